@@ -2,8 +2,9 @@
 //!
 //! A renderer has its device and its queues already. This program makes such a device, gives the engine
 //! a queue of it, and lets it write the poses of every frame into a buffer of the renderer's, from
-//! which another queue family, where there is one, copies them. At the end the bits are compared with
-//! the CPU's.
+//! which another queue family, where there is one, copies them. Then two clips are evaluated, mixed and
+//! walked to the world in one submission, without a way back to the host between. At the end the bits are
+//! compared with the CPU's.
 #![allow(clippy::disallowed_methods)] // poses to look at
 #![allow(unsafe_code)] // Vulkan's handles are the application's to promise
 
@@ -11,14 +12,18 @@ use std::error::Error;
 
 use ash::vk;
 use glam::Quat;
-use tumble::vulkan::{VulkanBuffer, VulkanHandles};
+use tumble::vulkan::{PosePass, VulkanBuffer, VulkanHandles};
 use tumble::{
-    Clip, Device, Engine, EngineOptions, Layout, SampleTimes, TrackSet, ash, glam, method,
+    Clip, Device, Engine, EngineOptions, Layout, SampleTimes, Skeleton, TrackSet, ash, glam, method,
 };
 
 const TRACKS: u64 = 60;
 /// Bytes of the poses of one frame.
 const SIZE: u64 = TRACKS * 16;
+/// Bytes of the same in the world, where a position is beside each rotation.
+const WORLD: u64 = 2 * SIZE;
+/// Bytes from one pose to the next in a buffer of several: passes bind ranges from multiples of 256 on.
+const STEP: u64 = SIZE.next_multiple_of(256);
 
 /// What a renderer has: a device, a queue for the engine, and one for drawing.
 struct Renderer {
@@ -131,11 +136,12 @@ impl Renderer {
     /// A buffer that both queue families may use, so that nobody needs to hand it over.
     fn buffer(
         &self,
+        size: u64,
         usage: vk::BufferUsageFlags,
         memory: vk::MemoryPropertyFlags,
     ) -> Result<(vk::Buffer, vk::DeviceMemory), Box<dyn Error>> {
         let families = [self.compute.1, self.graphics.1];
-        let info = vk::BufferCreateInfo::default().size(SIZE).usage(usage);
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         let info = match families[0] == families[1] {
             true => info,
             false => info
@@ -163,11 +169,24 @@ impl Renderer {
     }
 
     /// What a renderer does with the poses: here its queue copies them to memory that the host reads.
-    fn draw(&self, from: vk::Buffer, to: vk::Buffer) -> Result<(), vk::Result> {
-        // SAFETY: the buffers are alive and as long as the copy; the fence is waited for before anything
-        // is freed.
+    fn draw(&self, from: vk::Buffer, to: vk::Buffer) -> Result<(), Box<dyn Error>> {
+        self.submit(self.graphics, |commands| {
+            let region = vk::BufferCopy::default().size(SIZE);
+            // SAFETY: the commands are in recording, and the buffers are alive and as long as the copy.
+            unsafe { self.device.cmd_copy_buffer(commands, from, to, &[region]) };
+            Ok(())
+        })
+    }
+
+    /// Submits what is recorded to a queue, and waits for it.
+    fn submit(
+        &self,
+        (queue, family): (vk::Queue, u32),
+        record: impl FnOnce(vk::CommandBuffer) -> Result<(), Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
+        // SAFETY: plain use of a device that is alive; the fence is waited for before anything is freed.
         unsafe {
-            let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.graphics.1);
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(family);
             let pool = self.device.create_command_pool(&info, None)?;
             let info = vk::CommandBufferAllocateInfo::default()
                 .command_pool(pool)
@@ -175,16 +194,13 @@ impl Renderer {
             let commands = self.device.allocate_command_buffers(&info)?;
             let info = vk::CommandBufferBeginInfo::default();
             self.device.begin_command_buffer(commands[0], &info)?;
-            let region = vk::BufferCopy::default().size(SIZE);
-            self.device
-                .cmd_copy_buffer(commands[0], from, to, &[region]);
+            record(commands[0])?;
             self.device.end_command_buffer(commands[0])?;
             let fence = self
                 .device
                 .create_fence(&vk::FenceCreateInfo::default(), None)?;
             let submit = vk::SubmitInfo::default().command_buffers(&commands);
-            self.device
-                .queue_submit(self.graphics.0, &[submit], fence)?;
+            self.device.queue_submit(queue, &[submit], fence)?;
             self.device.wait_for_fences(&[fence], true, u64::MAX)?;
             self.device.destroy_fence(fence, None);
             self.device.destroy_command_pool(pool, None);
@@ -192,7 +208,19 @@ impl Renderer {
         Ok(())
     }
 
-    fn close(self, buffers: [(vk::Buffer, vk::DeviceMemory); 2]) {
+    /// What is in memory that the host sees.
+    fn read(&self, memory: vk::DeviceMemory, size: u64) -> Result<Vec<[f32; 4]>, vk::Result> {
+        // SAFETY: the memory is as long as what is read, and what writes it has ended.
+        unsafe {
+            let flags = vk::MemoryMapFlags::empty();
+            let pointer = self.device.map_memory(memory, 0, size, flags)?;
+            let values = std::slice::from_raw_parts(pointer.cast(), size as usize / 16).to_vec();
+            self.device.unmap_memory(memory);
+            Ok(values)
+        }
+    }
+
+    fn close(self, buffers: [(vk::Buffer, vk::DeviceMemory); 3]) {
         // SAFETY: the engine is dropped, and nothing is in flight.
         unsafe {
             for (buffer, memory) in buffers {
@@ -206,12 +234,12 @@ impl Renderer {
 }
 
 /// A clip of a minute, with a key a second.
-fn clip() -> Result<TrackSet, Box<dyn Error>> {
+fn clip(speed: f32) -> Result<TrackSet, Box<dyn Error>> {
     let times: Vec<f64> = (0..=60).map(f64::from).collect();
     let mut set = TrackSet::new();
     for track in 0..TRACKS {
         let keys: Vec<Quat> = (0..=60u8)
-            .map(|key| Quat::from_rotation_y((track as f32 * 0.1 + f32::from(key) * 0.7).sin()))
+            .map(|key| Quat::from_rotation_y((track as f32 * 0.1 + f32::from(key) * speed).sin()))
             .collect();
         set.push(format!("joint{track}"), &times, &keys)?;
     }
@@ -235,22 +263,87 @@ fn pose(clip: &Clip, time: f64, buffer: vk::Buffer) -> Result<(), tumble::Error>
     }
 }
 
+/// Evaluates two clips at one moment, mixes them by a quarter and walks the skeleton down to the world: four things in one
+/// submission, each of which sees what the one before it left in the buffer.
+fn mixed_in_world(
+    renderer: &Renderer,
+    [walk, run]: [&Clip; 2],
+    skeleton: &Skeleton,
+    time: f64,
+    [(buffer, _), (seen, seen_memory)]: [(vk::Buffer, vk::DeviceMemory); 2],
+) -> Result<Vec<[f32; 4]>, Box<dyn Error>> {
+    let range = |index: u64, size| VulkanBuffer {
+        buffer,
+        offset: index * STEP,
+        size,
+    };
+    let [from, to, local] = [0, 1, 2].map(|index| range(index, SIZE));
+    let world = range(3, WORLD);
+    let engine = walk.engine();
+    let frames = SampleTimes::at(vec![time]);
+    let pass = |pass| engine.pass(pass, TRACKS as usize, 1, Layout::FrameMajor);
+    let mix = PosePass::Mix {
+        from,
+        to,
+        weight: 0.25,
+    };
+    // SAFETY: the buffer is the device's, has memory and these usages, and lives longer than the targets, which
+    // live until `submit` has waited.
+    let (walk, run, mix, walked) = unsafe {
+        (
+            walk.request(&frames)
+                .layout(Layout::FrameMajor)
+                .target(from)?,
+            run.request(&frames).layout(Layout::FrameMajor).target(to)?,
+            pass(mix).target(local)?,
+            pass(PosePass::World { local, skeleton }).target(world)?,
+        )
+    };
+    renderer.submit(renderer.compute, |commands| {
+        let region = vk::BufferCopy::default()
+            .src_offset(world.offset)
+            .size(WORLD);
+        // SAFETY: the commands are in recording, and of a family that computes.
+        unsafe {
+            walk.record(commands, 0)?;
+            run.record(commands, 0)?;
+            mix.record(commands);
+            walked.record(commands);
+            renderer
+                .device
+                .cmd_copy_buffer(commands, buffer, seen, &[region]);
+        }
+        Ok(())
+    })?;
+    Ok(renderer.read(seen_memory, WORLD)?)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let renderer = Renderer::new()?;
     let pose_buffer = renderer.buffer(
+        SIZE,
+        vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_DST
+            | vk::BufferUsageFlags::TRANSFER_SRC,
+        vk::MemoryPropertyFlags::DEVICE_LOCAL,
+    )?;
+    let several = renderer.buffer(
+        3 * STEP + WORLD,
         vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::TRANSFER_DST
             | vk::BufferUsageFlags::TRANSFER_SRC,
         vk::MemoryPropertyFlags::DEVICE_LOCAL,
     )?;
     let seen = renderer.buffer(
+        WORLD,
         vk::BufferUsageFlags::TRANSFER_DST,
         vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
     )?;
-    let set = clip()?;
+    let sets = [clip(0.7)?, clip(1.9)?];
+    let skeleton = Skeleton::chain(TRACKS as usize, 0.2)?;
     // Both are kept for all frames: an upload prepares the keys, and costs as much as many frames.
     let engine = renderer.engine()?;
-    let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
+    let clip = engine.upload(&sets[0], method::BESSEL_OVERHAUSER)?;
     // The first call of a method compiles its kernel, up to a quarter of a second: while a level loads.
     pose(&clip, 0.0, pose_buffer.0)?;
 
@@ -259,33 +352,41 @@ fn main() -> Result<(), Box<dyn Error>> {
     for &time in &times {
         pose(&clip, time, pose_buffer.0)?;
         renderer.draw(pose_buffer.0, seen.0)?;
-        // SAFETY: the copy has ended, and the memory is as long as what is read.
-        drawn.extend(unsafe {
-            let flags = vk::MemoryMapFlags::empty();
-            let pointer = renderer.device.map_memory(seen.1, 0, SIZE, flags)?;
-            let poses = std::slice::from_raw_parts(pointer.cast::<[f32; 4]>(), TRACKS as usize);
-            let poses = poses.to_vec();
-            renderer.device.unmap_memory(seen.1);
-            poses
-        });
+        drawn.extend(renderer.read(seen.1, SIZE)?);
     }
+    let other = engine.upload(&sets[1], method::SLERP)?;
+    let buffers = [several, seen];
+    let in_world = mixed_in_world(&renderer, [&clip, &other], &skeleton, 12.3, buffers)?;
     let name = engine.device_name().to_owned();
-    drop((clip, engine));
-    renderer.close([pose_buffer, seen]);
+    drop((clip, other, engine));
+    renderer.close([pose_buffer, several, seen]);
 
     let cpu = Engine::new(Device::Cpu)?;
     let expected = cpu
-        .request(&set, method::BESSEL_OVERHAUSER, &SampleTimes::at(times))
+        .request(&sets[0], method::BESSEL_OVERHAUSER, &SampleTimes::at(times))
         .layout(Layout::FrameMajor)
         .evaluate()?;
-    let bits = |q: &[f32; 4]| q.map(f32::to_bits);
-    let pairs = drawn.iter().zip(expected.as_arrays());
-    let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+    let moment = SampleTimes::at(vec![12.3]);
+    let at_moment = |set, method| {
+        let request = cpu.request(set, method, &moment);
+        request.layout(Layout::FrameMajor).evaluate()
+    };
+    let walk = at_moment(&sets[0], method::BESSEL_OVERHAUSER)?;
+    let mixed = cpu.mix(&walk, &at_moment(&sets[1], method::SLERP)?, 0.25)?;
+    let expected_in_world = cpu.world(&mixed, &skeleton)?;
+    let differing = |found: &[[f32; 4]], expected: &[[f32; 4]]| {
+        let bits = |value: &[f32; 4]| value.map(f32::to_bits);
+        let pairs = found.iter().zip(expected);
+        pairs.filter(|(a, b)| bits(a) != bits(b)).count()
+    };
+    let rotations = differing(&drawn, expected.as_arrays());
+    let joints = differing(&in_world, expected_in_world.as_slice());
     println!(
-        "{} rotations on {name}, {differing} differ from the CPU's",
+        "{} rotations on {name}, {rotations} differ from the CPU's",
         drawn.len()
     );
-    if differing > 0 {
+    println!("{TRACKS} joints of two clips mixed, in the world, {joints} values differ");
+    if rotations + joints > 0 {
         return Err("bits differ".into());
     }
     Ok(())

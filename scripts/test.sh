@@ -121,7 +121,7 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
-# Three seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
+# Three seconds for each fuzz target, about a quarter for files of each format; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
 # The Python package waits for processes that it starts more than it computes, and other tests for their last
 # one: two rows of tests beside the engine's keep both cores busy.

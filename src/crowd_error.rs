@@ -3,6 +3,7 @@
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::VulkanError;
 use crate::memory::OutOfMemoryError;
+use crate::output::pose_error::OFFSET_STEP;
 use crate::prepare::error::SetError;
 use crate::threads::OutOfThreadsError;
 use crate::threads::stop::StoppedError;
@@ -20,8 +21,6 @@ pub(crate) const MAX_LAYERS: usize = 4;
 pub(crate) const MAX_TICKS: u32 = (1 << 31) - (1 << 18);
 /// Speeds stay below this magnitude.
 pub(crate) const FASTEST: f32 = 128.0;
-/// Where a buffer's range may start: Vulkan allows every device to ask for as much.
-pub(crate) const OFFSET_STEP: u64 = 256;
 
 /// Why a crowd cannot be made, changed or evaluated as asked. Places count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -69,11 +68,11 @@ pub enum CrowdError {
         ticks_per_second: u32,
     },
     /// The method is to give velocities.
-    #[error("the interpolation gives velocities or accelerations; a crowd takes rotations")]
+    #[error("the interpolation gives velocities or accelerations; a crowd needs rotations")]
     NotRotations,
     /// A curve that turns so wildly that no polynomial fits it.
     #[error(
-        "track {track} turns too wildly at {seconds} s for a polynomial; add a key there, or use slerp"
+        "track {track} rotates too fast at {seconds} s for a polynomial; add a key there, or use slerp"
     )]
     TooWild {
         /// The track.
@@ -133,12 +132,25 @@ pub enum CrowdError {
         /// How many there are.
         count: usize,
     },
+    /// An instance that a list has twice.
+    #[error(
+        "instance {instance} is in the list again, at {position}; a list of visible instances names each once"
+    )]
+    Repeated {
+        /// The instance.
+        instance: usize,
+        /// Where it comes again, from 0.
+        position: usize,
+    },
     /// A weight outside 0 to 1.
     #[error("the weight is {weight}; weights are 0 to 1")]
     Weight {
         /// What was given.
         weight: f32,
     },
+    /// A weight, or a fade, of the layer that has none.
+    #[error("the first layer has no weight; the layers above it, from 1 on, have one each")]
+    FirstLayer,
     /// A speed that is no number, or too fast.
     #[error(
         "the speed is {speed}; speeds lie between -{} and {}",

@@ -50,7 +50,8 @@
 //!   in [`Layout::FrameMajor`]; give the times in increasing order.
 //! * **Your own Vulkan device** ([`vulkan`]): [`Engine::from_vulkan`] takes a renderer's device and a queue,
 //!   [`Crowd::record`](crowd::Crowd::record) records a crowd's poses into its command buffers, and
-//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer. `examples/application_device.rs`
+//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer, where [`Engine::pass`]
+//!   blends them and walks skeletons. `examples/application_device.rs`
 //!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
 //! * **Bodies that travel**: [`Engine::follow`] moves them along [`paths`], [`Engine::smooth`] takes the
 //!   noise from samples.
@@ -79,7 +80,6 @@
 #![cfg_attr(not(feature = "vulkan"), allow(dead_code, unused_imports))]
 
 mod checks;
-mod clip;
 mod cpu;
 pub mod crowd;
 mod crowd_error;
@@ -116,13 +116,13 @@ mod tracks;
 mod twin;
 pub mod verify;
 
-pub use crate::clip::Clip;
-pub use crate::clip::request::Request;
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
 };
 pub use crate::device::Device;
 pub use crate::engine::Engine;
+pub use crate::engine::clip::Clip;
+pub use crate::engine::clip::request::Request;
 pub use crate::error::Error;
 pub use crate::gpu::options::EngineOptions;
 pub use crate::memory::OutOfMemoryError;
@@ -134,7 +134,7 @@ pub use crate::output::buffer::OutputBuffer;
 pub use crate::output::component_type::ComponentType;
 pub use crate::output::encoding::{Encoding, EncodingLengthError, EncodingOptions, MatrixOrder};
 pub use crate::output::euler::{EulerSequence, EulerSequenceError};
-pub use crate::output::pose_error::{PoseError, SkeletonError};
+pub use crate::output::pose_error::{PassOperand, PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::output::value::OutputValue;
@@ -152,12 +152,11 @@ pub use crate::time::frame_rate::FrameRate;
 pub use crate::time::frames::{SampleTimes, Timeline};
 pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
-pub use crate::tracks::check::UNIT_TOLERANCE;
 pub use crate::tracks::error::{NORM_TOLERANCE, TrackError};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};
-pub use crate::tracks::set::{Track, TrackSet};
+pub use crate::tracks::set::{Track, TrackSet, UNIT_TOLERANCE};
 
 pub mod paths {
     //! Bodies that follow paths: where they are, how they are turned, and when.
@@ -195,7 +194,8 @@ pub mod vulkan {
     //! * **An application's own device** (feature `vulkan`):
     //!   [`Engine::from_vulkan`](crate::Engine::from_vulkan) takes its `VulkanHandles` and a `VulkanQueue`, whose lock
     //!   is a `QueueLock`. Results go into a `VulkanBuffer`: at once by `Request::to_buffer`, or recorded into the
-    //!   application's commands by a `ClipTarget` or a `CrowdTarget`.
+    //!   application's commands by a `ClipTarget` or a `CrowdTarget`. A `PosePass` blends, mixes or adds what lies in
+    //!   such buffers, or walks a skeleton: a `PassTarget` records it.
     //! * **Memory for others on the same card**, such as CUDA: an `ExportedResult`.
     //!
     //! Without the feature `vulkan` no device is listed (`VulkanError::NotBuilt`); the types of an application's own
@@ -214,6 +214,8 @@ pub mod vulkan {
     #[cfg(feature = "vulkan")]
     pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
     pub use crate::gpu::options::Timings;
+    #[cfg(feature = "vulkan")]
+    pub use crate::gpu::pass_target::PassTarget;
     #[cfg(feature = "prove")]
     pub use crate::gpu::physical::details::{
         DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
@@ -221,6 +223,8 @@ pub mod vulkan {
     pub use crate::gpu::reports::{
         DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
     };
+    #[cfg(feature = "vulkan")]
+    pub use crate::pose::pass::{PassRequest, PosePass};
     pub use crate::shader::kernels;
 
     pub mod tuning {

@@ -18,6 +18,7 @@ mod extremes;
 mod follow;
 mod golden;
 mod mesa;
+mod method_lists;
 mod motion;
 mod names;
 mod numbers;

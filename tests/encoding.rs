@@ -1,6 +1,10 @@
 //! Results in other forms: the same bits from every device, namely those that the f32
 //! result gives.
 
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
 use crate::support::{KERNEL_OPTIONS, hostile_set, is_due, vulkan_engines};
 use glam::Quat;
 use tumble::{
@@ -73,6 +77,38 @@ fn every_device_encodes_like_the_host() {
             }
         }
     }
+}
+
+const BEGIN: &str =
+    "<!-- outputs: written by `UPDATE_EXPECTED=1 cargo test -p tumble --test all encoding` -->\n";
+const END: &str = "<!-- end of outputs -->\n";
+
+/// The guide's table of outputs is the engine's list.
+#[test]
+fn every_encoding_is_in_the_guide() {
+    let mut table = String::from("| name | numbers | bytes | what it is |\n|---|---|---|---|\n");
+    let mut names = Vec::new();
+    for encoding in Encoding::ALL {
+        if names.contains(&encoding.name()) {
+            continue; // with another option
+        }
+        names.push(encoding.name());
+        let numbers = encoding.components().join(" ");
+        let (name, bytes, summary) = (encoding.name(), encoding.bytes(), encoding.summary());
+        writeln!(table, "| `{name}` | `{numbers}` | {bytes} | {summary} |").unwrap();
+    }
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/methods.md");
+    let text = fs::read_to_string(&page).unwrap();
+    let (before, behind) = text.split_once(BEGIN).expect("the page has the table");
+    let (found, after) = behind.split_once(END).expect("the table ends");
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        fs::write(&page, format!("{before}{BEGIN}{table}{END}{after}")).unwrap();
+        return;
+    }
+    assert_eq!(
+        found, table,
+        "UPDATE_EXPECTED=1 writes the table of docs/methods.md"
+    );
 }
 
 #[test]

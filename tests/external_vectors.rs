@@ -251,7 +251,7 @@ fn drake_angular_velocity_across_a_sign_flip() {
         .to_vec();
     let times = [0.0, 1.6, 2.32];
     let curve = ReferenceCurve::new(
-        tumble::method::SLERP.reference,
+        tumble::method::SLERP.reference(),
         KeySigns::Shortest,
         Ends::default(),
         &times,
@@ -381,7 +381,7 @@ fn scipy_rotation_spline_of_two_keys_is_slerp() {
 fn curve(method: Method, times: &[f64], keys: &[DQuat]) -> ReferenceCurve {
     let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
     ReferenceCurve::new(
-        method.reference,
+        method.reference(),
         KeySigns::Shortest,
         method.ends,
         times,

@@ -1,6 +1,7 @@
 //! Angular velocities and accelerations: the derivatives of the formulas, near the
 //! reference's and with the same bits on every device.
 
+use crate::method_lists::{Column, assert_stated};
 use crate::support::{
     Random, first_difference, give_key_data, hostile_set, round_robin, vulkan_engines,
 };
@@ -107,6 +108,11 @@ fn velocities_and_accelerations_are_those_of_the_reference() {
                 let error = largest_error(&set, interpolation, &frames);
                 println!("{method}, {quantity:?}: {error:e}");
                 assert!(error < 2e-6, "{method}, {quantity:?}: {error:e}");
+                let column = match quantity {
+                    Quantity::Acceleration(_) => Column::Acceleration,
+                    _ => Column::Velocity,
+                };
+                assert_stated(method, column, error);
             }
         }
     }

@@ -232,7 +232,7 @@ fn two_keys_go_on_turning() {
         .unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "velocities are not mirrored; hold, loop or extrapolate them"
+        "velocities cannot be mirrored; hold, loop or extrapolate them"
     );
 }
 

@@ -1,6 +1,8 @@
 //! Poses from poses: layers blended, mixed and added, and chains walked down to the
 //! world. The same bits on every device, near the textbook.
 
+mod buffers;
+
 use crate::support::{Random, hostile_set, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::{angle_between, slerp};

@@ -3,8 +3,8 @@
 use crate::support::{Random, first_difference, hostile_set, is_due, vulkan_devices};
 use glam::{DQuat, Quat};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Error, Interpolation, Layout, METHODS, SampleTimes,
-    Speed, WrapMode, method,
+    Chunk, Device, Encoding, Engine, EngineOptions, Error, Interpolation, Layout, METHODS,
+    SampleTimes, Speed, WrapMode, method,
 };
 
 fn devices() -> Vec<Device> {
@@ -202,6 +202,26 @@ fn parts_are_those_of_the_whole() {
                                 * size;
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
+                    }
+                    // Of the set only that part is prepared.
+                    let of_set = engine.request(&set, interpolation, frames).layout(layout);
+                    let of_set = of_set.tracks(tracks.clone()).samples(part.clone());
+                    let bytes = of_set.clone().encoding(encoding).evaluate_bytes().unwrap();
+                    assert!(bytes == found, "{layout:?}, {encoding}");
+                    if encoding == Encoding::F32 {
+                        let none = of_set.clone().tracks(2..2);
+                        none.stream(50, |_| Err(Error::NotRates)).unwrap();
+                        let (mut streamed, mut chunks) = (Vec::new(), 0);
+                        let sink = |chunk: Chunk<'_>| {
+                            assert_eq!(chunk.start * 16, streamed.len());
+                            assert!(chunk.tracks.start >= tracks.start);
+                            assert!(chunk.samples.start >= part.start);
+                            streamed.extend_from_slice(bytemuck::cast_slice::<_, u8>(chunk.rows));
+                            chunks += 1;
+                            Ok::<(), Error>(())
+                        };
+                        of_set.stream(50, sink).unwrap();
+                        assert!(streamed == found && chunks > 1, "{layout:?}");
                     }
                 }
             }

@@ -27,7 +27,7 @@ fn free() -> impl Iterator<Item = Method> {
 }
 
 fn curve(method: Method, ends: Ends, times: &[f64], keys: &[Quat]) -> ReferenceCurve {
-    ReferenceCurve::new(method.reference, KeySigns::Shortest, ends, times, keys)
+    ReferenceCurve::new(method.reference(), KeySigns::Shortest, ends, times, keys)
 }
 
 /// `count` keys, each up to `step` radians from the one before.

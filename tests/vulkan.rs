@@ -247,6 +247,7 @@ fn results_stay_in_an_applications_own_buffer() {
 
 #[allow(unsafe_code)] // the buffer is the application's
 fn assert_stays_in_application_buffer(mapping: Mapping) {
+    use crate::application::ApplicationBuffer;
     let application = crate::application::Application::new();
     let engine = application.engine(mapping);
     // With intervals so wild that the host computes their samples.
@@ -308,6 +309,30 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
         }
     }
     let cpu = Engine::new(Device::Cpu).unwrap();
+    // Of a set, some samples of some tracks: only what they need is prepared.
+    for (frames, samples) in [(&frames, 100..150), (&sparse, 1..2)] {
+        for method in [method::SLERP, method::C2] {
+            let part = |engine: &Engine| {
+                let request = engine.request(&set, method, frames);
+                let request = request.layout(Layout::FrameMajor).tracks(3..33);
+                let request = request.samples(samples.clone());
+                let bytes = request.evaluate_bytes().unwrap();
+                let buffer = ApplicationBuffer::of(&application, &vec![0; bytes.len()]);
+                let range = buffer.range(0, bytes.len() as u64);
+                if std::ptr::eq(engine, &cpu) {
+                    return [bytes.clone(), bytes];
+                }
+                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                unsafe { request.to_buffer(range) }.unwrap();
+                let found = buffer.bytes();
+                // SAFETY: as above.
+                let target = unsafe { request.target(range) }.unwrap();
+                assert_eq!(target.bytes(), bytes.len() as u64);
+                [bytes, found]
+            };
+            assert!(part(&engine) == part(&cpu), "{method}");
+        }
+    }
     let clip = cpu.upload(&set, method::SLERP).unwrap();
     let nowhere = VulkanBuffer {
         buffer: ash::vk::Buffer::null(),

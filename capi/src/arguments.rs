@@ -55,6 +55,7 @@ pub(crate) unsafe fn list<'a, T: Copy>(
 pub(crate) trait Number: Copy {}
 
 impl Number for f32 {}
+impl Number for u8 {}
 impl Number for u16 {}
 impl Number for i32 {}
 

@@ -13,9 +13,9 @@ use crate::vulkan::buffer_range;
 
 /// A set prepared for one method, on an engine's device. Any number of threads may use it at once.
 pub struct TumbleClip {
-    inner: Clip,
+    pub(crate) inner: Clip,
     /// Whether its engine is on the application's own Vulkan device.
-    is_on_application_device: bool,
+    pub(crate) is_on_application_device: bool,
 }
 
 impl Object for TumbleClip {

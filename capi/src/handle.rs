@@ -59,7 +59,7 @@ pub(crate) fn get<T: Object>(handle: *const T) -> Result<Arc<T>, Failure> {
     }
     let found = read().objects.get(&handle.addr()).cloned();
     let found = found.ok_or_else(|| {
-        let message = format!("this {name} was freed, or was never given");
+        let message = format!("this {name} was freed, or never existed");
         Failure::new(TumbleResult::InvalidHandle, message)
     })?;
     found.downcast().map_err(|_| {

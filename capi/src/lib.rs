@@ -15,6 +15,7 @@ pub mod engine;
 pub mod file;
 mod handle;
 pub mod interpolation;
+pub mod request;
 pub mod result;
 pub mod samples;
 pub mod set;

@@ -72,6 +72,7 @@ impl From<Error> for Failure {
             | Error::OutputBytes { .. }
             | Error::ComparedLength { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
+            Error::NoSuchPart { .. } => TumbleResult::OutOfRange,
             Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };
@@ -136,6 +137,8 @@ impl From<CrowdError> for Failure {
             | CrowdError::Instances { .. }
             | CrowdError::Layers { .. }
             | CrowdError::Weight { .. }
+            | CrowdError::FirstLayer
+            | CrowdError::Repeated { .. }
             | CrowdError::Speed { .. }
             | CrowdError::Wrap { .. }
             | CrowdError::Seconds { .. }

@@ -15,6 +15,7 @@ use crate::engine::*;
 use crate::file::*;
 use crate::handle;
 use crate::interpolation::*;
+use crate::request::TumbleMatrixOrder;
 use crate::result::*;
 use crate::samples::*;
 use crate::set::*;
@@ -81,6 +82,10 @@ fn constants_count_the_options_of_the_engine() {
     same(
         &[TumbleLayout::TrackMajor, TumbleLayout::FrameMajor],
         &tumble::Layout::ALL,
+    );
+    same(
+        &[TumbleMatrixOrder::RowMajor, TumbleMatrixOrder::ColumnMajor],
+        &tumble::MatrixOrder::ALL,
     );
     use crate::crowd::output::TumbleCrowdValues as V;
     same(

@@ -36,6 +36,7 @@ fn the_header_is_what_the_sources_say() {
         "interpolation",
         "samples",
         "clip",
+        "request",
         "set_vectors",
         "vulkan",
         "crowd/library",

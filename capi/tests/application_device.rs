@@ -1,4 +1,4 @@
-//! Crowds on an application's own Vulkan device, through the functions that C has.
+//! Crowds and clips on an application's own Vulkan device, through the functions that C has.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use std::ffi::{CStr, c_void};
@@ -14,6 +14,8 @@ use tumble_capi::crowd::output::*;
 use tumble_capi::crowd::player::*;
 use tumble_capi::crowd::target::*;
 use tumble_capi::engine::*;
+use tumble_capi::interpolation::*;
+use tumble_capi::request::*;
 use tumble_capi::result::*;
 use tumble_capi::samples::*;
 use tumble_capi::set::*;
@@ -405,6 +407,284 @@ fn clips_are_evaluated_into_an_applications_buffer() {
         done(tumble_clip_free(clip));
         done(tumble_engine_free(engine));
     }
+    done(tumble_set_free(set));
+    // SAFETY: nothing is in flight.
+    unsafe {
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
+}
+
+/// A set of three tracks that turn differently.
+fn turning_set() -> *mut TumbleSet {
+    let mut set = null_mut();
+    // SAFETY: as many numbers as stated, and room for the handle.
+    unsafe {
+        done(tumble_set_new(&raw mut set));
+        for track in 1..=3 {
+            let times: [f64; 5] = std::array::from_fn(|key| 0.25 * key as f64 * f64::from(track));
+            let keys: [[f32; 4]; 5] = [
+                [0.0, 0.0, 0.0, 1.0],
+                [0.6, 0.0, 0.0, 0.8],
+                [0.36, 0.48, 0.0, 0.8],
+                [0.0, 0.8, 0.0, 0.6],
+                [0.0, 0.0, -0.28, 0.96],
+            ];
+            let keys: [[f32; 4]; 5] = std::array::from_fn(|key| keys[key * track as usize % 5]);
+            let (times, keys) = (times.as_ptr(), keys.as_ptr().cast());
+            done(tumble_set_push(set, null(), times, keys, 5));
+        }
+    }
+    set
+}
+
+/// A request's bytes in the caller's memory.
+fn requested(clip: *const TumbleClip, request: &TumbleRequest) -> Vec<u8> {
+    let mut bytes = 0;
+    // SAFETY: a structure, room for the number, and memory of that size.
+    unsafe {
+        done(tumble_request_bytes(clip, request, &raw mut bytes));
+        let mut found = vec![0xff_u8; bytes];
+        let output = found.as_mut_ptr().cast();
+        done(tumble_request_evaluate(clip, request, output, bytes));
+        found
+    }
+}
+
+/// What is asked of a clip is recorded into an application's commands, in every encoding: the bytes that the CPU
+/// gives.
+#[test]
+fn clips_are_recorded_into_an_applications_commands() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let commands = Commands::new(&application);
+    let set = turning_set();
+    let samples = TumbleSamples {
+        size: size_of::<TumbleSamples>(),
+        sampling: TumbleSampling::Range as u32,
+        rate_frames: 60,
+        rate_seconds: 1,
+        start: -0.25,
+        end: 3.5,
+        times: null(),
+        time_count: 0,
+    };
+    let whole = TumbleRequest {
+        size: size_of::<TumbleRequest>(),
+        samples: &raw const samples,
+        layout: 0,
+        matrix_order: 0,
+        encoding: null(),
+        sequence: null(),
+        first_track: 0,
+        track_count: 0,
+        first_sample: 0,
+        sample_count: 0,
+    };
+    let (mut engine, mut cpu) = (null_mut(), null_mut());
+    done(open(&handles(&application), &mut engine));
+    // SAFETY: text, null and room for the handle.
+    done(unsafe { tumble_engine_open(c"cpu".as_ptr(), null(), &raw mut cpu) });
+    let upload = |engine, interpolation| {
+        let mut clip = null_mut();
+        // SAFETY: a structure, and room for the handle.
+        done(unsafe { tumble_upload(engine, set, interpolation, &raw mut clip) });
+        clip
+    };
+    let mut requests = Vec::new();
+    for index in 0..tumble_encoding_count() {
+        let encoding = tumble_encoding_name(index);
+        requests.push(TumbleRequest {
+            encoding,
+            layout: index as u32 % 2,
+            ..whole
+        });
+        requests.push(TumbleRequest {
+            encoding,
+            matrix_order: 1,
+            sequence: c"zxz".as_ptr(),
+            first_track: 1,
+            track_count: 1,
+            first_sample: 20,
+            ..whole
+        });
+    }
+    assert!(requests.len() >= 16 && tumble_encoding_name(requests.len() / 2).is_null());
+    let target = |clip, request: &TumbleRequest, buffer: vk::Buffer, (offset, size)| {
+        let mut target = null_mut();
+        let buffer = buffer.as_raw();
+        // SAFETY: the buffer is the application's, which frees the target first; room for the handle.
+        let made =
+            unsafe { tumble_clip_target_new(clip, request, buffer, offset, size, &raw mut target) };
+        (made, target)
+    };
+    let record = |target, commands, offset| {
+        // SAFETY: the commands are in recording, or the call is refused before they are used.
+        unsafe { tumble_clip_record(target, commands, offset) }
+    };
+    let free = |target| {
+        // SAFETY: nothing is in flight.
+        unsafe { tumble_clip_target_free(target) }
+    };
+    for name in [c"slerp", c"bessel-overhauser"] {
+        let interpolation = TumbleInterpolation {
+            size: size_of::<TumbleInterpolation>(),
+            method: name.as_ptr(),
+            // SAFETY: numbers and null are zeros.
+            ..unsafe { std::mem::zeroed() }
+        };
+        let recorded = upload(engine, &raw const interpolation);
+        let expected = upload(cpu, &raw const interpolation);
+        for request in &requests {
+            let expected = requested(expected, request);
+            assert!(requested(recorded, request) == expected);
+            let size = expected.len() as u64;
+            // A multiple of the bytes of a value of every encoding.
+            const VALUES: u64 = 144;
+            let second = size.next_multiple_of(VALUES);
+            let (buffer, memory) = application.buffer(VALUES + second + size);
+            let (made, target) = target(recorded, request, buffer, (VALUES, second + size));
+            done(made);
+            let all = commands.recorded(|commands| {
+                done(record(target, pointer(commands), 0));
+                done(record(target, pointer(commands), second));
+            });
+            // What was recorded may be submitted again.
+            commands.run(&[all]);
+            commands.run(&[all]);
+            let found = application.bytes(memory, VALUES + second + size);
+            let (first, behind) = found[VALUES as usize..].split_at(second as usize);
+            assert!(first[..expected.len()] == expected && behind == expected);
+            done(free(target));
+            // SAFETY: nothing is in flight.
+            unsafe {
+                application.device.destroy_buffer(buffer, None);
+                application.device.free_memory(memory, None);
+            }
+        }
+        done(tumble_clip_free(recorded));
+        done(tumble_clip_free(expected));
+    }
+
+    // What does not fit, and what is not there.
+    let (clip, of_cpu) = (upload(engine, null()), upload(cpu, null()));
+    let size = requested(of_cpu, &whole).len() as u64;
+    let (buffer, memory) = application.buffer(16 + size);
+    let fits = (16, size);
+    for wrong in [(8, size), (16, size - 1)] {
+        fails(
+            target(clip, &whole, buffer, wrong).0,
+            TumbleResult::WrongSize,
+            "does not fit",
+        );
+    }
+    let argument = TumbleResult::InvalidArgument;
+    let (made, _) = target(of_cpu, &whole, buffer, fits);
+    fails(made, argument, "tumble_engine_from_vulkan");
+    let (made, _) = target(clip, &whole, vk::Buffer::null(), fits);
+    fails(made, TumbleResult::InvalidPointer, "VK_NULL_HANDLE");
+    for (wrong, code, says) in [
+        (
+            TumbleRequest { size: 8, ..whole },
+            argument,
+            "set it to `sizeof`",
+        ),
+        (
+            TumbleRequest {
+                samples: null(),
+                ..whole
+            },
+            TumbleResult::InvalidPointer,
+            "`samples` is null",
+        ),
+        (
+            TumbleRequest {
+                encoding: c"f64".as_ptr(),
+                ..whole
+            },
+            argument,
+            "`request->encoding`: there is no encoding `f64`; there are f32, f16",
+        ),
+        (
+            TumbleRequest {
+                sequence: c"XXY".as_ptr(),
+                ..whole
+            },
+            argument,
+            "`request->sequence`: `XXY` is not a sequence",
+        ),
+        (
+            TumbleRequest {
+                matrix_order: 2,
+                ..whole
+            },
+            argument,
+            "`request->matrix_order` is 2",
+        ),
+        (
+            TumbleRequest { layout: 2, ..whole },
+            argument,
+            "`layout` is 2",
+        ),
+        (
+            TumbleRequest {
+                first_track: 3,
+                track_count: 1,
+                ..whole
+            },
+            TumbleResult::OutOfRange,
+            "tracks 3..4",
+        ),
+        (
+            TumbleRequest {
+                first_sample: 1,
+                sample_count: usize::MAX,
+                ..whole
+            },
+            TumbleResult::OutOfRange,
+            "samples 1..",
+        ),
+    ] {
+        fails(target(clip, &wrong, buffer, fits).0, code, says);
+    }
+    let (made, good) = target(clip, &whole, buffer, fits);
+    done(made);
+    fails(
+        record(good, null_mut(), 0),
+        TumbleResult::InvalidPointer,
+        "`commands` is null",
+    );
+    commands.recorded(|commands| {
+        for offset in [8, 16] {
+            let refused = record(good, pointer(commands), offset);
+            fails(refused, TumbleResult::WrongSize, "does not fit");
+        }
+    });
+    let mut output = [0_u8; 15];
+    // SAFETY: so many bytes.
+    let refused =
+        unsafe { tumble_request_evaluate(clip, &raw const whole, output.as_mut_ptr().cast(), 15) };
+    fails(refused, TumbleResult::WrongSize, "the output has 15 bytes");
+    // A target needs neither its clip nor its engine.
+    for clip in [clip, of_cpu] {
+        done(tumble_clip_free(clip));
+    }
+    done(tumble_engine_free(engine));
+    commands.run(&[commands.recorded(|commands| done(record(good, pointer(commands), 0)))]);
+    done(free(good));
+    fails(
+        free(good),
+        TumbleResult::InvalidHandle,
+        "this clip target was freed",
+    );
+    fails(
+        record(good, pointer(vk::CommandBuffer::from_raw(8)), 0),
+        TumbleResult::InvalidHandle,
+        "was freed",
+    );
+    done(tumble_engine_free(cpu));
     done(tumble_set_free(set));
     // SAFETY: nothing is in flight.
     unsafe {

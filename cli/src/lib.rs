@@ -28,27 +28,27 @@ const ABOUT: &str = "Interpolate tracks of rotation keys in bulk, on Vulkan or t
 
 const EXAMPLES: &str = "\
 Examples:
-  tumble generate -o chain.dat                 make a file to play with
-  tumble info chain.dat                        what is in it
+  tumble generate -o chain.dat                 make an example file
+  tumble info chain.dat                        show what it contains
   tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
-  tumble eval walks -o results                 a directory of files; --resume goes on
-  tumble check results                         are its bits still what they were?
-  tumble merge results                         shards of many processes become one manifest
-  tumble verify chain.dat                      device = CPU, and both against f64
-  tumble route hill.obj --from 0,0,0 --to 9,5,0 -o way.csv
-  tumble view chain.dat --open                 see the boxes turn
-  tumble plot chain.dat -o chain.svg           see every component
-  tumble devices                               what Vulkan offers here
-  tumble prove                                 does a device keep what is promised?
-  tumble bench                                 how fast this machine is
+  tumble eval walks -o results --resume        a directory of files; skips results that are done
+  tumble check results                         find results that changed since they were written
+  tumble merge results                         combine the shards of several processes
+  tumble verify chain.dat                      compare a device with the CPU, and both with f64
+  tumble route hill.obj --start-point 0,0,0 --end-point 9,5,0 -o way.csv
+  tumble view chain.dat --open                 show it in the browser
+  tumble plot chain.dat -o chain.svg           plot every component
+  tumble devices                               list the Vulkan devices
+  tumble prove                                 test everything that is promised of a device
+  tumble bench                                 measure the speed of this machine
 
 Exit codes:
-  0 done                           5 a Vulkan device was demanded, there is none
-  1 a bug in tumble                6 the device failed, or is not exact
+  0 success                        5 Vulkan is required, and there is no Vulkan device
+  1 a bug in tumble                6 the device failed, or its bits differ
   2 the command line is wrong      7 output could not be written
-  3 some inputs failed             8 a difference was found, or nothing proved
-  4 all inputs failed              129 to 131, 141, 143 by a signal";
+  3 some inputs failed             8 results differ or are missing, or nothing was proved
+  4 all inputs failed              129 to 131, 141, 143 ended by a signal";
 
 /// The command line.
 #[derive(Debug, Parser)]
@@ -67,11 +67,104 @@ pub fn main() -> ExitCode {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
+    use std::collections::BTreeMap;
+
+    use clap::{Arg, CommandFactory, Parser};
+
+    use super::Arguments;
 
     /// clap checks its own definition: clashing flags, bad defaults.
     #[test]
     fn the_command_line_is_well_defined() {
-        super::Arguments::command().debug_assert();
+        Arguments::command().debug_assert();
+    }
+
+    /// What an option means: its help up to what is of one command alone, which comes behind a colon, a
+    /// semicolon or a bracket.
+    fn meaning(option: &Arg) -> String {
+        let help = option.get_help().unwrap_or_default().to_string();
+        let end = help.find([':', ';', '[']).unwrap_or(help.len());
+        help[..end].trim().to_owned()
+    }
+
+    /// One name, one meaning, in all commands; and one letter for one name.
+    #[test]
+    fn an_option_means_the_same_in_every_command() {
+        let program = Arguments::command();
+        let mut meanings: BTreeMap<&str, BTreeMap<String, Vec<&str>>> = BTreeMap::new();
+        let mut letters: BTreeMap<char, &str> = BTreeMap::new();
+        for command in program.get_subcommands() {
+            for option in command.get_arguments() {
+                let visible = option.get_visible_aliases().unwrap_or_default();
+                for name in option.get_long().into_iter().chain(visible) {
+                    let commands = meanings.entry(name).or_default();
+                    let users = commands.entry(meaning(option)).or_default();
+                    users.push(command.get_name());
+                }
+                if let (Some(letter), Some(name)) = (option.get_short(), option.get_long()) {
+                    assert_eq!(*letters.entry(letter).or_insert(name), name, "-{letter}");
+                }
+            }
+        }
+        assert!(meanings.len() > 100, "{}", meanings.len());
+        for (name, commands) in meanings {
+            assert_eq!(commands.len(), 1, "--{name} means {commands:#?}");
+            assert!(!commands.contains_key(""), "--{name} has no help");
+        }
+    }
+
+    /// Options that once had a name of two meanings are still known by it, and go into manifests as they
+    /// always did.
+    #[test]
+    fn older_names_of_options_are_the_same_options() {
+        let route = "route hill.obj -o o.csv";
+        for (old, new, recorded) in [
+            (
+                format!("{route} --from 0,0,0 --to 1,-1,1"),
+                format!("{route} --start-point 0,0,0 --end-point 1,-1,1"),
+                "",
+            ),
+            (
+                "convert a -o b --up z".into(),
+                "convert a -o b --up-axis z".into(),
+                "\"up\": [\"z\"]",
+            ),
+            (
+                "smooth a -o b --ends loop".into(),
+                "smooth a -o b --edges loop".into(),
+                "\"ends\": [\"loop\"]",
+            ),
+            (
+                "view a -o b --axes 9".into(),
+                "view a -o b --drawn-frames 9".into(),
+                "",
+            ),
+            (
+                "render a -o b --axes 9".into(),
+                "render a -o b --drawn-frames 9".into(),
+                "",
+            ),
+            (
+                "plot a -o b --format png".into(),
+                "plot a -o b --picture-format png".into(),
+                "",
+            ),
+            (
+                "prove --seconds 9".into(),
+                "prove --time-limit 9".into(),
+                "",
+            ),
+        ] {
+            let [old, new] = [old, new].map(|line| {
+                let words = ["tumble"].into_iter().chain(line.split(' '));
+                let parsed = Arguments::try_parse_from(words);
+                format!(
+                    "{:?}",
+                    parsed.unwrap_or_else(|error| panic!("{line}: {error}"))
+                )
+            });
+            assert_eq!(old, new);
+            assert!(new.contains(recorded), "{new}");
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! since workers may see them under other names. A [`LibraryPlan`] cuts the library, a [`Worker`] keeps
 //! a device open and evaluates shards, and [`merge`] makes one manifest of their records.
 
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -12,19 +13,18 @@ use clap::Parser;
 use serde::Serialize;
 use tumble_formats::Format;
 
-use crate::arguments::gather::{FoundInput, GatheredInputs};
-use crate::batch::entry;
-use crate::batch::output_plan;
-use crate::batch::result_names;
+use crate::arguments::input::{FoundInput, GatheredInputs};
+use crate::batch::entry::{ManifestEntry, ManifestLines};
+use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
-use crate::batch::shards::record::ShardHeader;
+use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::batch::shards::run::Shard;
-use crate::batch::shards::{merge as merging, record::RefusedInput};
+use crate::batch::{entry, output_plan, result_names};
 use crate::commands::eval::Arguments;
 use crate::commands::eval::job::EvaluationReport;
 use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
 use crate::host::Refused;
-use crate::messages::exit::{Failure, USAGE};
+use crate::messages::exit::{ALL_INPUTS, Failure, USAGE};
 use crate::messages::words;
 
 /// A command line.
@@ -291,6 +291,189 @@ impl Worker {
     }
 }
 
+/// A shard's file as text, for front ends that keep results where the program cannot write: what is said of
+/// the shard, and its lines of the manifest.
+#[derive(Debug, Clone)]
+pub struct ShardRecord {
+    header: ShardHeader,
+    entries: Vec<ManifestEntry>,
+    is_whole: bool,
+}
+
+/// A file of rows that holds all results of a shard.
+#[derive(Debug, Clone)]
+pub struct RowsFile {
+    /// Its name below the directory of results.
+    pub name: String,
+    /// Its hash.
+    pub sha256: String,
+    /// Its length.
+    pub bytes: u64,
+    /// The library whose inputs it holds the results of.
+    pub library: String,
+    /// The hash of the hashes of these inputs.
+    pub inputs_sha256: String,
+    /// Its kind, as in [`LibraryPlan::new`].
+    pub into: String,
+}
+
+impl ShardRecord {
+    /// The name of a shard's file below the directory of results.
+    #[must_use]
+    pub fn name_of(shard: usize) -> String {
+        format!("{}/{shard:05}.jsonl", record::FOLDER)
+    }
+
+    /// Reads a shard's file; `None` where the text is none.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let bytes = text.as_bytes();
+        let (header, start) = record::header(bytes)?;
+        Some(Self {
+            header,
+            entries: entries_of(&text[start..]),
+            is_whole: record::whole(bytes).is_some(),
+        })
+    }
+
+    /// The file of a shard whose results are these lines of a manifest; others are left out.
+    #[must_use]
+    pub fn new(shard: usize, of: usize, plan: String, inputs: usize, lines: &[String]) -> Self {
+        let header = ShardHeader {
+            shard,
+            of,
+            plan,
+            inputs,
+            ..ShardHeader::default()
+        };
+        Self {
+            header,
+            entries: entries_of(&lines.concat()),
+            is_whole: true,
+        }
+    }
+
+    /// Whether the text had all its lines, as they were written.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    /// The plan that the shard is of: [`LibraryPlan::id`].
+    #[must_use]
+    pub fn plan(&self) -> &str {
+        &self.header.plan
+    }
+
+    /// Makes it a shard of another plan, whose results are the same.
+    pub fn set_plan(&mut self, plan: String) {
+        self.header.plan = plan;
+    }
+
+    /// Its results: the name below the directory, the hash and the length of each.
+    #[must_use]
+    pub fn results(&self) -> Vec<(String, String, u64)> {
+        results_of(&self.entries)
+    }
+
+    /// Adds an input that has no result.
+    pub fn refuse(&mut self, input: String, message: String) {
+        let code = ALL_INPUTS;
+        self.header.inputs += 1;
+        self.header.failed.push(RefusedInput {
+            input,
+            code,
+            message,
+        });
+    }
+
+    /// Whether it has all results of inputs, and no others: made from inputs of these hashes, by the name of
+    /// each input's result without its ending, with these options, kernels and version.
+    #[must_use]
+    pub fn is_made_from(&self, inputs: &BTreeMap<String, String>, options: &str) -> bool {
+        let mut parts: BTreeMap<String, usize> = BTreeMap::new();
+        let mut made = 0;
+        for entry in &self.entries {
+            let (key, count) = (key_of(entry), entry.whole().1);
+            let hash = inputs.get(&key);
+            if !hash.is_some_and(|hash| entry.is_made_from(hash, options)) {
+                return false;
+            }
+            let parts = parts.entry(key).or_default();
+            *parts += 1;
+            made += usize::from(*parts == count);
+        }
+        self.header.failed.is_empty() && made == inputs.len()
+    }
+
+    /// Puts a file of rows in the place of its results; nothing where there are none.
+    pub fn join(&mut self, rows: RowsFile) {
+        let Some(first) = self.entries.first() else {
+            return;
+        };
+        self.entries = vec![ManifestEntry {
+            output: rows.name,
+            output_sha256: rows.sha256,
+            output_bytes: rows.bytes,
+            input: rows.library,
+            input_sha256: Some(rows.inputs_sha256),
+            options: format!("{} into={}", first.options, rows.into),
+            one_of: None,
+            ..first.clone()
+        }];
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn text(&self) -> String {
+        record::text(&self.header, &self.entries)
+    }
+}
+
+fn entries_of(lines: &str) -> Vec<ManifestEntry> {
+    let lines = lines.split_inclusive('\n');
+    lines
+        .filter_map(|line| ManifestEntry::of_line(line.as_bytes()))
+        .collect()
+}
+
+fn results_of<'a>(
+    entries: impl IntoIterator<Item = &'a ManifestEntry>,
+) -> Vec<(String, String, u64)> {
+    let result = |entry: &ManifestEntry| {
+        let (output, sha256) = (entry.output.clone(), entry.output_sha256.clone());
+        (output, sha256, entry.output_bytes)
+    };
+    entries.into_iter().map(result).collect()
+}
+
+/// What the results of an entry's input are known by: without the ending, which is the format's, except for
+/// files of rows.
+fn key_of(entry: &ManifestEntry) -> String {
+    let name = entry.whole().0;
+    match name.ends_with(".parquet") {
+        true => name.to_owned(),
+        false => Path::new(name).with_extension("").display().to_string(),
+    }
+}
+
+/// The results that a manifest lists, the last line of each: its name, its hash and its length.
+#[must_use]
+pub fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
+    results_of(ManifestLines::parse(text.as_bytes()).entries.values())
+}
+
+/// The lines of a manifest, by the input's result that they are of, without its ending.
+#[must_use]
+pub fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
+    let mut found: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for entry in entries_of(text) {
+        let lines = found.entry(key_of(&entry)).or_default();
+        lines.push(entry::line(&entry));
+    }
+    found
+}
+
 fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("strings and numbers")
 }
@@ -324,4 +507,135 @@ pub fn merge(folder: &Path) -> Result<MergeReport, Refused> {
         inputs: merged.inputs,
         failed: merged.failed,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(output: &str, one_of: Option<(&str, usize)>) -> String {
+        entry::line(&ManifestEntry {
+            output: output.to_owned(),
+            output_sha256: format!("hash of {output}"),
+            output_bytes: 3,
+            input: "a.glb".to_owned(),
+            input_sha256: Some("1".to_owned()),
+            options: "o".to_owned(),
+            kernels_sha256: kernels_sha256().to_owned(),
+            tumble: env!("CARGO_PKG_VERSION").to_owned(),
+            device: "CPU".to_owned(),
+            one_of: one_of.map(|(all, count)| (all.to_owned(), count)),
+        })
+    }
+
+    fn hashes(keys: &[&str]) -> BTreeMap<String, String> {
+        keys.iter()
+            .map(|key| ((*key).to_owned(), "1".to_owned()))
+            .collect()
+    }
+
+    #[test]
+    fn a_record_is_read_as_it_was_written() {
+        let lines = [line("é\u{2028}.npy", None), line("a.npy", None)];
+        let mut record = ShardRecord::new(3, 9, "plan".to_owned(), 2, &lines);
+        record.refuse("bad.dat".to_owned(), "no keys".to_owned());
+        let text = record.text();
+        assert!(text.ends_with(&lines.concat()), "{text}");
+        let read = ShardRecord::parse(&text).unwrap();
+        assert!(read.is_whole());
+        assert_eq!((read.text(), read.plan()), (text.clone(), "plan"));
+        assert_eq!((read.header.inputs, read.header.failed.len()), (3, 1));
+        let less = ShardRecord::parse(&text.replace(&lines[1], "")).unwrap();
+        assert!(!less.is_whole());
+        assert_eq!(less.results().len(), 1);
+        assert!(ShardRecord::parse("").is_none());
+        assert!(
+            !ShardRecord::parse(&text[..text.len() - 1])
+                .unwrap()
+                .is_whole()
+        );
+    }
+
+    /// All clips of all inputs, from the same bytes with the same options.
+    #[test]
+    fn a_shard_is_done_when_all_its_results_are_those_of_the_request() {
+        let clips = [
+            line("b.npy", None),
+            line("a.run.npy", Some(("a.npy", 2))),
+            line("a.walk.npy", Some(("a.npy", 2))),
+        ];
+        let of = |lines: &[String]| ShardRecord::new(1, 1, String::new(), 2, lines);
+        let both = hashes(&["a", "b"]);
+        assert!(of(&clips).is_made_from(&both, "o"));
+        assert!(!of(&clips).is_made_from(&both, "p"), "other options");
+        assert!(
+            !of(&clips[..2]).is_made_from(&both, "o"),
+            "a clip is missing"
+        );
+        assert!(
+            !of(&clips).is_made_from(&hashes(&["b"]), "o"),
+            "another input"
+        );
+        assert!(
+            !of(&clips).is_made_from(&hashes(&["a", "b", "c"]), "o"),
+            "no result of c"
+        );
+        let mut changed = both.clone();
+        changed.insert("b".to_owned(), "2".to_owned());
+        assert!(
+            !of(&clips).is_made_from(&changed, "o"),
+            "another input's bytes"
+        );
+        let mut failed = of(&clips);
+        failed.refuse("c.dat".to_owned(), String::new());
+        assert!(!failed.is_made_from(&both, "o"));
+    }
+
+    #[test]
+    fn rows_take_the_place_of_a_shards_results() {
+        let lines = [line("a.npy", None), line("b.npy", None)];
+        let mut record = ShardRecord::new(1, 1, String::new(), 2, &lines);
+        record.join(RowsFile {
+            name: "part-00001.parquet".to_owned(),
+            sha256: "rows".to_owned(),
+            bytes: 8,
+            library: "clips".to_owned(),
+            inputs_sha256: "1".to_owned(),
+            into: "parquet".to_owned(),
+        });
+        let results = record.results();
+        assert_eq!(
+            results,
+            [("part-00001.parquet".to_owned(), "rows".to_owned(), 8)]
+        );
+        assert!(record.is_made_from(&hashes(&["part-00001.parquet"]), "o into=parquet"));
+        let mut none = ShardRecord::new(1, 1, String::new(), 0, &[]);
+        none.join(RowsFile {
+            name: "part-00001.parquet".to_owned(),
+            sha256: String::new(),
+            bytes: 0,
+            library: String::new(),
+            inputs_sha256: String::new(),
+            into: String::new(),
+        });
+        assert_eq!(none.results(), []);
+    }
+
+    #[test]
+    fn manifests_are_listed_by_result_and_by_input() {
+        let lines = [
+            line("walks/a.run.npy", Some(("walks/a.npy", 2))),
+            line("walks/a.walk.npy", Some(("walks/a.npy", 2))),
+            line("b.npy", None),
+            "{\"output\":3}\n".to_owned(),
+        ];
+        let by_input = manifest_by_input(&lines.concat());
+        assert_eq!(by_input.keys().collect::<Vec<_>>(), ["b", "walks/a"]);
+        assert_eq!(by_input["walks/a"], lines[..2]);
+        let names: Vec<String> = manifest_results(&lines.concat())
+            .into_iter()
+            .map(|it| it.0)
+            .collect();
+        assert_eq!(names, ["b.npy", "walks/a.run.npy", "walks/a.walk.npy"]);
+    }
 }

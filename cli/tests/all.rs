@@ -4,6 +4,7 @@
 // Tests may use what systems round differently (clippy.toml).
 #![allow(clippy::disallowed_methods)]
 
+// Written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all commands::`.
 #[cfg(unix)]
 mod attack;
 mod batch;
@@ -12,6 +13,7 @@ mod cli;
 mod cli_arguments;
 mod cli_files;
 mod cli_listings;
+mod commands;
 mod compare;
 mod configurations;
 mod dat_fixtures;
@@ -28,6 +30,7 @@ mod remedies;
 mod render;
 mod route;
 mod shards;
+mod stubs;
 mod trajectories;
 mod travel;
 mod validation;
@@ -35,6 +38,7 @@ mod view;
 mod view_controls;
 mod view_live;
 mod view_skeletons;
+// End of the list.
 
 #[path = "../../tests/support/application.rs"]
 mod application;

@@ -49,6 +49,25 @@ fn directories_patterns_and_lists_name_inputs() {
     succeed(folder, &["eval", "--files-from", "one", "-o", "one.npy"]);
 }
 
+/// Manifests call options as they did when these had other names: an older batch is resumed by its old line
+/// and by the new one.
+#[test]
+fn batches_of_older_names_of_options_are_resumed() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let batch = ["smooth", "a.dat", "b.dat", "-o", "out"];
+    let [old, new] = ["--ends", "--edges"].map(|option| [&batch[..], &[option, "loop"]].concat());
+    succeed(folder, &old);
+    let manifest = fs::read_to_string(folder.join("out/manifest.jsonl")).unwrap();
+    assert!(manifest.contains("smooth ends=loop "), "{manifest}");
+    for line in [&new, &old] {
+        let again = succeed(folder, &[&line[..], &["--resume"]].concat());
+        assert!(again.words.contains("2 results skipped"), "{}", again.words);
+    }
+    let other = [&batch[..], &["--edges", "keep", "--resume"]].concat();
+    assert!(succeed(folder, &other).words.contains("2 results made"));
+}
+
 #[test]
 fn a_batch_goes_on_after_a_failure_and_can_be_checked() {
     let temporary = sample_folder();

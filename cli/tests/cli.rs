@@ -216,17 +216,24 @@ fn every_device_writes_the_cpu_s_file() {
 #[test]
 fn outputs_have_their_shapes_and_names() {
     let folder = sample_folder();
-    for (output, shape, first) in [
-        ("quaternion", vec![2, 3, 4], "box1.w"),
-        ("axis-angle", vec![2, 3, 4], "box1.x"),
-        ("matrix", vec![2, 3, 3, 3], "box1.m00"),
-        ("matrix-3x4", vec![2, 3, 3, 4], "box1.m00"),
-        ("euler", vec![2, 3, 3], "box1.x1"),
-        ("velocity", vec![2, 3, 3], "box1.x"),
-        ("acceleration", vec![2, 3, 3], "box1.x"),
-        ("transform", vec![3, 2, 10], "box1.tx"),
-        ("world", vec![3, 2, 7], "box1.px"),
-    ] {
+    let mut outputs = vec![
+        ("quaternion", vec![2, 3, 4], "box1.w".to_owned()),
+        ("velocity", vec![2, 3, 3], "box1.x".to_owned()),
+        ("acceleration", vec![2, 3, 3], "box1.x".to_owned()),
+        ("transform", vec![3, 2, 10], "box1.tx".to_owned()),
+        ("world", vec![3, 2, 7], "box1.px".to_owned()),
+    ];
+    // Row by row and XYZ, as without options.
+    for encoding in Encoding::ALL {
+        let name = encoding.name();
+        let is_listed = outputs.iter().any(|(listed, ..)| *listed == name);
+        if !encoding.is_quaternion() && encoding != Encoding::Vector && !is_listed {
+            let shape = [&[2, 3], encoding.shape()].concat();
+            outputs.push((name, shape, format!("box1.{}", encoding.components()[0])));
+        }
+    }
+    assert!(outputs.contains(&("matrix-3x4", vec![2, 3, 3, 4], "box1.m00".to_owned())));
+    for (output, shape, first) in outputs {
         let of = |out: &str| {
             let line = [
                 "eval",
@@ -243,10 +250,11 @@ fn outputs_have_their_shapes_and_names() {
             fs::read(folder.path().join(out)).unwrap()
         };
         let (found, numbers) = read_npy(&of("out.npy"));
-        assert_eq!(found, shape, "{output}");
+        let lengths: Vec<u64> = shape.iter().map(|&length| length as u64).collect();
+        assert_eq!(found, lengths, "{output}");
         let text = String::from_utf8(of("out.csv")).unwrap();
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
-        assert_eq!((lines.len(), lines[0][2]), (4, first), "{output}");
+        assert_eq!((lines.len(), lines[0][2]), (4, &*first), "{output}");
         // The last frame of the first track: the same bits in both.
         let each = numbers.len() / 6;
         let start = if shape[0] == 3 { 4 * each } else { 2 * each };

@@ -32,7 +32,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy -m slerb                 | bessel-overhauser
 2 | eval a.dat -o o.npy --layot track            | --layout
 2 | eval a.dat -o o.npy --ends lop               | loop
-4 | eval a.dat -o o.npy --ends loop              | repeat the first
+4 | eval a.dat -o o.npy --ends loop              | equals the first
 2 | eval a.dat -o o.npy --memory 5parsecs        | 256MiB
 2 | eval a.dat -o o.txt                          | .npy, .parquet
 2 | eval a.dat -o a.dat --format npy --overwrite | is the input

@@ -6,6 +6,7 @@ mod card;
 mod library;
 mod loader;
 mod odd;
+mod recorded;
 
 use std::collections::BTreeMap;
 use std::fs;

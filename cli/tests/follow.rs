@@ -334,7 +334,7 @@ fn what_cannot_be_smoothed_is_refused() {
         (
             2,
             "parabolic",
-            &["a.dat", "--kernel", "linear", "--ends", "parabolic"],
+            &["a.dat", "--kernel", "linear", "--edges", "parabolic"],
         ),
     ] {
         let all = [&["smooth", "-o", "out.npy"], line].concat();

@@ -13,29 +13,34 @@ mod support;
 #[path = "../../fuzz/src/targets.rs"]
 mod targets;
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::fs;
-use std::panic::catch_unwind;
+use std::panic::{RefUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use support::Random;
-use targets::Target;
+use tumble_formats::FORMATS;
 
 /// Longer inputs find no more, and take longer.
 const LONGEST: usize = 4096;
 
+/// A target: from bytes to a hash of the outcome.
+type Target<'a> = &'a (dyn Fn(&[u8]) -> u64 + RefUnwindSafe);
+
 /// Runs a target on mutations of `corpus`; `words` are pieces that its inputs are made of.
-fn fuzz(name: &str, target: Target, corpus: Vec<Vec<u8>>, words: &[&str]) {
-    fuzz_for(1.0, name, target, corpus, words);
+fn fuzz(name: &str, target: Target<'_>, corpus: Vec<Vec<u8>>, words: &[&str]) {
+    let words: Vec<&[u8]> = words.iter().map(|word| word.as_bytes()).collect();
+    fuzz_for(1.0, name, target, corpus, &words);
 }
 
-/// As [`fuzz`], for a quarter of the time: the motion files, whose tests also damage them.
-fn fuzz_motion(name: &str, target: Target, corpus: Vec<Vec<u8>>, words: &[&str]) {
-    fuzz_for(0.25, name, target, corpus, words);
+/// As [`fuzz`], for a quarter of the time: files whose tests also damage them.
+fn fuzz_files(name: &str, target: Target<'_>, corpus: Vec<Vec<u8>>, words: &[&str]) {
+    let words: Vec<&[u8]> = words.iter().map(|word| word.as_bytes()).collect();
+    fuzz_for(0.25, name, target, corpus, &words);
 }
 
-fn fuzz_for(share: f64, name: &str, target: Target, mut corpus: Vec<Vec<u8>>, words: &[&str]) {
+fn fuzz_for(share: f64, name: &str, target: Target<'_>, mut corpus: Vec<Vec<u8>>, words: &[&[u8]]) {
     let seconds = std::env::var("FUZZ_SECONDS").map_or(1.0, |text| text.parse().unwrap());
     let seconds: f64 = share * seconds;
     let mut random = Random(name.bytes().map(u64::from).sum());
@@ -65,7 +70,7 @@ fn fuzz_for(share: f64, name: &str, target: Target, mut corpus: Vec<Vec<u8>>, wo
 }
 
 /// A panic keeps its input.
-fn run(name: &str, target: Target, input: &[u8]) -> u64 {
+fn run(name: &str, target: Target<'_>, input: &[u8]) -> u64 {
     catch_unwind(|| target(input)).unwrap_or_else(|_| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
         fs::create_dir_all(&folder).unwrap();
@@ -75,7 +80,7 @@ fn run(name: &str, target: Target, input: &[u8]) -> u64 {
     })
 }
 
-fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &[&str]) {
+fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &[&[u8]]) {
     let mut below = |limit: usize| random.next() as usize % limit.max(1);
     let offset = below(input.len());
     match below(9) {
@@ -100,7 +105,7 @@ fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &
             input.splice(offset..offset, piece);
         }
         _ if !words.is_empty() => {
-            let word = words[below(words.len())].bytes();
+            let word = words[below(words.len())].iter().copied();
             let end = (offset + below(3) * below(8)).min(input.len());
             input.splice(offset..end, word);
         }
@@ -119,181 +124,64 @@ fn fixtures(format: &str) -> Vec<Vec<u8>> {
     files.map(|path| fs::read(path).unwrap()).collect()
 }
 
+/// Every format of the table, each for about a third of the time: their tests also damage files.
 #[test]
-fn dat() {
-    let words = [
-        "# 2 3.0\n",
-        "\n",
-        "\r\n",
-        "\r",
-        "\t",
-        " ",
-        "#",
-        "0",
-        "1",
-        "-1",
-        "1e39",
-        "1e-400",
-        "nan",
-        "inf",
-        "0x1",
-        "1_0",
-        "1,5",
-        "+.5e-3",
-        "\u{a0}",
-        "\u{feff}",
-        "\0",
-        "0.7071068",
-        "1e400",
-        "65536",
-        "65537",
-        " 1 0 0 0",
-        "0.5 1 0 0 0 0 1 0 0\n",
-    ];
-    fuzz("dat", targets::dat, fixtures("dat"), &words);
+fn formats() {
+    for &format in FORMATS {
+        let mut corpus = fixtures(format.name);
+        // Longer logs are cut, and a chunk that is cut is nothing.
+        let logs = corpus.iter().filter(|file| file.starts_with(LOG));
+        let unpacked: Vec<Vec<u8>> = logs.map(|log| unpacked(log)).collect();
+        corpus.extend(unpacked);
+        let words = words(&corpus);
+        let words: Vec<&[u8]> = words.iter().map(Vec::as_slice).collect();
+        let target = |bytes: &[u8]| targets::formats::format(format, bytes);
+        fuzz_for(0.3, format.name, &target, corpus, &words);
+    }
 }
 
-#[test]
-fn gltf() {
-    let words = [
-        "glTF\u{2}\0\0\0",
-        "JSON{",
-        "BIN\0",
-        "\0\0\0\0",
-        "\"nodes\":[{}]",
-        "\"children\":[0]",
-        "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]",
-        "\"rotation\"",
-        "\"translation\"",
-        "\"weights\"",
-        "\"CUBICSPLINE\"",
-        "\"STEP\"",
-        "\"sparse\"",
-        "\"normalized\":true",
-        "\"byteStride\":4",
-        "\"EXT_meshopt_compression\"",
-        "5121",
-        "5126",
-        "18446744073709551615",
-        "-1",
-        "1e39",
-        "null",
-        "[",
-        "}",
-        ",",
+/// The words that the files of a format are made of, and what numbers, lines and lengths may be.
+fn words(corpus: &[Vec<u8>]) -> Vec<Vec<u8>> {
+    let everywhere: [&[u8]; 24] = [
+        b"\n",
+        b"\r\n",
+        b"\t",
+        b" ",
+        b",",
+        b"#",
+        b"\"",
+        b"{",
+        b"}",
+        b"[",
+        b"-1",
+        b"0",
+        b"1.5e-3",
+        b"1e39",
+        b"1e-400",
+        b"nan",
+        b"inf",
+        b"18446744073709551615",
+        b"\xef\xbb\xbf",
+        b"\xc2\xa0",
+        b"\0",
+        b"\0\0\0\0",
+        b"\x01\0\0\0\0\0\0\0",
+        b"\xff\xff\xff\xff",
     ];
-    fuzz_motion("gltf", targets::gltf::gltf, fixtures("glb"), &words);
+    let mut words: BTreeSet<Vec<u8>> = everywhere.map(<[u8]>::to_vec).into();
+    for file in corpus {
+        let lines = file.split_inclusive(|&byte| byte == b'\n');
+        let parts = file.split(|byte| !byte.is_ascii_graphic());
+        let pieces = lines
+            .chain(parts)
+            .filter(|part| (2..=48).contains(&part.len()));
+        words.extend(pieces.map(<[u8]>::to_vec));
+    }
+    words.into_iter().collect()
 }
 
-#[test]
-fn bvh() {
-    let words = [
-        "HIERARCHY\n",
-        "ROOT ",
-        "JOINT hand\n",
-        "End Site",
-        "{",
-        "}",
-        "OFFSET 0 1 2\n",
-        "CHANNELS 3 Zrotation Xrotation Yrotation\n",
-        "CHANNELS 0",
-        "Xposition",
-        "MOTION\nFrames: 2\nFrame Time: 0.04\n",
-        "Frames: 3\n",
-        "\n",
-        "\r\n",
-        " 90",
-        " -1e38",
-        " 1e-40",
-        "720.125",
-        "\u{feff}",
-        "\u{e4}",
-    ];
-    fuzz_motion("bvh", targets::motion::bvh, fixtures("bvh"), &words);
-}
-
-#[test]
-fn fbx() {
-    let words = [
-        "Kaydara FBX Binary  \0\u{1a}\0",
-        "; FBX 7.4.0 project file\n",
-        "Model: 2, \"Model::n\", \"LimbNode\" {\n}\n",
-        "AnimationLayer: 3, \"AnimLayer::n\", \"\" {\n}\n",
-        "C: \"OO\",2,1\n",
-        "C: \"OP\",11,1, \"Lcl Scaling\"\n",
-        "P: \"InheritType\", \"enum\", \"\", \"\",2\n",
-        "P: \"RotationOrder\", \"enum\", \"\", \"\",4\n",
-        "46186158000",
-        "9223372036854775807",
-        "*1000000000",
-        "1e300",
-        "-1",
-        "{",
-        "}",
-    ];
-    fuzz_motion("fbx", targets::motion::fbx, fixtures("fbx"), &words);
-}
-
-#[test]
-fn kitti() {
-    let words = [
-        "1 0 0 0 ",
-        "0 1 0 0 ",
-        "0 0 1 0\n",
-        "-1",
-        "0.6 -0.8",
-        "nan",
-        ",",
-        "#",
-        "\n",
-    ];
-    fuzz_motion("kitti", targets::motion::kitti, fixtures("kitti"), &words);
-}
-
-#[test]
-fn euroc() {
-    let words = [
-        "1403636580838555648,",
-        "-1,",
-        "1e-10,",
-        "0,0,0,1,0,0,0\n",
-        "0.6,0.8",
-        "#",
-        ",",
-        " ",
-        "\n",
-        "1.403636580838555648e18",
-        "nan",
-    ];
-    fuzz_motion("euroc", targets::motion::euroc, fixtures("euroc"), &words);
-}
-
-#[test]
-fn mcap() {
-    let words = [
-        "geometry_msgs/msg/PoseStamped",
-        "tf2_msgs/msg/TFMessage",
-        "nav_msgs/Path",
-        "cdr",
-        "zstd",
-        "lz4",
-        "\0\x01\0\0",
-        "\x05",
-        "\x06",
-        "\x0f",
-        "\u{89}MCAP0\r\n",
-    ];
-    let mut corpus = fixtures("mcap");
-    // Longer ones are cut, and a chunk that is cut is nothing.
-    corpus.extend(
-        corpus
-            .clone()
-            .into_iter()
-            .filter(|file| file.starts_with(b"\x89MCAP0\r\n"))
-            .map(|file| unpacked(&file)),
-    );
-    fuzz_motion("mcap", targets::motion::mcap, corpus, &words);
-}
+/// How a log of MCAP begins.
+const LOG: &[u8] = b"\x89MCAP0\r\n";
 
 /// The first records of a log whose first chunk is not compressed, without the chunk.
 fn unpacked(log: &[u8]) -> Vec<u8> {
@@ -315,52 +203,9 @@ fn unpacked(log: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn tum() {
-    let words = [
-        "1700000000.125 0 0 0 0 0 0 1\n",
-        "-1e14",
-        ",",
-        " ",
-        "#",
-        "\n",
-        "\r\n",
-        "0.6 0.8",
-        "1e-24",
-        "1.5e+09",
-        "99999999999999.5",
-        "\u{e4}",
-    ];
-    fuzz_motion("tum", targets::motion::tum, fixtures("tum"), &words);
-}
-
-#[test]
-fn npz_and_npy() {
-    let words = [
-        "PK\x01\x02",
-        "PK\x05\x06",
-        "poses.npy",
-        "rotations.npy",
-        "body_rotations.npy",
-        "times.npy",
-        "fps.npy",
-        "'descr': '<f8'",
-        "'>f4'",
-        "'|O'",
-        "'<U3'",
-        "'fortran_order': True",
-        "'shape': (2, 3, 4)",
-        "(4, 6)",
-        "(0, 4)",
-        "(99999999999, 4)",
-    ];
-    fuzz_motion("npz", targets::arrays::npz, fixtures("npz"), &words);
-    fuzz_motion("npy", targets::arrays::npy, fixtures("npy"), &words);
-}
-
-#[test]
 fn outputs() {
     let seeds = (0..32u8).map(|i| (0..200).map(|j| i.wrapping_mul(31) ^ j).collect());
-    fuzz("outputs", targets::outputs, seeds.collect(), &[]);
+    fuzz("outputs", &targets::outputs, seeds.collect(), &[]);
 }
 
 #[test]
@@ -399,7 +244,7 @@ fn arguments() {
         }
     }
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    fuzz("arguments", targets::arguments, seeds, &words);
+    fuzz("arguments", &targets::arguments, seeds, &words);
 }
 
 #[test]
@@ -415,7 +260,7 @@ fn frames() {
         "\u{fa}",
         "\u{fd}",
     ];
-    fuzz("frames", targets::frames, seeds.collect(), &words);
+    fuzz("frames", &targets::frames, seeds.collect(), &words);
 }
 
 #[test]
@@ -424,7 +269,7 @@ fn tracks() {
         let wave = |j: u8| i.wrapping_mul(j).wrapping_mul(37) ^ j.wrapping_mul(11);
         [i, 0].into_iter().chain((0..160).map(wave)).collect()
     });
-    fuzz("tracks", targets::tracks, seeds.collect(), &[]);
+    fuzz("tracks", &targets::tracks, seeds.collect(), &[]);
 }
 
 #[test]
@@ -442,7 +287,7 @@ fn spirv() {
     let seeds = expressions.map(kernel_of);
     assert!(seeds.iter().all(|seed| seed.len() < LONGEST));
     let words = ["\u{3}\u{2}#\u{7}", "\0\0\0\0", "\u{1}\0\0\0"];
-    fuzz("spirv", targets::spirv, seeds.into(), &words);
+    fuzz("spirv", &targets::spirv, seeds.into(), &words);
 }
 
 /// A small shader, as bytes.
@@ -466,71 +311,7 @@ fn kernel_of(expression: &str) -> Vec<u8> {
 }
 
 #[test]
-fn parquet() {
-    // Ends of files, types and lengths of Thrift's compact protocol.
-    let words = [
-        "PAR1",
-        "\x15\0",
-        "\x15\u{7f}",
-        "\x18\x04",
-        "\x19\x1c",
-        "\x2c",
-        "\0\0\0\0PAR1",
-    ];
-    fuzz_motion(
-        "parquet",
-        targets::tables::parquet,
-        fixtures("parquet"),
-        &words,
-    );
-}
-
-#[test]
-fn arrow() {
-    let words = [
-        "ARROW1",
-        "ARROW1\0\0",
-        "\0\0\0\0",
-        "\x01\0\0\0\0\0\0\0",
-        "\x08\0",
-        "\x7f",
-    ];
-    fuzz_motion("arrow", targets::tables::arrow, fixtures("arrow"), &words);
-}
-
-#[test]
-fn csv() {
-    let words = [
-        "time,",
-        "track,",
-        "x,y,z,w",
-        "hip.x",
-        "hip.w",
-        "tx,ty,tz",
-        "episode_index",
-        "frame",
-        ",",
-        "\"",
-        "\n",
-        "\r\n",
-        "\n0,",
-        "0.5",
-        "-0",
-        "1e39",
-        "1e-400",
-        "nan",
-        "1403636579763555584",
-        "9223372036854775808",
-        " ",
-        "\u{feff}",
-        "\u{e4}",
-        "\0",
-    ];
-    fuzz_motion("csv", targets::tables::csv, fixtures("csv"), &words);
-}
-
-#[test]
-fn meshes() {
+fn surfaces() {
     let words = [
         "v 0 0 0\n",
         "v 1 0 0\n",
@@ -572,7 +353,7 @@ fn meshes() {
         gltf.into(),
     ];
     seeds.extend(fixtures("glb"));
-    fuzz_motion("meshes", targets::surfaces::meshes, seeds, &words);
+    fuzz_files("surfaces", &targets::surfaces::surfaces, seeds, &words);
 }
 
 /// Also headers that nest, and that say they are longer than any file.
@@ -602,8 +383,8 @@ fn paths_and_numbers() {
         "{",
         "}",
     ];
-    let target = targets::surfaces::numbers;
-    fuzz_motion("numbers", target, seeds.clone(), &words);
+    let target = &targets::surfaces::numbers;
+    fuzz_files("numbers", target, seeds.clone(), &words);
     seeds.push(b"t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n".to_vec());
     seeds.push(b"x,y,z\n0,0,0\n1,1,0\n".to_vec());
     let words = [
@@ -618,5 +399,5 @@ fn paths_and_numbers() {
         "(1, 3, 3)",
         "'<f8'",
     ];
-    fuzz_motion("paths", targets::surfaces::paths, seeds, &words);
+    fuzz_files("paths", &targets::surfaces::paths, seeds, &words);
 }

@@ -298,7 +298,7 @@ fn converting_and_smoothing_keep_the_rest_of_a_file() {
         "{}",
         part.words
     );
-    let scaled = line(folder, "convert fox.gltf --up z -o up.glb");
+    let scaled = line(folder, "convert fox.gltf --up-axis z -o up.glb");
     assert!(
         scaled.words.contains("not copied: materials"),
         "{}",
@@ -393,7 +393,7 @@ fn fbx_goes_into_other_formats() {
         folder,
         &[&["compare", "walk.fbx", "walk.glb"][..], &alike].concat(),
     );
-    let metres = ["--scale", "metres", "--up", "y", "-o", "metres.bvh"];
+    let metres = ["--scale", "metres", "--up-axis", "y", "-o", "metres.bvh"];
     succeed(
         folder,
         &[&["eval", "walk.fbx", "--fps", "30"][..], &metres].concat(),

@@ -57,7 +57,7 @@ const OPTIONS: &[&[&str]] = &[
     &["--to", "npz"],
     &["--to", "bvh"],
     &["--scale", "2"],
-    &["--up", "y"],
+    &["--up-axis", "y"],
     &["--linear", "foot"],
     &["--raw-times"],
     &["--bridge-gaps"],

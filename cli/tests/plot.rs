@@ -264,7 +264,7 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
             "a.dat",
             "--dimension",
             "2,8",
-            "--format",
+            "--picture-format",
             "png",
             "-o",
             "out",

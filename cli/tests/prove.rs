@@ -75,7 +75,7 @@ fn the_software_drivers_are_proved_and_compared() {
         (LAVAPIPE, "llvmpipe", "one.json", "--validate"),
         (SWIFTSHADER, "SwiftShader", "two.json", "--overwrite"),
     ] {
-        let line = ["prove", "--quick", "--seconds", "600", "-o", file, more];
+        let line = ["prove", "--quick", "--time-limit", "600", "-o", file, more];
         let run = finish(with_driver(folder, driver, &line).output().unwrap());
         let proof = read(&folder.join(file));
         expect_proof(&run, &proof, name);
@@ -126,7 +126,7 @@ fn a_driver_that_is_not_exact_is_told_with_code_6() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let line = ["prove", "--seconds", "1", "--json"];
+    let line = ["prove", "--time-limit", "1", "--json"];
     let mut command = with_driver(folder.path(), LAVAPIPE, &line);
     command
         .env("GALLIUM_NOSSE", "1")
@@ -162,7 +162,7 @@ fn what_proves_nothing_is_refused() {
     if !is_there(LAVAPIPE) {
         return;
     }
-    let line = ["prove", "--seconds", "1"];
+    let line = ["prove", "--time-limit", "1"];
     let short = finish(with_driver(folder, LAVAPIPE, &line).output().unwrap());
     let page = String::from_utf8_lossy(&short.out);
     assert_eq!(short.code, 8, "{page}{}", short.words);

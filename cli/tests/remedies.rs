@@ -91,13 +91,13 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "route hill.obj -o o.csv",
-        "give --from and --to",
-        &["route hill.obj --from 1,0,1 --to 8,0,8 -o o.csv"],
+        "give --start-point and --end-point",
+        &["route hill.obj --start-point 1,0,1 --end-point 8,0,8 -o o.csv"],
     ),
     (
-        "route hill.obj --by line --from 1,0,1 --to 8,0,8 -o o.csv",
+        "route hill.obj --by line --start-point 1,0,1 --end-point 8,0,8 -o o.csv",
         "are for nets",
-        &["route hill.obj --from 1,0,1 --to 8,0,8 -o o.csv"],
+        &["route hill.obj --start-point 1,0,1 --end-point 8,0,8 -o o.csv"],
     ),
     ("eval pipe.dat -o o.npy", "(--pipes reads named pipes)", &[]),
     (
@@ -138,7 +138,7 @@ fn folder() -> tempfile::TempDir {
     write("m.gltf", &crate::attack::two_animations());
     succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
     // The paths of `route` have upward directions.
-    let route = "route hill.obj --from 1,0,1 --to 8,0,8 -o ups.csv";
+    let route = "route hill.obj --start-point 1,0,1 --end-point 8,0,8 -o ups.csv";
     succeed(folder, &words(route));
     let points = fs::read_to_string(folder.join("ups.csv")).unwrap();
     assert!(points.starts_with("x,y,z,ux,uy,uz\n"), "{points}");

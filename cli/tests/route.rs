@@ -71,9 +71,9 @@ fn a_way_over_a_hill() {
         let line = [
             "route",
             "hill.obj",
-            "--from",
+            "--start-point",
             "0,0,0",
-            "--to",
+            "--end-point",
             "3,6,0.125",
             "--by",
             by,
@@ -108,9 +108,9 @@ fn a_way_over_a_hill() {
         &[
             "route",
             "hill.obj",
-            "--from",
+            "--start-point",
             "0,0,5",
-            "--to",
+            "--end-point",
             "3,6,0.125",
             "-o",
             "-",
@@ -227,9 +227,9 @@ fn ways_between_rocks_and_on_nets() {
         [
             "route",
             "plaza.gltf",
-            "--from",
+            "--start-point",
             from,
-            "--to",
+            "--end-point",
             "14,1,10",
             "--avoid",
             "rock.obj",
@@ -267,9 +267,9 @@ fn ways_between_rocks_and_on_nets() {
         [
             "route",
             "net.npy",
-            "--from",
+            "--start-point",
             "0,0,0",
-            "--to",
+            "--end-point",
             "1,0.5,0.5",
             "--by",
             by,
@@ -311,7 +311,7 @@ fn bad_inputs_and_lines() {
     fs::write(folder.join("pairs.txt"), "1 2 3\n").unwrap();
     fs::write(folder.join("hill.txt"), "").unwrap();
     fs::write(folder.join("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 1 3 4 2\nf 1 2 6 5\nf 1 5 7 3\nf 8 7 5 6\nf 8 6 2 4\nf 8 4 3 7\n").unwrap();
-    let ends = ["--from", "0,0,0", "--to", "1,1,1", "-o", "out.csv"];
+    let ends = ["--start-point", "0,0,0", "--end-point", "1,1,1", "-o", "out.csv"];
     for (code, words, message) in [
         (4, vec!["route", "flat.obj"], "face 0 (from 0) has no area"),
         (4, vec!["route", "empty.ply"], "no faces"),

@@ -75,7 +75,9 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
     let poses = poses.into_vec::<f32>().unwrap();
     let read = |name: &str| {
         let bytes = fs::read(folder.path().join(name)).unwrap();
-        tumble_routes::mesh::Mesh::of_obj(&bytes).unwrap()
+        let polygons = tumble_formats::surface::obj::read_obj(name, &bytes).unwrap();
+        let faces = polygons.iter();
+        tumble_routes::mesh::Mesh::welded(&polygons.positions, faces, 0.0).unwrap()
     };
     let (hill, rocks) = (read("hill.obj"), read("rocks.obj"));
     let distance: f32 = poses
@@ -121,7 +123,8 @@ fn a_path_its_axes_and_a_box_are_rendered() {
     }
     // Without axes and with a small body less is coloured, and the body moves.
     let still = |start: &str, out: &str| {
-        let line = format!("render road.csv --axes 0 --size 200x200 --start {start} -o {out}");
+        let line =
+            format!("render road.csv --drawn-frames 0 --size 200x200 --start {start} -o {out}");
         succeed(folder.path(), &words(&line));
         pixels(&folder.path().join(out)).0
     };
@@ -140,7 +143,7 @@ fn a_path_its_axes_and_a_box_are_rendered() {
         folder.path(),
         &words("follow road.csv --fps 100 -o road.glb"),
     );
-    let line = "render road.glb --axes 0 --size 200x200 --start 3.5 -o d.png";
+    let line = "render road.glb --drawn-frames 0 --size 200x200 --start 3.5 -o d.png";
     succeed(folder.path(), &words(line));
     let again = pixels(&folder.path().join("d.png")).0;
     let differ = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 40);

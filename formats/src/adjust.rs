@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError};
 
 use crate::format::{Loaded, Space};
-use crate::motion::{Body, Motion, Transform};
+use crate::motion::{Body, Motion, Transform, carry_key_data};
 
 /// The axis that points up, of two of which one was the other before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -117,19 +117,10 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
         let keys: Vec<Quat> = track.keys.iter().map(|&key| rotated(key)).collect();
         let set = &mut adjusted.set;
         set.push(track.name.unwrap_or_default(), track.times, &keys)?;
+        carry_key_data(set, index, &track, 0..keys.len())?;
         if !track.tangents.is_empty() {
-            let tangents: Vec<_> = track
-                .tangents
-                .iter()
-                .map(|both| both.map(rotated))
-                .collect();
-            set.set_tangents(index, &tangents)?;
-        }
-        if !track.velocities.is_empty() {
-            set.set_velocities(index, track.velocities)?;
-        }
-        if !track.tcb.is_empty() {
-            set.set_tcb(index, track.tcb)?;
+            let tangents = track.tangents.iter().map(|both| both.map(rotated));
+            set.set_tangents(index, &tangents.collect::<Vec<_>>())?;
         }
         if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
             let shifted = |key: &Vec3| (exactly(before + key.as_dvec3()) - origin).as_vec3();
@@ -208,7 +199,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
 #[non_exhaustive]
 pub enum OffsetsError {
     /// Every joint has three.
-    #[error("{numbers} numbers of offsets for {joints} joints; three are wanted for each, x y z")]
+    #[error("{numbers} numbers of offsets for {joints} joints; each joint needs three, x y z")]
     Numbers {
         /// How many numbers there are.
         numbers: usize,
@@ -216,7 +207,7 @@ pub enum OffsetsError {
         joints: usize,
     },
     /// Translations say where a joint is.
-    #[error("joint {joint} (`{name}`) has translations of its own, which say where it is")]
+    #[error("joint {joint} (`{name}`) has translation keys, and an offset is only for joints without them")]
     Moved {
         /// The first such joint, from 0.
         joint: usize,

@@ -28,7 +28,7 @@ pub(crate) struct Budget {
 /// More than the budget has.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it claims more \
+    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it states more \
      than it contains"
 )]
 pub(crate) struct OverBudget {

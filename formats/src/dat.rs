@@ -40,11 +40,20 @@ pub static FORMAT: Format = Format {
     summary: "keyframes of a chain of boxes, as text",
     extensions: &[],
     probe: |_| false,
+    numbers_in_line: None,
+    is_text: true,
+    numbers_repeated_names: false,
     read: open_dat,
     read_bytes: |name, bytes, options| read_dat(name, &bytes[..], options),
     write: None,
     write_motion: Some(write::write_motion),
-    features: &[Feature::BoxLength, Feature::UnevenTimes, Feature::Start],
+    features: &[
+        Feature::SeveralTracks,
+        Feature::Quaternions,
+        Feature::BoxLength,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &[FormatOption::BoxLength],
 };
 
@@ -143,7 +152,7 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
         .map(|(_, token)| number::parse(token))
         .collect();
     if words.len() == 2 && words.iter().all(Result::is_ok) {
-        let message = "a second header; split the file, or make it a comment with words";
+        let message = "a second header; split the file, or make this line a comment by adding words";
         return Err(lines.refuse(1, Code::SecondHeader, message.to_owned()));
     }
     Ok(())
@@ -247,7 +256,7 @@ impl DatKeys {
         let (column, digits) = row.last;
         if !lines.ended && digits < row.fewest_digits {
             let message = "the file ends in the middle of a line, and its last number is shorter \
-                           than all others; is it cut?";
+                           than all others; is it truncated?";
             lines.warn(column, Code::MaybeCut, message);
         }
         self.fewest_digits = row.fewest_digits.min(digits);
@@ -283,10 +292,10 @@ impl DatKeys {
             let relation = if time == previous {
                 "repeats"
             } else {
-                "comes before"
+                "is before"
             };
             let message = format!(
-                "time {time} {relation} the one before it, {previous}; times increase strictly"
+                "time {time} {relation} the previous time, {previous}; times must increase strictly"
             );
             return Err(lines.refuse(1, Code::TimeNotIncreasing, message));
         }
@@ -332,7 +341,7 @@ impl DatKeys {
             Some(previous) => {
                 if dot(*previous, exact).abs() <= HALF_TURN_PRODUCT {
                     let message = format!(
-                        "box {} turns by exactly 180° from the key before; the signs decide which way",
+                        "box {} turns by exactly 180° from the previous key; the signs decide the direction",
                         index + 1
                     );
                     lines.warn(column, Code::HalfTurn, message);

@@ -37,6 +37,9 @@ pub static FORMAT: Format = Format {
                 found.is_some()
             })
     },
+    numbers_in_line: None,
+    is_text: true,
+    numbers_repeated_names: false,
     read: open_euroc,
     read_bytes: |name, bytes, options| match options.map {
         Some(_) => (crate::csv::FORMAT.read_bytes)(name, bytes, options),
@@ -44,7 +47,12 @@ pub static FORMAT: Format = Format {
     },
     write: None,
     write_motion: Some(write_motion),
-    features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],
+    features: &[
+        Feature::Quaternions,
+        Feature::Translations,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,

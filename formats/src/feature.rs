@@ -4,6 +4,10 @@
 /// What a clip may hold beside rotations at times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Feature {
+    /// More than one track; a format without room refuses them.
+    SeveralTracks,
+    /// Rotations as quaternions, all bits of f32; a format without room has angles or matrices.
+    Quaternions,
     /// Names of the tracks.
     TrackNames,
     /// A name of the clip.
@@ -37,7 +41,9 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
+        Self::SeveralTracks,
+        Self::Quaternions,
         Self::TrackNames,
         Self::ClipName,
         Self::Skeleton,
@@ -56,7 +62,9 @@ impl Feature {
 
     /// What tables of many clips hold.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 9] = [
+    pub(crate) const OF_TABLES: [Self; 11] = [
+        Self::SeveralTracks,
+        Self::Quaternions,
         Self::TrackNames,
         Self::ClipName,
         Self::Skeleton,
@@ -72,6 +80,8 @@ impl Feature {
     #[must_use]
     pub fn summary(self) -> &'static str {
         match self {
+            Self::SeveralTracks => "several tracks",
+            Self::Quaternions => "quaternions to the last bit",
             Self::TrackNames => "names of tracks",
             Self::ClipName => "name of the clip",
             Self::Skeleton => "skeleton",
@@ -83,7 +93,7 @@ impl Feature {
             Self::World => "poses in the world",
             Self::BoxLength => "length of boxes",
             Self::SeveralClips => "several clips",
-            Self::TimesPerChannel => "channels at their own times",
+            Self::TimesPerChannel => "separate key times for each channel",
             Self::UnevenTimes => "uneven times",
             Self::Start => "start",
         }

@@ -1,5 +1,5 @@
 //! What a file format is: how it is recognised, read and written, and what it has room for. The formats
-//! themselves build on this; the [registry](registry::FORMATS) names them all.
+//! themselves build on this; [`FORMATS`](crate::FORMATS) names them all.
 
 pub mod registry;
 mod write_clips;
@@ -35,6 +35,14 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// Whether a file that begins with these bytes (up to 512) is one.
     pub probe: fn(&[u8]) -> bool,
+    /// How many numbers each of its lines has, where files of nothing but numbers are known by that.
+    pub numbers_in_line: Option<usize>,
+    /// Whether all its files are lines of text, in which numbers keep every digit; results in it have a line
+    /// for each frame. Text takes no more memory than its length allows, and is read without a budget.
+    pub is_text: bool,
+    /// Whether a second track of a name is written with its number behind the name, because each name
+    /// stands once in a file. Writers that do otherwise say so themselves.
+    pub numbers_repeated_names: bool,
     /// Reads keyframes from a file; `-` is standard input.
     pub read: ReadKeys,
     /// Reads keyframes from the bytes of a file; files beside it are not read.
@@ -310,9 +318,6 @@ pub enum WriteError {
 
 /// How a format holds results.
 pub struct WriteResults {
-    /// Whether it is text, a line for each frame, in which numbers keep every digit: encodings
-    /// that are shorter than f32 are not for it.
-    pub is_text: bool,
     /// The order of a quaternion's components where none is asked for.
     pub order: ComponentOrder,
     /// The only layout that it has, if it has but one.

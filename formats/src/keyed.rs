@@ -26,7 +26,7 @@ pub enum KeyedError {
     },
     /// Keys are meant for cubics with given tangents, which would be lost.
     #[error(
-        "track {track} (`{name}`) is a cubic spline with tangents, which keys alone do not tell; \
+        "track {track} (`{name}`) is a cubic spline with tangents, which keys alone do not contain; \
          sample it with `tumble eval --fps`"
     )]
     Cubic {

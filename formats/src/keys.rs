@@ -110,7 +110,7 @@ impl Origin<'_> {
                 jumps = false;
             } else if time < last {
                 let message =
-                    format!("time {time} comes before the one before it, {last}; times increase");
+                    format!("time {time} is before the previous time, {last}; times increase");
                 return Err(self.refuse(key, Code::TimeNotIncreasing, message));
             } else if equal(before, key) {
                 warnings.warn(Code::EqualKeys, || {

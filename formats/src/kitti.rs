@@ -24,9 +24,12 @@ use crate::tum::{Trajectory, TrajectoryPoses, decimal_count};
 /// A path of one body, without times.
 pub static FORMAT: Format = Format {
     name: "kitti",
-    summary: "a trajectory, the rows of a matrix a line, times apart",
+    summary: "a trajectory, a matrix on each line; times are in another file",
     extensions: &[],
     probe: |_| false,
+    numbers_in_line: Some(12),
+    is_text: true,
+    numbers_repeated_names: false,
     read: open_kitti,
     read_bytes: |name, bytes, options| read_kitti(name, &bytes[..], options),
     write: None,
@@ -103,8 +106,8 @@ pub fn read_kitti(
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     if options.source_rate.is_none() && options.frame_times.is_none() {
-        let message = "KITTI's poses have no times; give --source-fps, their rate, or --source-times, a file \
-                       of them";
+        let message = "KITTI's poses have no times; give their rate with --source-fps, or a file of times with \
+                       --source-times";
         return Err(Diagnostic::new(name, Code::NoRate, message));
     }
     let mut poses = TrajectoryPoses::default();

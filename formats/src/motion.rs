@@ -4,8 +4,11 @@ mod dense;
 pub(crate) mod grid;
 mod select;
 
+use std::io;
+use std::ops::Range;
+
 use glam::{DVec3, Quat, Vec3};
-use tumble::{Channel, FrameRate, TrackError, TrackSet};
+use tumble::{Channel, FrameRate, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
 use crate::decimal::Decimal;
@@ -252,6 +255,28 @@ impl ChannelInterpolation {
     }
 }
 
+/// Gives a track what some keys of another have beside their values: tangents, velocities and tensions.
+///
+/// # Errors
+/// When the track does not have as many keys.
+pub(crate) fn carry_key_data(
+    set: &mut TrackSet,
+    track: usize,
+    from: &Track<'_>,
+    keys: Range<usize>,
+) -> Result<(), TrackError> {
+    if !from.tangents.is_empty() {
+        set.set_tangents(track, &from.tangents[keys.clone()])?;
+    }
+    if !from.velocities.is_empty() {
+        set.set_velocities(track, &from.velocities[keys.clone()])?;
+    }
+    if !from.tcb.is_empty() {
+        set.set_tcb(track, &from.tcb[keys])?;
+    }
+    Ok(())
+}
+
 /// What a clip is at each of its samples, ready to be written.
 ///
 /// Lists are in the order `[sample][track]`.
@@ -277,6 +302,30 @@ pub struct SampledClip<'a> {
 }
 
 impl SampledClip<'_> {
+    /// How many samples of all tracks there are.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a list that is shorter or longer than the times and the tracks say.
+    pub(crate) fn checked_len(&self) -> io::Result<usize> {
+        let tracks = self.clip.set.track_count();
+        let all = tracks.saturating_mul(self.times.len());
+        let lists = [
+            ("rotations", self.rotations.len(), all, false),
+            ("translations", self.translations.len(), all, true),
+            ("scales", self.scales.len(), all, true),
+            ("joints", self.clip.skeleton.len(), tracks, true),
+            ("channels", self.clip.channels.len(), tracks, true),
+        ];
+        for (name, length, expected, may_be_empty) in lists {
+            if length != expected && !(may_be_empty && length == 0) {
+                let message =
+                    format!("a clip of {tracks} tracks has {length} {name}, not {expected}");
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+            }
+        }
+        Ok(all)
+    }
+
     /// The digits of a sample's time in text. Where samples are not frames of a rate there are at least
     /// nine behind the point, which tell readers that nothing was rounded to fewer. `None` out of range.
     pub(crate) fn time_digits(&self, sample: usize) -> Option<String> {

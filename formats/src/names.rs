@@ -4,6 +4,9 @@ use std::collections::HashSet;
 
 use tumble::TrackSet;
 
+/// What the one track of a trajectory is called.
+pub(crate) const TRAJECTORY_TRACK: &str = "body";
+
 /// The name of joint `index` (from 0) in a file whose names are all that is on a line before a brace,
 /// and differ: braces and control characters become `_`, a joint without a name is `joint7`, and a name
 /// that is taken gets the joint's number behind it, `hand#12`. `taken` collects what was given.

@@ -8,6 +8,7 @@ use glam::Quat;
 use tumble::{ComponentType, Encoding, Layout};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npz::array::Array;
 use crate::npz::header::{ArrayHeader, Element};
@@ -17,13 +18,15 @@ use crate::quaternion::ComponentOrder;
 /// `NumPy`'s array files.
 pub static FORMAT: Format = Format {
     name: "npy",
-    summary: "NumPy's, float32",
+    summary: "a NumPy array, float32",
     extensions: &[],
     probe: |start| start.starts_with(b"\x93NUMPY"),
+    numbers_in_line: None,
+    is_text: false,
+    numbers_repeated_names: false,
     read: open_npy,
     read_bytes: read_npy,
     write: Some(WriteResults {
-        is_text: false,
         order: ComponentOrder::Xyzw,
         layout: None,
         rotation_bytes: |encoding| encoding.bytes() as f64,
@@ -31,7 +34,7 @@ pub static FORMAT: Format = Format {
         poses: |poses, mut out| poses.write_npy(&mut out),
     }),
     write_motion: None,
-    features: &[],
+    features: &[Feature::SeveralTracks],
     options: &FormatOption::OF_ARRAYS,
 };
 

@@ -1,5 +1,8 @@
-//! Paths that bodies follow: points in CSV with the header `[t,]x,y,z[,ux,uy,uz]`, or in NPY of shape
-//! (tracks, points, 3).
+//! Paths that bodies follow. A format is a file that names it in a `FORMAT`, and a line in the table
+//! [`PATHS`](crate::PATHS).
+
+pub mod csv;
+pub mod npy;
 
 use std::io::Read;
 use std::path::Path;
@@ -7,13 +10,41 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use tumble::TrackSet;
 
-use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::PATHS;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::motion::Motion;
-use crate::npy;
 use crate::origin::origin_of;
 use crate::source::Source;
-use crate::text::number;
+
+/// A file format of paths.
+pub struct PathFormat {
+    /// The name by which programs call it, and the extension of its files.
+    pub name: &'static str,
+    /// What is read of it, in a few words.
+    pub summary: &'static str,
+    /// Whether a file that begins with these bytes is one, whatever it holds.
+    pub probe: fn(&[u8]) -> bool,
+    /// Whether a file of the format that begins with these bytes is one of paths.
+    pub holds_paths: fn(&[u8]) -> bool,
+    /// Reads the paths of the bytes of a file; the text is what messages call it.
+    pub read_bytes: fn(&str, &[u8]) -> Result<Vec<PathPoints>, Diagnostic>,
+}
+
+impl PathFormat {
+    /// The format of a file that begins with these bytes: the first of the table where they tell nothing.
+    #[must_use]
+    pub fn detect(start: &[u8]) -> &'static Self {
+        let mut all = PATHS.iter().copied();
+        all.find(|format| (format.probe)(start)).unwrap_or(PATHS[0])
+    }
+}
+
+impl std::fmt::Debug for PathFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("PathFormat").field(&self.name).finish()
+    }
+}
 
 /// The duration of paths whose file has no times.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,8 +83,7 @@ pub fn open_paths(
     read_paths(&file, name, &source.into_bytes(options.limits.file)?, pace)
 }
 
-/// Whether a file looks like one of paths: text whose first line names the columns of points, or NPY of
-/// shape (tracks, points, 3). What cannot be read looks like none.
+/// Whether a file looks like one of paths. What cannot be read looks like none.
 #[must_use]
 pub fn looks_like_paths(path: &Path) -> bool {
     let mut start = Vec::new();
@@ -62,21 +92,7 @@ pub fn looks_like_paths(path: &Path) -> bool {
     }
     let read =
         std::fs::File::open(path).and_then(|file| file.take(MAX_HEADER).read_to_end(&mut start));
-    if read.is_err() {
-        return false;
-    }
-    if start.starts_with(b"\x93NUMPY") {
-        return npy::shape_of(&start).is_some_and(|shape| matches!(shape[..], [_, _, 3]));
-    }
-    let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next();
-    let line = String::from_utf8_lossy(line.unwrap_or_default()).to_lowercase();
-    let names: Vec<&str> = line.trim_start_matches('\u{feff}').split(',').collect();
-    let names: Vec<&str> = names.iter().map(|name| name.trim()).collect();
-    let has_all = ["x", "y", "z"].iter().all(|name| names.contains(name));
-    has_all
-        && names
-            .iter()
-            .all(|name| NAMES.contains(name) || *name == "time")
+    read.is_ok() && (PathFormat::detect(&start).holds_paths)(&start)
 }
 
 /// More than the header of an array or the first line of a table needs.
@@ -92,10 +108,7 @@ pub fn read_paths(
     bytes: &[u8],
     pace: Option<Pace>,
 ) -> Result<Motion, Diagnostic> {
-    let paths = match bytes.starts_with(b"\x93NUMPY") {
-        true => of_array(file, bytes)?,
-        false => vec![of_text(file, bytes)?],
-    };
+    let paths = (PathFormat::detect(bytes).read_bytes)(file, bytes)?;
     paths_of(file, name, paths, pace)
 }
 
@@ -132,154 +145,6 @@ pub fn paths_of(
         paths.set_origin(track, origin);
     }
     Ok(paths)
-}
-
-/// Columns by their names, of which those of `t` and of the ups may be missing.
-const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
-
-fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
-    let refuse = |line: u64, code, message: String| {
-        let mut fault = Diagnostic::new(file, code, message);
-        fault.location = Some(Location::Text { line, column: 1 });
-        fault
-    };
-    let text = std::str::from_utf8(bytes)
-        .map_err(|_| Diagnostic::new(file, Code::Encoding, "this is not UTF-8; save it as text"))?;
-    let text = text.trim_start_matches('\u{feff}');
-    let mut reader = ::csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(::csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let mut record = ::csv::StringRecord::new();
-    let mut next = |record: &mut ::csv::StringRecord| {
-        let read = reader.read_record(record);
-        read.map_err(|error| Diagnostic::new(file, Code::Path, error.to_string()))
-    };
-    if !next(&mut record)? {
-        return Err(Diagnostic::new(
-            file,
-            Code::Empty,
-            "the file is empty; it begins with `t,x,y,z`",
-        ));
-    }
-    let names: Vec<String> = record.iter().map(str::to_lowercase).collect();
-    let column = |name: &str| {
-        names
-            .iter()
-            .position(|known| known == name || name == "t" && known == "time")
-    };
-    let columns = NAMES.map(column);
-    let known = columns.iter().flatten().count();
-    let has = |range: std::ops::Range<usize>| columns[range].iter().flatten().count();
-    if has(1..4) < 3 || !matches!(has(4..7), 0 | 3) || known != names.len() {
-        let message = format!(
-            "the header is `{}`; a path has t,x,y,z,ux,uy,uz, of which t and ux,uy,uz may be missing",
-            names.join(",")
-        );
-        return Err(refuse(1, Code::Path, message));
-    }
-    let mut path = PathPoints::default();
-    while next(&mut record)? {
-        let line = record.position().map_or(0, ::csv::Position::line);
-        if record.len() != names.len() {
-            let message = format!(
-                "{} cells where the header has {}",
-                record.len(),
-                names.len()
-            );
-            return Err(refuse(line, Code::Columns, message));
-        }
-        let number = |field: usize| -> Result<f64, Diagnostic> {
-            let cell = columns[field]
-                .and_then(|column| record.get(column))
-                .unwrap_or_default();
-            let read = number::parse(cell);
-            read.map(|parsed| parsed.value)
-                .map_err(|(code, message)| refuse(line, code, message))
-        };
-        if columns[0].is_some() {
-            let time = number(0)?;
-            if let Some(&before) = path.times.last()
-                && time <= before
-            {
-                let message = format!("the time {time} is not after {before}");
-                return Err(refuse(line, Code::TimeNotIncreasing, message));
-            }
-            path.times.push(time);
-        }
-        let vector = |from: usize| -> Result<DVec3, Diagnostic> {
-            Ok(DVec3::new(
-                number(from)?,
-                number(from + 1)?,
-                number(from + 2)?,
-            ))
-        };
-        path.points.push(vector(1)?);
-        let is_blank = |column: &Option<usize>| {
-            column
-                .and_then(|column| record.get(column))
-                .is_none_or(str::is_empty)
-        };
-        let up = match columns[4..7].iter().all(is_blank) {
-            true => None,
-            false => Some(vector(4)?.as_vec3()),
-        };
-        if up.is_some_and(|up| up.as_dvec3().length() == 0.0) {
-            let message = "the upward direction has no length; leave its cells blank".to_owned();
-            return Err(refuse(line, Code::Path, message));
-        }
-        path.ups.push(up);
-    }
-    if path.points.is_empty() {
-        return Err(refuse(
-            1,
-            Code::NoKeys,
-            "there is no point after the header".to_owned(),
-        ));
-    }
-    Ok(path)
-}
-
-fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<PathPoints>, Diagnostic> {
-    let refuse = |code, message: String| Diagnostic::new(file, code, message);
-    let array = npy::read_numbers(file, bytes, |shape| match shape {
-        [_, _, 3] => Ok(()),
-        _ => Err(format!(
-            "the array has the shape {shape:?}; paths have (tracks, points, 3)"
-        )),
-    })?;
-    let (tracks, points) = (array.shape[0], array.shape[1]);
-    if tracks == 0 || points == 0 {
-        return Err(refuse(
-            Code::NoKeys,
-            "there is no point in the array".to_owned(),
-        ));
-    }
-    let of_track = |(track, numbers): (usize, &[f64])| -> Result<PathPoints, Diagnostic> {
-        let points = numbers
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|&point| DVec3::from_array(point));
-        let points: Vec<DVec3> = points.collect();
-        match points.iter().position(|point| !point.as_vec3().is_finite()) {
-            Some(point) => {
-                let message = "a coordinate is not a finite f32".to_owned();
-                Err(refuse(Code::NotFinite, message).inside(format!("[{track}, {point}]")))
-            }
-            None => Ok(PathPoints {
-                points,
-                ..PathPoints::default()
-            }),
-        }
-    };
-    array
-        .values
-        .chunks(points * 3)
-        .enumerate()
-        .map(of_track)
-        .collect()
 }
 
 impl PathPoints {

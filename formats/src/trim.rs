@@ -3,7 +3,7 @@
 use glam::Vec3;
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet, signs_differ};
 
-use crate::motion::Motion;
+use crate::motion::{Motion, carry_key_data};
 use crate::rate::{Precision, on_frames};
 use crate::sample::ChannelMethods;
 
@@ -96,15 +96,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         }
         trimmed.push(track.name.unwrap_or_default(), &times, &keys)?;
         let new_track = trimmed.track_count() - 1;
-        if !track.tangents.is_empty() {
-            trimmed.set_tangents(new_track, &track.tangents[part.kept.clone()])?;
-        }
-        if !track.velocities.is_empty() {
-            trimmed.set_velocities(new_track, &track.velocities[part.kept.clone()])?;
-        }
-        if !track.tcb.is_empty() {
-            trimmed.set_tcb(new_track, &track.tcb[part.kept.clone()])?;
-        }
+        carry_key_data(&mut trimmed, new_track, &track, part.kept.clone())?;
         for (channel, samples) in [
             (Channel::Translation, &cuts.translations),
             (Channel::Scale, &cuts.scales),

@@ -2,7 +2,7 @@
 //! blanks or commas, with `#` comments. Times are often seconds since 1970.
 
 use std::fmt::Write as _;
-use std::io::{self, BufRead, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 use glam::{DQuat, DVec3, Quat};
@@ -17,14 +17,12 @@ use crate::format::{
 use crate::keys::{Origin, select};
 use crate::motion::grid::restore;
 use crate::motion::{Joint, Motion, SampledClip, Transform};
+use crate::names::TRAJECTORY_TRACK;
 use crate::rate::{Precision, last_digit_power};
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use crate::warnings::Warnings;
-
-/// What the one track is called.
-pub(crate) const BODY: &str = "body";
 
 /// How a trajectory's line has a pose.
 pub(crate) struct PoseLine {
@@ -45,7 +43,7 @@ const LINE: PoseLine = PoseLine {
 /// A path of one body.
 pub static FORMAT: Format = Format {
     name: "tum",
-    summary: "a trajectory, `t x y z qx qy qz qw` a line",
+    summary: "a trajectory, `t x y z qx qy qz qw` on each line",
     extensions: &[],
     // The headings of the benchmark itself and of its tools; many files have none.
     probe: |start| {
@@ -56,11 +54,19 @@ pub static FORMAT: Format = Format {
         let has = |words: &[u8]| line.windows(words.len()).any(|part| part == words);
         line.starts_with(b"#") && (has(b"ground truth trajectory") || has(b"tx ty tz"))
     },
+    numbers_in_line: Some(8),
+    is_text: true,
+    numbers_repeated_names: false,
     read: open_tum,
     read_bytes: |name, bytes, options| read_tum(name, &bytes[..], options),
     write: None,
     write_motion: Some(write_motion),
-    features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],
+    features: &[
+        Feature::Quaternions,
+        Feature::Translations,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,
@@ -191,7 +197,7 @@ impl TrajectoryPoses {
         let power = self.unit.map_or(0, TimeUnit::power);
         let Some(time) = Decimal::parse_in(token, power) else {
             let message = format!(
-                "the time {token} is out of range; --time-unit ms, us or ns says that it is none of seconds"
+                "the time {token} is out of range; --time-unit ms, us or ns states another unit than seconds"
             );
             return Err(lines.refuse(column, Code::TumTime, message));
         };
@@ -264,7 +270,7 @@ impl TrajectoryPoses {
         let mut set = TrackSet::new();
         // Checked above; a set refuses what slipped through.
         let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
-        set.push(BODY, &times, &keys).map_err(refuse)?;
+        set.push(TRAJECTORY_TRACK, &times, &keys).map_err(refuse)?;
         let mut clip = Motion {
             set,
             skeleton: vec![Joint {
@@ -319,15 +325,7 @@ impl<'a> Trajectory<'a> {
             let message = format!("{tracks} tracks; a trajectory is one, choose one");
             return Err(refuse(message).into());
         }
-        let samples = sampled.times.len();
-        let fits = |count: usize| count == 0 || count == samples;
-        if sampled.rotations.len() != samples
-            || !fits(sampled.translations.len())
-            || !fits(sampled.scales.len())
-        {
-            let message = "lists of samples whose lengths are not those of times and tracks";
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
-        }
+        sampled.checked_len()?;
         Ok(Self { sampled, options })
     }
 

@@ -17,7 +17,7 @@ use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::npz::read_npz;
 use tumble_formats::trim::trim;
-use tumble_formats::{Code, Format, Loaded, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Format, Loaded, ReadOptions};
 
 const BVH: &str = "HIERARCHY
 ROOT Bip01 Pelvis
@@ -324,6 +324,59 @@ fn indices_may_be_written_with_a_point() {
 fn a_part_of_a_file_is_the_file_with_shorter_animations() {
     let file = gltf(&[("materials", json!([{"name": "skin"}]))]);
     let loaded = read(&file);
+    let (parts, glb, warnings) = cut(&loaded);
+    assert_eq!(warnings, []);
+    let document = loaded.document.as_ref().unwrap();
+    assert_eq!(document.other_contents(), ["materials"]);
+    assert_eq!(json_of(&glb)["materials"], json!([{"name": "skin"}]));
+    let again = read_gltf("t", glb, None, &ReadOptions::default()).unwrap();
+    for (part, found) in parts.iter().zip(&again.clips) {
+        assert_eq!(found.set.time_span(), Some((0.5, 1.5)));
+        assert_eq!(found.channels, part.channels);
+        for (track, other) in part.set.tracks().zip(found.set.tracks()) {
+            assert_eq!(track.keys, other.keys);
+            // What rests does so from the first key on.
+            let is_moved = track.keys.len() > 1;
+            assert!(!is_moved || track.times == other.times, "{:?}", other.times);
+        }
+    }
+    // Without clips, everything stays.
+    let mut text = Vec::new();
+    let options = MotionOptions::default();
+    document
+        .write(&[], &options, Path::new("t.gltf"), &mut text)
+        .unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&text).unwrap(), file);
+}
+
+/// Catches weights that are cut as transforms are, and an animation that stays long without a word.
+#[test]
+fn weights_are_not_cut_and_that_is_said() {
+    let mut file = gltf(&[]);
+    let weights = json!({"sampler": 0, "target": {"node": 1, "path": "weights"}});
+    let channels = file["animations"][0]["channels"].as_array_mut().unwrap();
+    channels.push(weights.clone());
+    let (_, glb, warnings) = cut(&read(&file));
+    let [warning] = &warnings[..] else {
+        panic!("{warnings:?}");
+    };
+    assert_eq!(warning.code, Code::StaysWhole);
+    assert!(
+        warning
+            .to_string()
+            .contains(":/animations/0: warning[W111]: 1 channel of weights or another property is not cut"),
+        "{warning}"
+    );
+    let written = json_of(&glb);
+    let mut channels = written["animations"][0]["channels"]
+        .as_array()
+        .unwrap()
+        .iter();
+    assert!(channels.any(|channel| *channel == weights), "{written}");
+}
+
+/// The clips of a file from 0.5 to 1.5 s, the file with them, and what was said of it.
+fn cut(loaded: &Loaded) -> (Vec<Motion>, Vec<u8>, Vec<Diagnostic>) {
     let engine = Engine::new(Device::Cpu).unwrap();
     let parts: Vec<Motion> = (loaded.clips.iter())
         .map(|clip| trim(clip, 0.5, 1.5, &engine).unwrap())
@@ -347,30 +400,10 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
         })
         .collect();
     let document = loaded.document.as_ref().unwrap();
-    assert_eq!(document.other_contents(), ["materials"]);
     let mut glb = Vec::new();
     let options = MotionOptions::default();
-    document
-        .write(&clips, &options, Path::new("o.glb"), &mut glb)
-        .unwrap();
-    assert_eq!(json_of(&glb)["materials"], json!([{"name": "skin"}]));
-    let again = read_gltf("t", glb, None, &ReadOptions::default()).unwrap();
-    for (part, found) in parts.iter().zip(&again.clips) {
-        assert_eq!(found.set.time_span(), Some((0.5, 1.5)));
-        assert_eq!(found.channels, part.channels);
-        for (track, other) in part.set.tracks().zip(found.set.tracks()) {
-            assert_eq!(track.keys, other.keys);
-            // What rests does so from the first key on.
-            let is_moved = track.keys.len() > 1;
-            assert!(!is_moved || track.times == other.times, "{:?}", other.times);
-        }
-    }
-    // Without clips, everything stays.
-    let mut text = Vec::new();
-    document
-        .write(&[], &options, Path::new("t.gltf"), &mut text)
-        .unwrap();
-    assert_eq!(serde_json::from_slice::<Value>(&text).unwrap(), file);
+    let warnings = document.write(&clips, &options, Path::new("o.glb"), &mut glb);
+    (parts, glb, warnings.unwrap())
 }
 
 /// The body's pelvis is at `trans` and where its shape puts it; what is written again is `trans`.

@@ -1,7 +1,10 @@
-//! The registry lies above all formats: it imports each of them, and none of them imports it.
+//! The table of formats lies above all formats: it names each of them, and none of them imports it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// What names all formats, and the module with which they are asked for.
+const TABLES: [&str; 4] = ["FORMATS", "SURFACES", "PATHS", "format::registry"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
@@ -20,14 +23,16 @@ fn no_format_imports_the_registry() {
     let mut files = Vec::new();
     sources(&root, &mut files);
     assert!(files.len() > 50, "{}", files.len());
-    for file in files.iter().filter(|file| **file != root.join("lib.rs")) {
+    let above =
+        ["lib.rs", "format/registry.rs", "surface/mod.rs", "path.rs"].map(|file| root.join(file));
+    for file in files.iter().filter(|file| !above.contains(file)) {
         let text = fs::read_to_string(file).unwrap();
         let mut code = text
             .lines()
             .filter(|line| !line.trim_start().starts_with("//"));
         assert!(
-            !code.any(|line| line.contains("format::registry")),
-            "{}: formats lie below the registry",
+            !code.any(|line| TABLES.iter().any(|name| line.contains(name))),
+            "{}: formats lie below their table",
             file.display()
         );
     }

@@ -1,14 +1,12 @@
-//! The table of formats in the guide, all of which are read, is the code's.
+//! The tables of formats in the guide are the code's.
 
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
+use std::sync::Mutex;
 
-use tumble_formats::{FORMATS, Feature};
-
-const BEGIN: &str =
-    "<!-- formats: written by `UPDATE_EXPECTED=1 cargo test -p tumble-formats` -->\n";
-const END: &str = "<!-- end of formats -->\n";
+use tumble_formats::surface::SurfaceKind;
+use tumble_formats::{FORMATS, Feature, PATHS, SURFACES};
 
 #[test]
 fn the_table_of_formats_is_that_of_the_code() {
@@ -30,16 +28,12 @@ fn the_table_of_formats_is_that_of_the_code() {
         let (endings, summary) = (endings.join(" "), format.summary);
         writeln!(table, "| {endings} | {summary} | {written} |").unwrap();
     }
-    update(BEGIN, END, &table);
+    update("formats.md", "formats", &table);
 }
-
-const BEGIN_FEATURES: &str =
-    "<!-- features: written by `UPDATE_EXPECTED=1 cargo test -p tumble-formats` -->\n";
-const END_FEATURES: &str = "<!-- end of features -->\n";
 
 #[test]
 fn the_table_of_what_formats_hold_is_that_of_the_code() {
-    let all = FORMATS.into_iter().filter(|format| format.writes_clips());
+    let all = FORMATS.iter().filter(|format| format.writes_clips());
     let all: Vec<_> = all.collect();
     let mut table = String::from("| |");
     for format in &all {
@@ -58,17 +52,52 @@ fn the_table_of_what_formats_hold_is_that_of_the_code() {
         }
         table.push('\n');
     }
-    update(BEGIN_FEATURES, END_FEATURES, &table);
+    update("formats.md", "features", &table);
 }
 
-/// Compares a table of the page with the code's, or writes it.
-fn update(begin: &str, end: &str, table: &str) {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/formats.md");
+#[test]
+fn the_table_of_surfaces_is_that_of_the_code() {
+    let mut table = String::from("| file | kind | what is read |\n|---|---|---|\n");
+    for format in SURFACES {
+        let endings: Vec<String> = format.endings().map(|it| format!("`.{it}`")).collect();
+        let kind = match format.kind {
+            SurfaceKind::Mesh => "mesh",
+            SurfaceKind::Net => "net",
+        };
+        let (endings, summary) = (endings.join(" "), format.summary);
+        writeln!(table, "| {endings} | {kind} | {summary} |").unwrap();
+    }
+    update("routes.md", "surfaces", &table);
+}
+
+#[test]
+fn the_table_of_paths_is_that_of_the_code() {
+    let mut table = String::from("| format | what it is |\n|---|---|\n");
+    for format in PATHS {
+        writeln!(
+            table,
+            "| {} | {} |",
+            format.name.to_uppercase(),
+            format.summary
+        )
+        .unwrap();
+    }
+    update("paths.md", "paths", &table);
+}
+
+/// Compares a table of a page of `docs/` with the code's, or writes it.
+fn update(page: &str, name: &str, table: &str) {
+    static WRITING: Mutex<()> = Mutex::new(());
+    let _one = WRITING.lock();
+    let begin =
+        format!("<!-- {name}: written by `UPDATE_EXPECTED=1 cargo test -p tumble-formats` -->\n");
+    let end = format!("<!-- end of {name} -->\n");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../docs")
+        .join(page);
     let text = fs::read_to_string(&file).unwrap();
-    let (before, rest) = text
-        .split_once(begin)
-        .expect("docs/formats.md has the table");
-    let (found, after) = rest.split_once(end).expect("the table ends");
+    let (before, rest) = text.split_once(&begin).expect("the page has the table");
+    let (found, after) = rest.split_once(&end).expect("the table ends");
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         fs::write(&file, format!("{before}{begin}{table}{end}{after}")).unwrap();
         return;

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use glam::{Quat, Vec3};
 use tumble::{Channel, FrameRate, TrackSet};
 use tumble_formats::bvh::{BvhChannel, BvhJoint};
-use tumble_formats::format::{MotionOptions, WriteError};
+use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use tumble_formats::sample::Samples;
@@ -166,7 +166,10 @@ fn clip(numbers: &mut Numbers) -> Motion {
 
 /// The formats of clips, glTF as text too.
 fn formats() -> impl Iterator<Item = (&'static Format, &'static str)> {
-    let writable = FORMATS.into_iter().filter(|format| format.writes_clips());
+    let writable = FORMATS
+        .iter()
+        .copied()
+        .filter(|format| format.writes_clips());
     let names = writable.map(|format| (format, format.name));
     names.chain(Format::named("gltf").map(|format| (format, "gltf")))
 }
@@ -193,8 +196,8 @@ fn through(
         Err(WriteError::Io(error)) => panic!("{error}"),
     };
     std::fs::write(&file, bytes).unwrap();
-    // The rate is all that KITTI does not hold of such a clip.
-    let source_rate = rate.filter(|_| format.name == "kitti");
+    // The rate is all that a format without times does not hold of such a clip.
+    let source_rate = rate.filter(|_| format.takes(FormatOption::TimesApart));
     let options = ReadOptions {
         source_rate,
         ..ReadOptions::default()
@@ -401,7 +404,7 @@ fn may_be_refused(clip: &Motion, format: &Format) -> bool {
         .or_else(|| clip.rate_of_keys())
         .is_some_and(is_frame)
         && !format.supports(Feature::UnevenTimes);
-    is_uneven || ["tum", "euroc", "kitti"].contains(&format.name) && tracks != 1
+    is_uneven || tracks != 1 && !format.supports(Feature::SeveralTracks)
 }
 
 #[test]

@@ -9,7 +9,10 @@ use arrow_ipc::reader::FileReader;
 use bytes::Bytes;
 use glam::{Quat, Vec3};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use tumble::{Channel, Encoding, FrameRate, Layout, MatrixOrder, SampleTimes, Timeline, TrackSet};
+use tumble::{
+    Channel, ComponentType, Encoding, FrameRate, Layout, MatrixOrder, SampleTimes, Timeline,
+    TrackSet,
+};
 use tumble_formats::arrow::read_arrow;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::{MotionOptions, ResultShape, WriteError};
@@ -317,17 +320,17 @@ fn every_representation_has_its_columns() {
             let found: Vec<u8> = (3..names.len())
                 .flat_map(|column| {
                     let column = batch.column(column);
-                    match encoding {
-                        Encoding::F16 => {
+                    match encoding.component_type() {
+                        ComponentType::F16 => {
                             let half = column.as_primitive::<Float16Type>().value(4);
                             half.to_bits().to_ne_bytes().to_vec()
                         }
-                        Encoding::Snorm16 => column
+                        ComponentType::Snorm16 => column
                             .as_primitive::<Int16Type>()
                             .value(4)
                             .to_ne_bytes()
                             .to_vec(),
-                        _ => column
+                        ComponentType::F32 => column
                             .as_primitive::<Float32Type>()
                             .value(4)
                             .to_ne_bytes()

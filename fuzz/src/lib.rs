@@ -2,31 +2,32 @@
 
 mod targets;
 
+use tumble_formats::FORMATS;
+
 /// Each target, by the name of what it fuzzes.
 pub fn target(name: &str, data: &[u8]) {
-    let target: targets::Target = match name {
-        "dat" => targets::dat,
-        "gltf" => targets::gltf::gltf,
-        "bvh" => targets::motion::bvh,
-        "fbx" => targets::motion::fbx,
-        "tum" => targets::motion::tum,
-        "euroc" => targets::motion::euroc,
-        "kitti" => targets::motion::kitti,
-        "mcap" => targets::motion::mcap,
-        "npz" => targets::arrays::npz,
-        "npy" => targets::arrays::npy,
+    let target: fn(&[u8]) -> u64 = match name {
+        "formats" => formats,
         "outputs" => targets::outputs,
         "arguments" => targets::arguments,
         "frames" => targets::frames,
         "tracks" => targets::tracks,
         "spirv" => targets::spirv,
-        "parquet" => targets::tables::parquet,
-        "arrow" => targets::tables::arrow,
-        "csv" => targets::tables::csv,
-        "meshes" => targets::surfaces::meshes,
+        "surfaces" => targets::surfaces::surfaces,
         "paths" => targets::surfaces::paths,
         "numbers" => targets::surfaces::numbers,
         _ => panic!("there is no target {name}"),
     };
     target(data);
+}
+
+/// A file of the format that the first byte chooses.
+fn formats(bytes: &[u8]) -> u64 {
+    match bytes.split_first() {
+        Some((&choice, file)) => {
+            let format = FORMATS[usize::from(choice) % FORMATS.len()];
+            targets::formats::format(format, file)
+        }
+        None => 0,
+    }
 }

@@ -1,10 +1,12 @@
 //! The readers of meshes, nets and paths.
 
-use tumble_formats::gltf::meshes::triangles_of;
 use tumble_formats::npy::read_numbers;
 use tumble_formats::path::{Pace, read_paths};
-use tumble_formats::{Diagnostic, Limits};
-use tumble_routes::mesh::read::{Polygons, ReadError, obj, ply};
+use tumble_formats::surface::{Surface, SurfaceFormat};
+use tumble_formats::times::read_times;
+use tumble_formats::{Diagnostic, Limits, SURFACES};
+use tumble_routes::mesh::Mesh;
+use tumble_routes::net::Net;
 
 use super::signature;
 
@@ -13,28 +15,29 @@ fn hint(error: &Diagnostic) -> String {
     error.message.chars().rev().take(12).collect()
 }
 
-/// OBJ, PLY and the meshes of glTF: what is read has the vertices that its faces name, or is refused when it
-/// becomes a mesh.
-pub(crate) fn meshes(bytes: &[u8]) -> u64 {
-    let outcome = |read: Result<Polygons, ReadError>| {
-        let text = match read.map(|polygons| polygons.mesh()) {
-            Ok(Ok(mesh)) => format!("{:?}", mesh.pieces().len().min(3)),
-            Ok(Err(error)) => error.to_string(),
-            Err(error) => error.to_string(),
+/// Every format of surfaces: what is read has the vertices that its faces name, or is refused when it becomes a
+/// mesh or a net.
+pub(crate) fn surfaces(bytes: &[u8]) -> u64 {
+    let outcome = |format: &&SurfaceFormat| {
+        let found = (format.read_bytes)("fuzz", bytes.to_vec(), None, Limits::default());
+        let text = match found {
+            Ok(Surface::Mesh(found)) => match Mesh::welded(&found.positions, found.iter(), 0.0) {
+                Ok(mesh) => format!("{:?}", mesh.pieces().len().min(3)),
+                Err(error) => error.to_string(),
+            },
+            Ok(Surface::Net(net)) => {
+                assert_eq!(Some(net.points.len()), net.rows.checked_mul(net.columns));
+                match Net::new(net.rows, net.columns, net.points) {
+                    Ok(_) => "a net".to_owned(),
+                    Err(error) => error.to_string(),
+                }
+            }
+            Err(error) => hint(&error),
         };
         let words = text.chars().filter(|c| !c.is_ascii_digit()).take(40);
         words.collect::<String>()
     };
-    let triangles = match triangles_of("fuzz", bytes.to_vec(), None, Limits::default()) {
-        Ok(found) => {
-            let count = found.positions.len();
-            let corners = found.triangles.as_flattened();
-            assert!(corners.iter().all(|&corner| (corner as usize) < count));
-            found.triangles.len().min(3).to_string()
-        }
-        Err(error) => hint(&error),
-    };
-    signature((outcome(obj(bytes)), outcome(ply(bytes)), triangles))
+    signature(SURFACES.iter().map(outcome).collect::<Vec<_>>())
 }
 
 /// Paths in CSV and NPY: what is read has points in order.
@@ -56,8 +59,9 @@ pub(crate) fn paths(bytes: &[u8]) -> u64 {
     signature(outcomes)
 }
 
-/// Arrays whose meaning the caller knows.
+/// Arrays whose meaning the caller knows, and lists of times.
 pub(crate) fn numbers(bytes: &[u8]) -> u64 {
+    let _ = read_times("fuzz", bytes);
     match read_numbers("fuzz", bytes, |_| Ok(())) {
         Ok(found) => {
             assert_eq!(found.values.len(), found.shape.iter().product::<usize>());

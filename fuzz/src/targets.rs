@@ -15,31 +15,16 @@ use tumble::{
     Device, Encoding, Engine, FrameRate, Interpolation, KeySigns, Layout, MAX_FRAMES, METHODS,
     SampleTimes, Speed, TrackSet, WrapMode,
 };
-use tumble_formats::Limits;
-use tumble_formats::ReadOptions;
 use tumble_formats::csv::CsvWriter;
-use tumble_formats::dat::read_dat;
-use tumble_formats::dat::write::write_dat;
 use tumble_formats::npy::NpyWriter;
 use tumble_formats::quaternion::ComponentOrder;
-use tumble_formats::times::read_times;
 use tumble_formats::{Diagnostic, Location};
 
-#[path = "arrays.rs"]
-pub(crate) mod arrays;
-#[path = "gltf.rs"]
-pub(crate) mod gltf;
-#[path = "motion.rs"]
-pub(crate) mod motion;
+#[path = "formats.rs"]
+pub(crate) mod formats;
 
 #[path = "surfaces.rs"]
 pub(crate) mod surfaces;
-
-#[path = "tables.rs"]
-pub(crate) mod tables;
-
-/// A target: from bytes to a hash of the outcome.
-pub(crate) type Target = fn(&[u8]) -> u64;
 
 fn signature(of: impl Hash) -> u64 {
     let mut hasher = DefaultHasher::new();
@@ -103,52 +88,6 @@ fn location_is_inside(bytes: &[u8], said: &Diagnostic) {
     if let Some(Location::Text { line, column }) = said.location {
         assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
         assert!(1 <= column && column <= bytes.len() as u64 + 1);
-    }
-}
-
-/// The `.dat` parser: what it takes is a valid set that reads back bit for bit, what it
-/// refuses has a location within the input.
-pub(crate) fn dat(bytes: &[u8]) -> u64 {
-    let options = ReadOptions {
-        limits: Limits {
-            line: 4096,
-            file: 65_536,
-            memory: None,
-        },
-        ..ReadOptions::default()
-    };
-    let _ = read_times("fuzz", bytes);
-    match read_dat("fuzz", bytes, &options) {
-        Ok(loaded) => {
-            for warning in &loaded.warnings {
-                location_is_inside(bytes, warning);
-            }
-            for track in loaded.clips[0].set.tracks() {
-                assert!(!track.keys.is_empty());
-                assert!(track.times.windows(2).all(|pair| pair[0] < pair[1]));
-                for key in track.keys {
-                    assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
-                }
-            }
-            let mut written = Vec::new();
-            write_dat(
-                &mut written,
-                &loaded.clips[0].set,
-                loaded.box_length.unwrap_or(1.0),
-            )
-            .expect("memory takes everything");
-            let again = read_dat("fuzz", &*written, &ReadOptions::default())
-                .expect("a written file is read again");
-            assert_eq!(bits(&again.clips[0].set), bits(&loaded.clips[0].set));
-            let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
-            signature((codes, loaded.clips[0].set.track_count().min(3)))
-        }
-        Err(error) => {
-            location_is_inside(bytes, &error);
-            assert!(!error.message.is_empty());
-            let hint: String = error.message.chars().rev().take(12).collect();
-            signature((error.code, hint))
-        }
     }
 }
 

@@ -288,7 +288,10 @@ fn about() -> Answer {
 /// The names of the formats that are read.
 fn formats() -> Vec<&'static str> {
     #[cfg(feature = "files")]
-    return tumble_formats::FORMATS.map(|format| format.name).to_vec();
+    return tumble_formats::FORMATS
+        .iter()
+        .map(|format| format.name)
+        .collect();
     #[cfg(not(feature = "files"))]
     Vec::new()
 }

@@ -147,8 +147,10 @@ def others(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, float]:
         return torch.where(sine < 1e-3, a * (1 - s) + b * s, found)
 
     def by_roma() -> Any:
+        # Each environment has a step of its clip; roma's slerp would take every step for every environment.
         a, b = keys[first], keys[first + 1]
-        return roma.unitquat_slerp_fast(a, b, steps[:, None].expand(a.shape[:2]), shortest_arc=True)
+        arc = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
+        return roma.quat_product(a, roma.rotvec_to_unitquat(steps[:, None, None] * arc))
 
     return {**found, "torch": shortest(by_torch), "roma": shortest(by_roma)}
 

@@ -96,7 +96,7 @@ fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, 
     };
     let made = numpy(py)?.call_method1(name, (value,));
     let made = made.map_err(|error| match error.is_instance_of::<PyValueError>(py) {
-        true => input(format!("{label}: no array can be made of it: {error}")),
+        true => input(format!("{label}: it cannot be converted to an array: {error}")),
         false => error,
     })?;
     Ok(made.cast_into::<PyUntypedArray>()?)
@@ -116,7 +116,7 @@ fn array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Array<'py>> {
         )));
     }
     let converted = untyped.call_method1(intern!(value.py(), "astype"), ("float64",))?;
-    borrowed(&converted)?.ok_or_else(|| input(format!("{label}: no array of numbers")))
+    borrowed(&converted)?.ok_or_else(|| input(format!("{label}: it is not an array of numbers")))
 }
 
 /// An array of a type and an alignment that can be read where it lies.

@@ -399,7 +399,7 @@ pub(crate) fn path_errors(
 ) -> PyResult<PathErrors> {
     let align: Align = option_named(align, "align")?;
     if let Some(gap) = max_gap.filter(|gap| gap.is_nan() || *gap < 0.0) {
-        return Err(input(format!("max_gap: {gap} is no number of seconds")));
+        return Err(input(format!("max_gap: {gap} is not a number of seconds")));
     }
     let step = rpe.map(|text| {
         let step = text.parse();

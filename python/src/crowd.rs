@@ -75,7 +75,7 @@ fn each(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>
 fn indices(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<usize>> {
     let whole = |number: f64| match number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
         true => Ok(number as usize),
-        false => Err(input(format!("{name}: {number} is no index"))),
+        false => Err(input(format!("{name}: {number} is not an index"))),
     };
     each(value, name, count)?.into_iter().map(whole).collect()
 }
@@ -113,7 +113,7 @@ impl Crowd {
         engine: Option<&Bound<'_, Engine>>,
     ) -> PyResult<Self> {
         let Some(first) = clips.first() else {
-            return Err(input("clips: there is none"));
+            return Err(input("clips: give at least one"));
         };
         let method = method_named(method)?;
         let joints = first.motion.set.track_count();
@@ -291,7 +291,7 @@ impl Crowd {
             ComponentType::F32 => false,
             ComponentType::F16 => true,
             ComponentType::Snorm16 => {
-                return Err(input("dtype: crowds give float32 or float16"));
+                return Err(input("dtype: crowds return float32 or float16"));
             }
         };
         let shape: &[usize] = match values {

@@ -7,8 +7,8 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::{
-    Axes, Device, Encoding, EngineOptions, EulerSequence, Interpolation, Layout, MatrixOrder,
-    Quantity, UnknownNameError,
+    Axes, Device, Encoding, EncodingOptions, EngineOptions, EulerSequence, Interpolation, Layout,
+    MatrixOrder, Quantity, UnknownNameError,
 };
 use tumble_cli::host;
 
@@ -18,7 +18,7 @@ use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::OutputRequest;
 use crate::follow;
 use crate::options::{Request, option_named, request_arrays, samples_of};
-use crate::output::quaternions_of;
+use crate::output::{encoding_named, quaternions_of};
 use crate::poses;
 use crate::run::{interruptible, stoppable};
 use crate::samples;
@@ -74,6 +74,11 @@ pub(crate) fn default_engine(py: Python<'_>) -> PyResult<&Bound<'_, Engine>> {
 
 pub(crate) fn layout_named(name: &str) -> PyResult<Layout> {
     option_named(name, "layout")
+}
+
+fn sequence_named(name: &str) -> PyResult<EulerSequence> {
+    let sequence = name.parse();
+    sequence.map_err(|error| input(format!("sequence: {error}")))
 }
 
 /// The axes of that name, and whether they are the world's, along the skeleton.
@@ -314,7 +319,7 @@ impl Engine {
             encoding: match columns {
                 3 => Encoding::Matrix3x3(MatrixOrder::RowMajor),
                 4 => Encoding::Matrix3x4(MatrixOrder::RowMajor),
-                _ => return Err(input(format!("columns: there are 3 or 4, not {columns}"))),
+                _ => return Err(input(format!("columns: expected 3 or 4, not {columns}"))),
             },
             layout: layout_named(layout)?,
             on_card: device_array,
@@ -366,13 +371,73 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let sequence: EulerSequence = sequence
-            .parse()
-            .map_err(|error| input(format!("sequence: {error}")))?;
         let result = OutputRequest {
-            encoding: Encoding::Euler(sequence),
+            encoding: Encoding::Euler(sequence_named(sequence)?),
             radians: !degrees,
             layout: layout_named(layout)?,
+            ..OutputRequest::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The rotations as rotation vectors: float32, (tracks, frames, 3), the axis times the angle in radians, at most
+    /// pi, as SciPy's `as_rotvec` and the poses of SMPL. Other keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().rotation_vectors(clip, at=1.0, method="slerp").round(4)
+    /// array([[0.    , 0.    , 1.5708]], dtype=float32)
+    #[pyo3(signature = (clip, *, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, layout='track')")]
+    fn rotation_vectors<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = OutputRequest {
+            as_vectors: true,
+            layout: layout_named(layout)?,
+            ..OutputRequest::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The rotations in the representation of that name: "f32", "f16", "snorm16", "axis-angle", "matrix", "matrix-3x4",
+    /// "euler" … (`tumble.encodings()`), an array (tracks, frames, …). Every device gives the same bits.
+    ///
+    /// `major`: "row" or "column", the order of matrices. `sequence`: the axes of Euler angles. `degrees=False`: angles
+    /// in radians. `device_array`: as of `evaluate`, whose keywords the others are.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().encoded(clip, "matrix-3x4", fps=30, major="column").shape
+    /// (1, 61, 4, 3)
+    /// >>> tumble.Engine().encoded(clip, "axis-angle", at=1.0, method="slerp").round(3)
+    /// array([[ 0.,  0.,  1., 90.]], dtype=float32)
+    #[pyo3(signature = (clip, encoding, *, major="row", sequence="XYZ", degrees=true, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, encoding, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, major='row', sequence='XYZ', degrees=True, out=None, layout='track', device_array=False)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn encoded<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        encoding: &str,
+        major: &str,
+        sequence: &str,
+        degrees: bool,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        device_array: bool,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let with = EncodingOptions {
+            order: option_named(major, "major")?,
+            sequence: sequence_named(sequence)?,
+        };
+        let result = OutputRequest {
+            encoding: encoding_named(encoding, with)?,
+            radians: !degrees,
+            layout: layout_named(layout)?,
+            on_card: device_array,
             ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, Quat};
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
@@ -14,6 +15,7 @@ use tumble::{
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
+use tumble_formats::npz::rotation_vector;
 use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
@@ -21,7 +23,7 @@ use crate::device_array::DeviceArray;
 use crate::engine::MIN_DEVICE_ROTATIONS;
 use crate::errors::{device, guarded, input, of_engine, warn};
 use crate::options::{Request, SampleRequest};
-use crate::output::{array_of, filled_bytes};
+use crate::output::{array, array_of, filled, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
@@ -38,6 +40,8 @@ pub(crate) struct OutputRequest {
     pub(crate) in_world: bool,
     /// Angles in radians instead of degrees.
     pub(crate) radians: bool,
+    /// Rotation vectors, three numbers, of quaternions.
+    pub(crate) as_vectors: bool,
     /// The only track has no axis.
     pub(crate) is_one_track: bool,
 }
@@ -54,6 +58,7 @@ impl Default for OutputRequest {
             on_card: false,
             in_world: false,
             radians: false,
+            as_vectors: false,
             is_one_track: false,
         }
     }
@@ -101,6 +106,9 @@ impl OutputRequest {
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
+        if self.as_vectors {
+            return self.vectors(py, engine, clip, request, out, inputs);
+        }
         let samples = request.samples()?;
         let has_form = self.order != Order::Xyzw || self.encoding != Encoding::F32;
         if self.as_rotation && (has_form || out.is_some()) {
@@ -136,14 +144,7 @@ impl OutputRequest {
             return self.ragged(py, engine, clip, request, lists);
         }
         let (frames, count) = samples.resolved(&clip.set)?;
-        let is_one_time = matches!(samples, SampleRequest::Shared { is_one: true, .. });
-        let mut shape = Vec::with_capacity(4);
-        let axes = match self.layout {
-            Layout::TrackMajor => [(tracks, self.is_one_track), (count, is_one_time)],
-            Layout::FrameMajor => [(count, is_one_time), (tracks, self.is_one_track)],
-        };
-        shape.extend(axes.into_iter().filter(|axis| !axis.1).map(|axis| axis.0));
-        shape.extend_from_slice(self.encoding.shape());
+        let shape = self.shape(samples, tracks, count, self.encoding.shape());
         if self.on_card {
             let engine = engine((tracks * count).max(MIN_DEVICE_ROTATIONS))?;
             let work = Work {
@@ -188,6 +189,57 @@ impl OutputRequest {
         }
     }
 
+    /// The axes of a result whose values have the shape `each`.
+    fn shape(
+        &self,
+        samples: &SampleRequest,
+        tracks: usize,
+        count: usize,
+        each: &[usize],
+    ) -> Vec<usize> {
+        let is_one_time = matches!(samples, SampleRequest::Shared { is_one: true, .. });
+        let axes = match self.layout {
+            Layout::TrackMajor => [(tracks, self.is_one_track), (count, is_one_time)],
+            Layout::FrameMajor => [(count, is_one_time), (tracks, self.is_one_track)],
+        };
+        let kept = axes.into_iter().filter(|axis| !axis.1).map(|axis| axis.0);
+        kept.chain(each.iter().copied()).collect()
+    }
+
+    /// Rotation vectors: quaternions are evaluated, and their logarithms taken in f64.
+    fn vectors<'py>(
+        &self,
+        py: Python<'py>,
+        engine: impl FnOnce(usize) -> PyResult<Engine>,
+        clip: &Arc<Motion>,
+        request: &Request,
+        out: Option<&Bound<'py, PyAny>>,
+        inputs: &[&Bound<'py, PyAny>],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rotations = Self {
+            as_vectors: false,
+            ..*self
+        };
+        let samples = request.samples()?;
+        if matches!(samples, SampleRequest::Ragged(_)) {
+            let lists = rotations.of(py, engine, clip, request, out, inputs)?;
+            let results = PyList::empty(py);
+            for list in lists.try_iter()? {
+                let list = list?.cast_into::<PyArrayDyn<f32>>()?;
+                let array = array(py, &[list.shape()[0], 3], None, &[])?;
+                write_vectors(&list, &array)?;
+                results.append(array)?;
+            }
+            return Ok(results.into_any());
+        }
+        let (_, count) = samples.resolved(&clip.set)?;
+        let shape = self.shape(samples, clip.set.track_count(), count, &[3]);
+        let array = array(py, &shape, out, inputs)?;
+        let found = rotations.of(py, engine, clip, request, None, &[])?;
+        write_vectors(&found.cast_into()?, &array)?;
+        Ok(array.into_any())
+    }
+
     /// Refuses what is done on the host after the engine, or needs the host's memory.
     fn check_on_card(
         &self,
@@ -205,6 +257,9 @@ impl OutputRequest {
             }
             _ if self.order != Order::Xyzw => {
                 "what is on the card is x y z w; reorder it there, as q[..., [3, 0, 1, 2]]"
+            }
+            _ if self.radians && !self.encoding.angles().is_empty() => {
+                "angles on the card are in degrees; leave out `degrees`, and convert them there"
             }
             _ if along_skeleton => {
                 "what joints do in the world is added up on the host; take the axes of the body or its parent"
@@ -383,17 +438,15 @@ impl OutputRequest {
                 ComponentType::F16 | ComponentType::Snorm16 => self.reorder::<u16>(bytes),
             }
         }
-        if !self.radians {
+        let angles = self.encoding.angles();
+        if !self.radians || angles.is_empty() {
             return;
         }
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(bytes);
-        // Of an axis and an angle the last is the angle.
-        let (first, step) = match self.encoding {
-            Encoding::AxisAngle => (3, 4),
-            _ => (0, 1),
-        };
-        for angle in numbers.iter_mut().skip(first).step_by(step) {
-            *angle = f64::from(*angle).to_radians() as f32;
+        for value in numbers.chunks_exact_mut(self.encoding.components().len()) {
+            for angle in &mut value[angles.clone()] {
+                *angle = f64::from(*angle).to_radians() as f32;
+            }
         }
     }
 
@@ -484,6 +537,27 @@ impl OutputRequest {
         }
         Ok(list.into_any())
     }
+}
+
+/// Stores the rotation vectors of quaternions.
+fn write_vectors(
+    quaternions: &Bound<'_, PyArrayDyn<f32>>,
+    vectors: &Bound<'_, PyArrayDyn<f32>>,
+) -> PyResult<()> {
+    let quaternions = quaternions.readonly();
+    let quaternions = quaternions.as_slice()?;
+    filled(vectors, |vectors| {
+        let pairs = quaternions
+            .as_chunks()
+            .0
+            .iter()
+            .zip(vectors.as_chunks_mut().0);
+        for (&quaternion, vector) in pairs {
+            let found = rotation_vector::shortest(Quat::from_array(quaternion));
+            *vector = found.as_vec3().to_array();
+        }
+        Ok(())
+    })
 }
 
 /// The tracks of a clip, parents before their children.

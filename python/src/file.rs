@@ -152,8 +152,7 @@ impl File {
     }
 }
 
-/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`,
-/// KITTI, `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
+/// Reads a motion file of any format (docs/formats.md lists them). What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
 /// with the position.
 ///
 /// `load(path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
@@ -326,7 +325,7 @@ impl Scale {
         }
         match scale.extract::<f64>()? {
             factor if factor.is_finite() && factor > 0.0 => Ok(Self::Factor(factor)),
-            factor => Err(input(format!("scale: {factor} is not a number over 0"))),
+            factor => Err(input(format!("scale: {factor} is not a number greater than 0"))),
         }
     }
 }

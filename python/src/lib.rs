@@ -63,7 +63,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::pickle::clip_of_state;
     #[pymodule_export]
-    use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
+    use crate::program::{devices, encodings, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]
     use crate::reduce::{Reduction, reduce};
     #[pymodule_export]
@@ -71,7 +71,9 @@ mod _tumble {
     #[pymodule_export]
     use crate::save::save;
     #[pymodule_export]
-    use crate::shards::{Plan, Worker, inputs_of, kernels_sha256, merge};
+    use crate::shards::{
+        Plan, Record, Worker, inputs_of, kernels_sha256, manifest_by_input, manifest_results, merge,
+    };
     #[pymodule_export]
     use crate::stream::{Chunk, Chunks};
     #[pymodule_export]

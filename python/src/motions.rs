@@ -283,7 +283,7 @@ impl Motions {
                 )));
             };
             if time.is_nan() {
-                return Err(input(format!("times[{index}]: it is no number")));
+                return Err(input(format!("times[{index}]: it is not a number")));
             }
             let tick = (time * per_second).round().clamp(0.0, f64::from(ticks));
             Ok((clip, tick as u32))
@@ -311,7 +311,7 @@ fn rows<'a, const N: usize>(
 
 fn array<'py>(arrays: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     let found = arrays.get_item(name)?;
-    found.ok_or_else(|| input(format!("no motion library: there is no array `{name}`")))
+    found.ok_or_else(|| input(format!("not a motion library: there is no array `{name}`")))
 }
 
 fn length(motion: &Motion) -> f64 {

@@ -217,7 +217,7 @@ fn samples(
         (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
         (None, Some(times)) => arrays::sample_times(&times).map(Some),
         (None, None) if start.is_some() || end.is_some() => {
-            Err(input("`start` and `end` go with `fps`; give it too"))
+            Err(input("`start` and `end` need `fps`; give it too"))
         }
         (None, None) => Ok(None),
     }

@@ -7,7 +7,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
-use tumble::{ComponentType, Encoding};
+use tumble::{ComponentType, Encoding, EncodingOptions};
 
 use crate::arrays::{is_aligned, numpy};
 use crate::errors::input;
@@ -25,15 +25,36 @@ pub(crate) fn type_name(component: ComponentType) -> &'static str {
 pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
     let kind = PyArrayDescr::new(dtype.py(), dtype.clone())?;
     let name = kind.str()?.to_string();
-    let all = [Encoding::F32, Encoding::F16, Encoding::Snorm16];
-    let found = all
+    let mut all = Encoding::ALL
         .into_iter()
-        .find(|it| type_name(it.component_type()) == name);
+        .filter(|encoding| encoding.is_quaternion());
+    let found = all.find(|encoding| type_name(encoding.component_type()) == name);
     found.ok_or_else(|| {
         input(format!(
             "dtype: there are no rotations in {name}; there are float32, float16, and int16, to be divided by 32767"
         ))
     })
+}
+
+/// The representation of rotations of that name, with its options.
+pub(crate) fn encoding_named(name: &str, options: EncodingOptions) -> PyResult<Encoding> {
+    let names = encoding_names();
+    match name.parse::<Encoding>() {
+        Ok(encoding) if names.contains(&name) => Ok(encoding.with(options)),
+        _ => Err(input(format!(
+            "encoding: there is no `{name}`; there are {}",
+            names.join(", ")
+        ))),
+    }
+}
+
+/// The names of the representations of rotations, each once.
+pub(crate) fn encoding_names() -> Vec<&'static str> {
+    let all = Encoding::ALL.into_iter();
+    let rotations = all.filter(|&encoding| encoding != Encoding::Vector);
+    let mut names: Vec<&str> = rotations.map(Encoding::name).collect();
+    names.dedup();
+    names
 }
 
 /// An array of float32 for a result of that shape: a fresh one, or `out`, if it is exactly what is needed and
@@ -153,7 +174,7 @@ pub(crate) fn filled(
 fn refused(error: numpy::BorrowError) -> PyErr {
     match error {
         numpy::BorrowError::NotWriteable => input("out: it is read-only"),
-        _ => input("out: another call writes to this memory at this moment"),
+        _ => input("out: another call is writing to this memory"),
     }
 }
 

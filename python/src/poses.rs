@@ -104,7 +104,7 @@ fn samples(
         requested,
         SampleRequest::Rate(..) | SampleRequest::Shared { .. }
     ) {
-        return Err(input("at: poses are of all tracks at the same times"));
+        return Err(input("at: poses need the same times for all tracks"));
     }
     let (frames, count) = requested.resolved(&motion.set)?;
     let tracks = motion.set.track_count();

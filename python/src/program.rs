@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::METHODS;
+use tumble::{Encoding, METHODS};
 use tumble_cli::host;
 
 use crate::errors::{device, guarded, input};
+use crate::output::encoding_names;
 use crate::save::clips_of;
 
 /// Runs the program `tumble` with these arguments, the first of which is its name; gives its exit
@@ -55,6 +56,23 @@ pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let found = PyDict::new(py);
     for method in METHODS {
         found.set_item(method.name, method.summary)?;
+    }
+    Ok(found)
+}
+
+/// What each representation of rotations is (`Engine.encoded`): its name, and a few words.
+///
+/// >>> import tumble
+/// >>> tumble.encodings()["axis-angle"]
+/// 'x y z of the axis, and degrees, 0 to 360'
+#[pyfunction]
+pub(crate) fn encodings(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let found = PyDict::new(py);
+    let names = encoding_names();
+    for encoding in Encoding::ALL {
+        if names.contains(&encoding.name()) {
+            found.set_item(encoding.name(), encoding.summary())?;
+        }
     }
     Ok(found)
 }

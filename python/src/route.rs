@@ -102,7 +102,7 @@ fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     let index =
         |number: &f64| match number.fract() == 0.0 && (0.0..4_294_967_295.0).contains(number) {
             true => Ok(*number as u32),
-            false => Err(input(format!("faces: {number} is no index of a vertex"))),
+            false => Err(input(format!("faces: {number} is not an index of a vertex"))),
         };
     let face = |numbers: &[f64]| numbers.iter().map(index).collect::<PyResult<Vec<u32>>>();
     if let Some(parts) = parts(value) {
@@ -234,7 +234,7 @@ impl Surface {
         let avoid = match avoid.map(|surface| &surface.get().shape) {
             None => None,
             Some(Shape::Mesh(mesh)) => Some(Arc::clone(mesh)),
-            Some(Shape::Net(_)) => return Err(input("avoid: obstacles are a mesh")),
+            Some(Shape::Net(_)) => return Err(input("avoid: obstacles must be a mesh")),
         };
         if avoid.is_none() && clearance != 0.0 {
             return Err(input(
@@ -546,7 +546,7 @@ pub(crate) fn walk(
             )));
         }
         if !(parts.2 >= 0.0 && parts.2.is_finite()) {
-            return Err(input(format!("{name}: a radius is a number of 0 or more")));
+            return Err(input(format!("{name}: a radius must be a number of 0 or more")));
         }
         Ok(Mover {
             track: times.into_iter().zip(points).collect(),

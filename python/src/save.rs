@@ -103,7 +103,8 @@ pub(crate) fn save(
     let format = format_named(name)?;
     if times_out.is_some() && !format.takes(FormatOption::TimesApart) {
         return Err(input(format!(
-            "times_out is for kitti, which stores no times; {} stores times or a frame rate: leave it out",
+            "times_out is for {}, which stores no times; {} stores times or a frame rate: leave it out",
+            Format::names_taking(FormatOption::TimesApart),
             format.name
         )));
     }

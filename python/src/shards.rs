@@ -1,6 +1,7 @@
 //! What `tumble.distributed` is made of: a library cut into shards, a worker that evaluates them, and
 //! the merge. Outcomes are JSON, since they are sent to other machines.
 
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -180,4 +181,106 @@ impl Worker {
             })
         })
     }
+}
+
+/// A shard's file, for results that the program cannot write itself.
+#[pyclass(module = "tumble")]
+pub(crate) struct Record {
+    record: shards::ShardRecord,
+}
+
+#[pymethods]
+impl Record {
+    /// The file of a shard whose results are these lines of a manifest.
+    #[new]
+    fn new(shard: usize, of: usize, plan: String, inputs: usize, lines: Vec<String>) -> Self {
+        Self {
+            record: shards::ShardRecord::new(shard, of, plan, inputs, &lines),
+        }
+    }
+
+    /// Reads a shard's file; nothing where the text is none.
+    #[staticmethod]
+    fn parse(text: &str) -> Option<Self> {
+        let record = shards::ShardRecord::parse(text)?;
+        Some(Self { record })
+    }
+
+    /// The name of a shard's file below the directory of results.
+    #[staticmethod]
+    fn name_of(shard: usize) -> String {
+        shards::ShardRecord::name_of(shard)
+    }
+
+    /// Whether the text had all its lines, as they were written.
+    #[getter]
+    fn is_whole(&self) -> bool {
+        self.record.is_whole()
+    }
+
+    /// Which plan the shard is of.
+    #[getter]
+    fn plan(&self) -> &str {
+        self.record.plan()
+    }
+
+    #[setter]
+    fn set_plan(&mut self, plan: String) {
+        self.record.set_plan(plan);
+    }
+
+    /// The name, the hash and the length of each result.
+    fn results(&self) -> Vec<(String, String, u64)> {
+        self.record.results()
+    }
+
+    /// Adds an input that has no result.
+    fn refuse(&mut self, input: String, message: String) {
+        self.record.refuse(input, message);
+    }
+
+    /// Whether it has all results of inputs of these hashes, made with these options, and no others.
+    #[allow(clippy::needless_pass_by_value, reason = "a dictionary is converted")]
+    fn is_made_from(&self, inputs: BTreeMap<String, String>, options: &str) -> bool {
+        self.record.is_made_from(&inputs, options)
+    }
+
+    /// Puts a file of rows in the place of its results.
+    #[allow(clippy::too_many_arguments, reason = "what a line of a manifest says")]
+    #[pyo3(signature = (name, *, sha256, bytes, library, inputs_sha256, into))]
+    fn join(
+        &mut self,
+        name: String,
+        sha256: String,
+        bytes: u64,
+        library: String,
+        inputs_sha256: String,
+        into: String,
+    ) {
+        self.record.join(shards::RowsFile {
+            name,
+            sha256,
+            bytes,
+            library,
+            inputs_sha256,
+            into,
+        });
+    }
+
+    /// The file.
+    fn text(&self) -> String {
+        self.record.text()
+    }
+}
+
+/// The results that a manifest lists: the name, the hash and the length of each.
+#[pyfunction]
+pub(crate) fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
+    shards::manifest_results(text)
+}
+
+/// The lines of a manifest, by what the results of their inputs are known by.
+#[pyfunction]
+pub(crate) fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
+    shards::manifest_by_input(text)
 }

@@ -174,7 +174,7 @@ REFUSED = {
     "samples for other tracks": (dict(fps=None, at=np.zeros((2, 5))), None, None, "2 tracks"),
     "lists for other tracks": (dict(fps=None, at=[[0.0], [0.0, 1.0]]), None, None, "different"),
     "an end before the start": (dict(start=2.0, end=1.0), None, None, "before it starts"),
-    "a start without a rate": (dict(fps=None, at=[0.0], start=1.0), None, None, "go with `fps`"),
+    "a start without a rate": (dict(fps=None, at=[0.0], start=1.0), None, None, "need `fps`"),
     "a start that is NaN": (dict(start=float("nan")), None, None, "start: NaN"),
     "an unknown method": (dict(method="slurp"), None, None, "slerp"),
     "an unknown order": (dict(order="xyz"), None, None, "wxyz"),

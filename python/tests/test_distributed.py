@@ -321,7 +321,7 @@ def test_drivers_are_killed(machines, library):
             shutil.rmtree(out)  # it was quicker
         if stop != signal.SIGKILL and driver.returncode != 0:
             assert driver.returncode == 128 + stop, words
-            assert "--resume goes on" in words
+            assert "--resume continues" in words
         if (out / "manifest.d").is_dir():
             check = tumble_program("check", out, code=8)
             assert "shards are done" in check.stderr
@@ -520,7 +520,7 @@ def test_a_driver_stops_where_no_machine_may_take_part(monkeypatch, library, tmp
     from tumble.distributed import _driver
 
     monkeypatch.setattr(_driver, "wheel", lambda: ("f" * 64, tumble.__version__))
-    with pytest.raises(DistributedError, match="every machine has another wheel"):
+    with pytest.raises(DistributedError, match="no machine has the same version"):
         evaluate(library / "clips", tmp_path / "out", address=machines.address)
 
 
@@ -549,13 +549,29 @@ def test_a_device_goes_by_its_uuid():
         tumble.Engine("uuid:00")
 
 
-def test_records_are_lines_of_json():
-    header, lines = {"shard": 1, "failed": []}, ['{"output":"a\u2028b"}\n', '{"output":"é"}\n']
-    assert _job.split_record(_job.join_record(header, lines)) == (header, lines)
-    text = _job.join_record(header, lines)
-    assert _job.is_whole(text)
-    assert not _job.is_whole(text.replace('{"output":"é"}\n', ""))
-    assert not _job.is_whole("") and not _job.is_whole(text[:-1])
+def test_records_are_the_programs():
+    from tumble import _tumble
+
+    entry = dict.fromkeys(
+        ["output_sha256", "input", "input_sha256", "options", "kernels_sha256", "tumble", "device"], "x"
+    )
+    names = "a\u2028b", "é"
+    lines = [
+        json.dumps({"output": name, "output_bytes": 3, **entry}, ensure_ascii=False) + "\n"
+        for name in names
+    ]
+    record = _tumble.Record(1, 2, "plan", 2, lines)
+    assert record.results() == [(name, "x", 3) for name in names]
+    record.plan = "another"
+    read = _tumble.Record.parse(record.text())
+    assert read is not None and read.is_whole and read.plan == "another"
+    assert read.results() == record.results()
+    cut = _tumble.Record.parse(record.text()[:-1])
+    assert cut is not None and not cut.is_whole
+    assert _tumble.Record.parse("") is None
+    assert _tumble.Record.name_of(7) == "manifest.d/00007.jsonl"
+    assert _tumble.manifest_results("".join(lines)) == sorted(record.results())
+    assert set(_tumble.manifest_by_input("".join(lines))) == set(names)
 
 
 def test_examples_in_docstrings():

@@ -121,6 +121,8 @@ for one in tumble.load("walk.glb", source_fps=30):
     tumble.save("walk.npz", one, fps=60, sequence="ZXY")
 try:
     halves = engine.evaluate(clip, fps=24, dtype=np.float16)
+    found = engine.rotation_vectors(clip, fps=24, out=engine.encoded(clip, "euler", fps=24, sequence="ZXY"))
+    kept: tumble.DeviceArray = engine.encoded(clip, "matrix-3x4", fps=24, major="column", device_array=True)
     found = engine.smooth(engine.blend([found, found], [1, 2]), low_pass=6, fps=24)
     found = engine.add(engine.mix(found, found, 0.5), found, reference=[0, 0, 0, 1])
     found = engine.local_to_model(found, [None, 0], np.zeros((2, 3)), scales=[None, found])

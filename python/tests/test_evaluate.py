@@ -251,7 +251,7 @@ def test_all_devices_have_the_same_bits(clip):
 
 
 def test_every_method_is_there(clip):
-    assert len(tumble.methods()) == 15
+    assert {"step", "slerp", "bessel-overhauser", "c2"} <= set(tumble.methods())
     for method in tumble.methods():
         assert np.isfinite(clip.evaluate(fps=30, method=method)).all()
 

@@ -54,6 +54,76 @@ def test_axes_and_angles_are_those_of_scipy(clip, engine):
     assert np.allclose(np.deg2rad(degrees[..., 3]), found[..., 3].T, rtol=1e-6)
 
 
+def test_rotation_vectors_are_those_of_scipy(clip, engine):
+    q = engine.evaluate(clip, fps=30)
+    found = engine.rotation_vectors(clip, fps=30)
+    assert (found.shape, found.dtype) == ((3, 61, 3), np.float32)
+    expected = Rotation.from_quat(q.reshape(-1, 4)).as_rotvec().reshape(found.shape)
+    assert np.abs(found - expected).max() < 1e-6
+    out = np.empty((61, 3, 3), np.float32)
+    assert engine.rotation_vectors(clip, fps=30, layout="frame", out=out) is out
+    assert np.array_equal(out, found.swapaxes(0, 1))
+    assert np.array_equal(engine.rotation_vectors(clip, at=0.5), engine.rotation_vectors(clip, at=[0.5])[:, 0])
+    lists = engine.rotation_vectors(clip, at=[[0.1], [0.2, 0.3], []])
+    assert [one.shape for one in lists] == [(1, 3), (2, 3), (0, 3)]
+    assert np.array_equal(lists[1], engine.rotation_vectors(clip, at=[0.2, 0.3])[1])
+    still = tumble.Clip([0.0], [[[0, 0, 0, 1]], [[0, 0, 0, -1]], [[1, 0, 0, 0]], [[0, 0.6, 0, -0.8]]])
+    vectors = engine.rotation_vectors(still, at=0.0, path="as-authored")
+    expected = [[0, 0, 0], [0, 0, 0], [np.pi, 0, 0], [0, -2 * np.arctan2(0.6, 0.8), 0]]
+    assert np.allclose(vectors, expected, atol=1e-7)
+    with pytest.raises(tumble.InputError, match=r"out: its shape is \(3, 61, 4\); the result's is \(3, 61, 3\)"):
+        engine.rotation_vectors(clip, fps=30, out=np.empty((3, 61, 4), np.float32))
+
+
+@pytest.mark.parametrize("encoding", tumble.encodings())
+def test_every_encoding_has_the_bytes_of_the_program(clip, engine, tmp_path, encoding):
+    found = engine.encoded(clip, encoding, fps=30, method="slerp")
+    tumble.save(tmp_path / "clip.npz", clip)
+    is_quaternion = encoding in ("f32", "f16", "snorm16")
+    output = ["--encoding", encoding] if is_quaternion else ["--output", encoding]
+    program(
+        "eval", "clip.npz", *output, "--method", "slerp", "--fps", 30, "-o", "out.npy", cwd=tmp_path
+    )
+    expected = np.load(tmp_path / "out.npy")
+    assert found.dtype == expected.dtype and np.array_equal(found, expected)
+    out = np.empty_like(found)
+    assert engine.encoded(clip, encoding, fps=30, method="slerp", out=out) is out
+    assert np.array_equal(out, found)
+    by_frame = engine.encoded(clip, encoding, fps=30, method="slerp", layout="frame")
+    assert np.array_equal(by_frame, found.swapaxes(0, 1))
+
+
+def test_encodings_have_one_name_each(clip, engine):
+    options = dict(fps=30, method="slerp")
+    for encoding, named in [
+        ("f32", engine.evaluate(clip, **options)),
+        ("f16", engine.evaluate(clip, dtype="float16", **options)),
+        ("snorm16", engine.evaluate(clip, dtype="int16", **options)),
+        ("matrix", engine.matrices(clip, **options)),
+        ("matrix-3x4", engine.matrices(clip, columns=4, **options)),
+    ]:
+        assert np.array_equal(engine.encoded(clip, encoding, **options), named), encoding
+    by_columns = engine.encoded(clip, "matrix-3x4", major="column", **options)
+    assert np.array_equal(by_columns, engine.matrices(clip, columns=4, **options).swapaxes(2, 3))
+    for degrees in [True, False]:
+        found = engine.encoded(clip, "axis-angle", degrees=degrees, **options)
+        assert np.array_equal(found, engine.axis_angle(clip, degrees=degrees, **options))
+        found = engine.encoded(clip, "euler", sequence="zxz", degrees=degrees, **options)
+        assert np.array_equal(found, engine.euler(clip, sequence="zxz", degrees=degrees, **options))
+    # What is no angle is not converted.
+    found = engine.encoded(clip, "f16", degrees=False, **options)
+    assert np.array_equal(found, engine.encoded(clip, "f16", **options))
+    for wrong in ["vector", "f64"]:
+        with pytest.raises(tumble.InputError, match=f"there is no `{wrong}`; there are f32, f16, snorm16, axis-angle, "):
+            engine.encoded(clip, wrong, **options)
+    with pytest.raises(tumble.InputError, match="major: there is no `rows`; there are row, column"):
+        engine.encoded(clip, "matrix", major="rows", **options)
+    with pytest.raises(tumble.InputError, match="sequence: `XXY` is not a sequence"):
+        engine.encoded(clip, "euler", sequence="XXY", **options)
+    with pytest.raises(tumble.InputError, match="device_array: angles on the card are in degrees"):
+        engine.encoded(clip, "euler", degrees=False, device_array=True, **options)
+
+
 def test_matrices_of_four_columns_do_not_move(clip, engine):
     rotations = engine.matrices(clip, fps=30)
     found = engine.matrices(clip, fps=30, columns=4)
@@ -338,7 +408,7 @@ def test_what_cannot_be_followed(rng, engine):
         ((None, points), {}, "times: a path without times takes `duration`"),
         ((times, points), dict(rate=1.0), "leave out `duration` and `rate`"),
         ((None, points), dict(rate=1.0, duration=2.0), "exclude each other"),
-        ((None, points), dict(rate=-1.0), "rate: -1 is not a number over 0"),
+        ((None, points), dict(rate=-1.0), "rate: -1 is not a number greater than 0"),
         ((times[:4], points), {}, r"points\[0\]: there are 5, with 4 times"),
         ((times, points[:, :2]), {}, "points: the shape is"),
         ((times[::-1], points), {}, "time"),
@@ -376,7 +446,7 @@ def test_routes_are_those_of_the_program(tmp_path):
         file.writelines(f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist())
     surface = tumble.Surface(vertices, faces)
     for by in ["exact", "plane", "edges", "greedy"]:
-        line = ["route", "hill.obj", "--from", "1,0,1", "--to", "8,0,7", "--by", by, "-o", "way.csv"]
+        line = ["route", "hill.obj", "--start-point", "1,0,1", "--end-point", "8,0,7", "--by", by, "-o", "way.csv"]
         program(*line, "--overwrite", cwd=tmp_path)
         expected = np.loadtxt(tmp_path / "way.csv", delimiter=",", skiprows=1)
         with pytest.warns(tumble.InputWarning, match="start: it is .* away from the surface"):
@@ -420,8 +490,8 @@ def test_ways_keep_clear_and_walkers_wait(engine):
 def test_surfaces_that_are_none():
     for vertices, faces, message in [
         ([[0, 0, 0]], [[0, 1, 2]], "vertex 1"),
-        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2.5]], "faces: 2.5 is no index"),
-        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, -2]], "faces: -2 is no index"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2.5]], "faces: 2.5 is not an index"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, -2]], "faces: -2 is not an index"),
         ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], "vertices: the last axis"),
         ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], "no area|no faces"),
     ]:
@@ -595,7 +665,7 @@ def test_layers_masks_and_skinning(walks, engine, rng):
     for call, message in [
         (lambda: crowd.set([7], 0), "no instance 7|instance"),
         (lambda: crowd.set([0], 5), "no clip 5|clip"),
-        (lambda: crowd.set([0], 0.5), "clip: 0.5 is no index"),
+        (lambda: crowd.set([0], 0.5), "clip: 0.5 is not an index"),
         (lambda: crowd.set([0, 1], 0, time=[1.0, 2.0, 3.0]), r"time: the shape is \[3\]"),
         (lambda: crowd.set([0], 0, layer=1, weight=2.0), "weights are 0 to 1"),
         (lambda: crowd.set([0], 0, wrap="extrapolate"), "wrap: there is no"),
@@ -603,7 +673,7 @@ def test_layers_masks_and_skinning(walks, engine, rng):
         (lambda: crowd.evaluate("angles"), "values: there is no `angles`"),
         (lambda: crowd.evaluate(dtype="int16"), "float32 or float16"),
         (lambda: tumble.Crowd(walks, 1).evaluate("skinning"), "give `inverse_bind`"),
-        (lambda: tumble.Crowd([], 1), "clips: there is none"),
+        (lambda: tumble.Crowd([], 1), "clips: give at least one"),
         (lambda: tumble.Crowd([tumble.Clip(TIMES, unit(rng, 4))], 1), r"clips\[0\]: it has no skeleton"),
     ]:
         with pytest.raises(tumble.InputError, match=message):

@@ -97,7 +97,7 @@ pub enum MeshWarning {
     },
     /// Polygons whose corners lie in no plane.
     #[error(
-        "{count} polygons are not flat; they are cut into triangles as they lie in their mean plane; the first is face {face} (from 0)"
+        "{count} polygons are not flat; they are divided into triangles in their mean plane; the first is face {face} (from 0)"
     )]
     NotFlat {
         /// How many.
@@ -107,7 +107,7 @@ pub enum MeshWarning {
     },
     /// Triangles with the same corners as others.
     #[error(
-        "{count} triangles lie on others with the same corners, as those of a sheet with a back; they count once; the first is of face {face} (from 0)"
+        "{count} triangles have the same corners as others, as in a two-sided sheet; they count once; the first is of face {face} (from 0)"
     )]
     Doubled {
         /// How many.
@@ -116,7 +116,7 @@ pub enum MeshWarning {
         face: usize,
     },
     /// Corners that lie on the sides of other faces.
-    #[error("{count} corners lie on the open sides of other faces, which are cut there")]
+    #[error("{count} corners are on boundary edges of other faces; these faces are divided there")]
     SidesCut {
         /// How many.
         count: usize,
@@ -156,8 +156,8 @@ pub enum RouteError {
     },
     /// Start and goal lie on pieces that do not touch.
     #[error(
-        "start and goal lie on pieces of the surface that do not touch: the start's has {start} \
-         triangles, the goal's {goal}; where a seam parts them, weld it (--weld DISTANCE)"
+        "start and goal are on parts of the surface that are not connected: the start's has {start} \
+         triangles, the goal's {goal}; if a seam separates them, weld it (--weld DISTANCE)"
     )]
     OtherPiece {
         /// Triangles of the piece that the start lies on.

@@ -2,9 +2,12 @@
 //! computed apart.
 
 use glam::{DVec3, dvec3};
+use tumble_formats::surface::obj::read_obj;
 use tumble_routes::error::{MeshError, MeshWarning};
 use tumble_routes::mesh::Mesh;
 use tumble_routes::route::By;
+
+use crate::shapes::welded;
 
 fn length(mesh: &Mesh, from: [f64; 3], to: [f64; 3]) -> f64 {
     mesh.route(from.into(), to.into(), By::Exact)
@@ -17,7 +20,7 @@ fn near(found: f64, expected: f64) {
 }
 
 fn of_obj(text: &str) -> Mesh {
-    Mesh::of_obj(text.as_bytes()).unwrap()
+    welded(&read_obj("a.obj", text.as_bytes()).unwrap(), 0.0).unwrap()
 }
 
 /// An L whose face begins at any corner, in any plane: the route bends at the inner corner.
@@ -132,13 +135,13 @@ fn seams_are_welded_within_a_distance() {
         .route(DVec3::ZERO, dvec3(2.0, 1.0, 0.0), By::Exact)
         .unwrap_err();
     assert!(error.to_string().contains("--weld"), "{error}");
-    let polygons = tumble_routes::mesh::read::obj(text.as_bytes()).unwrap();
-    let welded = polygons.welded(1e-5).unwrap();
-    assert_eq!(welded.warnings(), []);
-    assert_eq!(welded.positions().len(), 6);
-    near(length(&welded, [0.0; 3], [2.0, 1.0, 0.0]), 5f64.sqrt());
+    let polygons = read_obj("a.obj", text.as_bytes()).unwrap();
+    let mended = welded(&polygons, 1e-5).unwrap();
+    assert_eq!(mended.warnings(), []);
+    assert_eq!(mended.positions().len(), 6);
+    near(length(&mended, [0.0; 3], [2.0, 1.0, 0.0]), 5f64.sqrt());
     for tolerance in [-1.0, f64::NAN, f64::INFINITY] {
-        let refused = polygons.welded(tolerance).unwrap_err();
+        let refused = welded(&polygons, tolerance).unwrap_err();
         assert!(matches!(refused, MeshError::Weld { .. }), "{refused}");
     }
 }
@@ -186,7 +189,8 @@ fn valid_obj_is_read() {
 #[test]
 fn crossing_sides_are_refused() {
     let bow = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3 4\n";
-    let error = Mesh::of_obj(bow.as_bytes()).unwrap_err();
+    let bow = read_obj("a.obj", bow.as_bytes()).unwrap();
+    let error = welded(&bow, 0.0).unwrap_err();
     assert!(
         error
             .to_string()

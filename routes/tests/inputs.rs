@@ -4,12 +4,13 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
 use proptest::prelude::*;
+use tumble_formats::surface::obj::read_obj;
+use tumble_formats::surface::ply::read_ply;
 use tumble_routes::error::{MeshError, MeshWarning, RouteError};
 use tumble_routes::mesh::Mesh;
-use tumble_routes::mesh::read::{ReadError, obj, ply};
 use tumble_routes::route::By;
 
-use crate::shapes::{cuboid, of, squares};
+use crate::shapes::{cuboid, of, squares, welded};
 
 const CORNERS: [DVec3; 4] = [DVec3::ZERO, DVec3::X, dvec3(1.0, 1.0, 0.0), DVec3::Y];
 
@@ -221,7 +222,8 @@ const OBJ: &str = "# a roof\nmtllib none.mtl\no left\nv 0 0 0\nv 1 0 1e0\nv 1 1 
 
 #[test]
 fn obj_files() {
-    let mesh = Mesh::of_obj(OBJ.as_bytes()).unwrap();
+    let read = |text: &str| read_obj("a.obj", text.as_bytes());
+    let mesh = welded(&read(OBJ).unwrap(), 0.0).unwrap();
     assert_eq!((mesh.positions().len(), mesh.triangles().len()), (6, 4));
     let route = mesh
         .route(DVec3::ZERO, dvec3(2.0, 0.0, 0.0), By::Exact)
@@ -234,11 +236,14 @@ fn obj_files() {
         "f 1 2\n",
         "\u{0}\u{ff}",
     ] {
-        assert!(Mesh::of_obj(bad.as_bytes()).is_err(), "{bad}");
+        let mesh = read(bad)
+            .ok()
+            .and_then(|polygons| welded(&polygons, 0.0).ok());
+        assert!(mesh.is_none(), "{bad}");
     }
     assert_eq!(
-        Mesh::of_obj(b"v 0 0 0\n").unwrap_err(),
-        ReadError::Mesh(MeshError::Empty)
+        welded(&read("v 0 0 0\n").unwrap(), 0.0).unwrap_err(),
+        MeshError::Empty
     );
 }
 
@@ -276,27 +281,30 @@ fn binary_ply(big: bool) -> Vec<u8> {
 
 #[test]
 fn ply_files() {
+    let read = |bytes: &[u8]| read_ply("a.ply", bytes);
     for bytes in [PLY.as_bytes(), &binary_ply(false), &binary_ply(true)] {
-        let mesh = Mesh::of_ply(bytes).unwrap();
+        let mesh = welded(&read(bytes).unwrap(), 0.0).unwrap();
         assert_eq!(mesh.positions(), CORNERS);
         assert_eq!(mesh.triangles().len(), 2);
-        assert!(Mesh::of_ply(&bytes[..bytes.len() - 3]).is_err());
+        assert!(read(&bytes[..bytes.len() - 3]).is_err());
     }
     // Numbers that no file of this length can hold.
     for huge in ["99999999999", "18446744073709551615"] {
         let text = PLY.replace("vertex 4", &format!("vertex {huge}"));
-        assert!(Mesh::of_ply(text.as_bytes()).is_err());
+        assert!(read(text.as_bytes()).is_err());
         let text = PLY.replace(
             "element face 1",
             &format!("element gap {huge}\nelement face 1"),
         );
-        assert!(Mesh::of_ply(text.as_bytes()).is_err());
+        assert!(read(text.as_bytes()).is_err());
     }
     let negative = PLY.replace("4 0 1 2 3", "4 0 1 2 -3");
-    assert!(matches!(
-        Mesh::of_ply(negative.as_bytes()),
-        Err(ReadError::Ply { .. })
-    ));
+    let error = read(negative.as_bytes()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "a.ply: error[E610]: the PLY file cannot be read: face 0 (from 0) names a vertex below 0: \
+         [0, 1, 2, -3]; export it again"
+    );
 }
 
 proptest! {
@@ -314,6 +322,6 @@ proptest! {
             bytes[offset] = byte;
         }
         bytes.truncate(keep.index(2 * bytes.len()).max(1));
-        let _ = (obj(&bytes), ply(&bytes));
+        let _ = (read_obj("a", &bytes), read_ply("a", &bytes));
     }
 }

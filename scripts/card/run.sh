@@ -130,9 +130,9 @@ step() {
 }
 say ""
 step devices "$devices_limit" ./tumble devices
-step prove "$prove_limit" ./tumble prove "${device[@]}" --seconds "$prove_seconds" -o "$results/proof.json"
+step prove "$prove_limit" ./tumble prove "${device[@]}" --time-limit "$prove_seconds" -o "$results/proof.json"
 step prove-validate "$validate_limit" \
-    ./tumble prove "${device[@]}" --seconds "$validate_seconds" --validate -o "$results/proof-validated.json"
+    ./tumble prove "${device[@]}" --time-limit "$validate_seconds" --validate -o "$results/proof-validated.json"
 proved=$worst
 step bench "$bench_limit" ./tumble bench sparse --rounds 3 --json
 say ""

@@ -246,7 +246,9 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
 ];
 
 /// Other kernels over a crowd.
-const CROWD: [(&str, &[&str]); 5] = [
+const CROWD: [(&str, &[&str]); 7] = [
+    ("gather", &["crowd/gather", "crowd"]),
+    ("scatter", &["crowd/scatter", "crowd"]),
     (
         "times",
         &[

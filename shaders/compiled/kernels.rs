@@ -192,6 +192,25 @@ const _: () = {
     assert!(std::mem::offset_of!(CrowdBase, count) == 4);
     assert!(std::mem::offset_of!(CrowdBase, step) == 8);
 };
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdChange {
+/// Its index among all, `[instance][layer]`.
+    pub(crate) index: u32,
+/// The words of the entry.
+    pub(crate) clip_and_weight: u32,
+    pub(crate) speed_and_modes: u32,
+    pub(crate) start: u32,
+    pub(crate) anchor: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdChange>() == 20);
+    assert!(std::mem::offset_of!(CrowdChange, index) == 0);
+    assert!(std::mem::offset_of!(CrowdChange, clip_and_weight) == 4);
+    assert!(std::mem::offset_of!(CrowdChange, speed_and_modes) == 8);
+    assert!(std::mem::offset_of!(CrowdChange, start) == 12);
+    assert!(std::mem::offset_of!(CrowdChange, anchor) == 16);
+};
 /// Where one channel (the rotation, the translation or the scale) of a joint lies in a clip.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -663,6 +682,8 @@ pub(crate) enum Kernel {
     CrowdPlainRotations,
     CrowdLocals,
     CrowdPlainLocals,
+    CrowdGather,
+    CrowdScatter,
     CrowdTimes,
     CrowdWalk,
     CrowdWalkAll,
@@ -777,7 +798,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 99] = [
+pub(crate) static KERNELS: [KernelCode; 101] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3536), texels: Some(("arc_frames_euler_texels", 3654)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
@@ -872,6 +893,8 @@ pub(crate) static KERNELS: [KernelCode; 99] = [
     KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2354), texels: Some(("crowd_plain_rotations_texels", 2446)), bindings: 5, segments: None },
     KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6327), texels: Some(("crowd_locals_texels", 6413)), bindings: 5, segments: None },
     KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 2978), texels: Some(("crowd_plain_locals_texels", 3070)), bindings: 5, segments: None },
+    KernelCode { kernel: Kernel::CrowdGather, storage: ("crowd_gather", 565), texels: None, bindings: 3, segments: None },
+    KernelCode { kernel: Kernel::CrowdScatter, storage: ("crowd_scatter", 463), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdTimes, storage: ("crowd_times", 2589), texels: None, bindings: 5, segments: None },
     KernelCode { kernel: Kernel::CrowdWalk, storage: ("crowd_walk", 940), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1264), texels: None, bindings: 2, segments: None },

@@ -8,7 +8,7 @@ use crate::shader::ArcSegment;
 use crate::simd::cache_line::CacheLine;
 use crate::simd::lanes::{Lanes, MAX_LANES, Number as _};
 use crate::time::runs::Affine;
-use crate::twin::evaluate::{Evaluate, Parameters};
+use crate::twin::{Evaluate, Parameters};
 
 /// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
 pub(crate) const SAMPLES_ONE_BY_ONE: usize = 3;
@@ -380,7 +380,7 @@ mod tests {
     use glam::Vec4;
 
     use crate::math::canonical::canonical;
-    use crate::twin::evaluate::COARSE;
+    use crate::twin::COARSE;
 
     use super::*;
     use crate::shader::PolynomialSegment;

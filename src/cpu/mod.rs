@@ -15,11 +15,11 @@
 //!
 //! # From a call to its bytes
 //!
-//! `evaluate::backend` chooses one of four:
+//! `evaluate` chooses one of four:
 //!
-//! | child of [`engine`] | for | what is prepared |
+//! | in [`engine`] | for | what is prepared |
 //! |---|---|---|
-//! | `batches` | sets | batch by batch, evaluated at once and forgotten |
+//! | `evaluate_batches` | sets | batch by batch, evaluated at once and forgotten |
 //! | `clip` | clips, and frame by frame | everything, before |
 //! | `sparse_samples` | far fewer samples than keys | the intervals with a sample |
 //! | `from_keys` | fewer samples than keys, arcs and cubics of small angles | nothing; intervals whose angles turn out too large are prepared alone |

@@ -9,13 +9,13 @@ use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
 use crate::time::error::SampleTimesError;
-use crate::time::frame_clock::FrameClock;
+use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
-use crate::time::runs::{Distance, Emit, NONE, Parameter, Run, RunSource};
+use crate::time::runs::{
+    Distance, Emit, IntervalBlock, IntervalBlocks, NONE, Parameter, Run, RunSource,
+};
 use crate::time::spans::SpanSource;
-use crate::time::track_copy::TrackCopy;
-use crate::twin::evaluate::Evaluate;
+use crate::twin::Evaluate;
 
 /// Distances are computed for this many samples at a time.
 const CHUNK: usize = 64;

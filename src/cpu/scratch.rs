@@ -7,9 +7,8 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
-use crate::prepare::preparation::Preparation;
+use crate::prepare::preparation::{Preparation, SetRequest};
 use crate::prepare::prepared::Prepared;
-use crate::prepare::request::SetRequest;
 use crate::threads;
 use crate::tracks::set::TrackSet;
 

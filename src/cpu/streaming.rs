@@ -4,15 +4,14 @@
 
 use std::ops::Range;
 
-use crate::cpu::evaluate::StreamingLines;
-use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, frames, frames_past_caches};
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, StreamingLines, frames, frames_past_caches};
 use crate::simd::cache_line::{CacheLine, EACH};
 use crate::simd::dispatch::{
     InLanesInto, VectorWidth, fence, in_lanes_into, streaming_stores_from,
 };
 use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
-use crate::twin::evaluate::Evaluate;
+use crate::twin::Evaluate;
 
 /// Bytes from which on a result is written by streaming stores: caches would keep so little of it
 /// that its reader loses nothing.

@@ -18,11 +18,10 @@ use crate::shader::{
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
-use crate::time::frame_clock::{FrameClock, FrameStart, in_frames};
+use crate::time::frame_clock::{FrameClock, FrameStart, TrackCopy, in_frames};
 use crate::time::frame_rate::FrameRate;
 use crate::time::runs::NONE;
 use crate::time::spans::SpanSource;
-use crate::time::track_copy::TrackCopy;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;

@@ -1,8 +1,11 @@
-//! The entries of a crowd's instances, and which of them changed.
+//! The entries of a crowd's instances, which of them changed, and which instances are evaluated.
 
+use crate::crowd::fade::Fades;
 use crate::crowd::layer::CrowdLayer;
-use crate::memory::{OutOfMemoryError, zeroed};
-use crate::shader::{CrowdClip, CrowdEntry};
+use crate::memory::{OutOfMemoryError, reserved, zeroed};
+use crate::output::crowd::{CrowdFrame, EntryChanges, VisibleInstances, listed_changes};
+use crate::shader::{CrowdChange, CrowdClip, CrowdEntry};
+use crate::twin::crowd_entries::change;
 use crate::twin::crowd_times::ELAPSED_BITS;
 
 /// The entries, the clock, and the entries that the device does not know yet.
@@ -10,12 +13,20 @@ use crate::twin::crowd_times::ELAPSED_BITS;
 pub(crate) struct Instances {
     /// `[instance][layer]`; [`set`](Self::set) changes them.
     pub(crate) entries: Vec<CrowdEntry>,
-    /// A bit for each entry that changed; those beyond the last entry mean nothing.
+    /// A bit for each entry that changed.
     changed: Vec<u64>,
+    /// Room for the changes of a frame.
+    listed: Vec<CrowdChange>,
+    /// The instances that are evaluated, in this order; without it all are.
+    pub(crate) visible: Option<Vec<u32>>,
+    /// Whether the device has the list.
+    is_list_known: bool,
     /// Ticks; [`set_clock`](Self::set_clock) changes it.
     pub(crate) clock: u64,
     /// The time of the clock that no anchor lies before.
     since: u64,
+    /// What changes weights with the clock.
+    pub(crate) fades: Fades,
 }
 
 impl Instances {
@@ -29,8 +40,12 @@ impl Instances {
         let mut all = Self {
             entries: zeroed(count, "a crowd")?,
             changed: zeroed(count.div_ceil(64), "a crowd")?,
+            listed: reserved(listed_changes(count), "a crowd")?,
+            visible: None,
+            is_list_known: false,
             clock: 0,
             since: 0,
+            fades: Fades::default(),
         };
         for (index, entry) in all.entries.iter_mut().enumerate() {
             *entry = still;
@@ -45,6 +60,15 @@ impl Instances {
     pub(crate) fn set(&mut self, index: usize, entry: CrowdEntry) {
         self.entries[index] = entry;
         self.changed[index / 64] |= 1 << (index % 64);
+    }
+
+    /// Sets the weight of an entry, in units of 2^-15.
+    pub(crate) fn set_weight(&mut self, index: usize, units: u32) {
+        let mut entry = self.entries[index];
+        if entry.clip_and_weight >> 16 != units {
+            entry.clip_and_weight = entry.clip_and_weight & 0xffff | units << 16;
+            self.set(index, entry);
+        }
     }
 
     /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later; where that would
@@ -62,42 +86,94 @@ impl Instances {
             }
             self.since = clock;
         }
+        let mut fades = std::mem::take(&mut self.fades);
+        fades.set_clock(clock, clock < self.clock, |index, units| {
+            self.set_weight(index, units);
+        });
+        self.fades = fades;
         self.clock = clock;
     }
 
-    /// The ranges of entries that changed, which count as known when all have been taken.
-    pub(crate) fn take_changes(&mut self) -> impl Iterator<Item = (usize, &[CrowdEntry])> {
-        let (entries, changed) = (&self.entries, &mut self.changed);
-        let (count, mut end) = (entries.len(), 0);
-        std::iter::from_fn(move || {
-            let first = first_that(changed, end, count, true);
-            if first == count {
-                changed.fill(0);
-                return None;
+    /// Evaluates the instances of a list alone, or all.
+    pub(crate) fn set_visible(&mut self, list: Option<Vec<u32>>) {
+        self.visible = list;
+        self.is_list_known = false;
+    }
+
+    /// How many instances are evaluated.
+    pub(crate) fn visible_count(&self, layers: usize) -> usize {
+        match &self.visible {
+            Some(list) => list.len(),
+            None => self.entries.len() / layers,
+        }
+    }
+
+    /// What the device is to know for an evaluation, of instances with so many layers: from then on it counts as
+    /// known.
+    pub(crate) fn take_frame(&mut self, layers: usize) -> CrowdFrame<'_> {
+        let instances = self.visible_count(layers) as u32;
+        let is_list_known = std::mem::replace(&mut self.is_list_known, true);
+        let visible = match &self.visible {
+            None => VisibleInstances::All,
+            Some(_) if is_list_known => VisibleInstances::AsBefore,
+            Some(list) => VisibleInstances::List(list),
+        };
+        let changes = match self.changed_range() {
+            None => EntryChanges::None,
+            Some((first, end, count)) if self.is_listed(end - first, count) => {
+                self.listed.clear();
+                for (index, &word) in self.changed.iter().enumerate() {
+                    let mut left = word;
+                    while left != 0 {
+                        let entry = index * 64 + left.trailing_zeros() as usize;
+                        self.listed.push(change(entry as u32, &self.entries[entry]));
+                        left &= left - 1;
+                    }
+                }
+                self.changed.fill(0);
+                EntryChanges::List(&self.listed)
             }
-            end = first_that(changed, first, count, false);
-            Some((first, &entries[first..end]))
-        })
+            Some((first, end, _)) => {
+                self.changed.fill(0);
+                EntryChanges::Range(first, &self.entries[first..end])
+            }
+        };
+        CrowdFrame {
+            clock: self.clock,
+            changes,
+            instances,
+            visible,
+        }
+    }
+
+    /// The first entry that changed, the end behind the last, and how many there are.
+    fn changed_range(&self) -> Option<(usize, usize, usize)> {
+        let changed = |word: &u64| *word != 0;
+        let first = self.changed.iter().position(changed)?;
+        let last = self.changed.iter().rposition(changed)?;
+        let words = &self.changed[first..=last];
+        let count: u32 = words.iter().map(|word| word.count_ones()).sum();
+        let start = first * 64 + self.changed[first].trailing_zeros() as usize;
+        let end = last * 64 + 64 - self.changed[last].leading_zeros() as usize;
+        Some((start, end, count as usize))
+    }
+
+    /// Whether so many changes in a range are fewer bytes as a list.
+    fn is_listed(&self, range: usize, count: usize) -> bool {
+        /// What a kernel more costs, in bytes.
+        const DISPATCH: usize = 256;
+        let bytes = count * size_of::<CrowdChange>() + DISPATCH;
+        count <= listed_changes(self.entries.len()) && bytes < range * size_of::<CrowdEntry>()
     }
 
     /// From now on the device knows nothing.
     pub(crate) fn forget(&mut self) {
         self.changed.fill(u64::MAX);
-    }
-}
-
-/// The first index from `index` on whose bit is `value`; `count` if none of so many is.
-fn first_that(changed: &[u64], mut index: usize, count: usize, value: bool) -> usize {
-    while index < count {
-        let word = changed[index / 64];
-        let word = if value { word } else { !word };
-        let left = word >> (index % 64);
-        if left != 0 {
-            return (index + left.trailing_zeros() as usize).min(count);
+        if let Some(last) = self.changed.last_mut() {
+            *last >>= self.entries.len().wrapping_neg() % 64;
         }
-        index = (index / 64 + 1) * 64;
+        self.is_list_known = false;
     }
-    count
 }
 
 #[cfg(test)]
@@ -105,24 +181,124 @@ mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
+    use crate::twin::crowd_entries::scatter;
+
+    /// Takes a frame as a device does; the bytes that it takes for it.
+    fn taken(all: &mut Instances, known: &mut [CrowdEntry]) -> usize {
+        match all.take_frame(2).changes {
+            EntryChanges::None => 0,
+            EntryChanges::Range(first, entries) => {
+                known[first..][..entries.len()].copy_from_slice(entries);
+                size_of_val(entries)
+            }
+            EntryChanges::List(list) => {
+                assert!(list.len() <= listed_changes(known.len()));
+                list.iter().for_each(|change| scatter(change, known));
+                size_of_val(list)
+            }
+        }
+    }
 
     #[test]
-    fn changes_are_ranges_and_are_told_once() {
-        let still = CrowdEntry::zeroed();
-        let mut all = Instances::new(100, 2, still).unwrap();
-        let ranges = |all: &mut Instances| -> Vec<_> {
-            let ranges = all
-                .take_changes()
-                .map(|(first, entries)| (first, entries.len()));
-            ranges.collect()
-        };
-        assert_eq!(ranges(&mut all), [(0, 200)]);
-        assert_eq!(ranges(&mut all), []);
-        for index in [0, 1, 63, 64, 65, 130, 199] {
-            all.set(index, still);
+    fn a_device_knows_every_change_after_a_frame() {
+        let mut random = fastrand::Rng::with_seed(3);
+        for instances in [1, 31, 32, 33, 1000] {
+            let mut all = Instances::new(instances, 2, CrowdEntry::zeroed()).unwrap();
+            let mut known = vec![
+                CrowdEntry {
+                    start: 1,
+                    ..CrowdEntry::zeroed()
+                };
+                2 * instances
+            ];
+            let whole = size_of_val(&known[..]);
+            for round in 0..50 {
+                if round % 10 == 0 {
+                    all.forget();
+                    known.fill(CrowdEntry {
+                        start: 2,
+                        ..CrowdEntry::zeroed()
+                    });
+                    assert_eq!(taken(&mut all, &mut known), whole);
+                    assert!(known == all.entries);
+                }
+                let changes = random.usize(0..[3, 40, 3 * instances][round % 3]);
+                let mut distinct = std::collections::BTreeSet::new();
+                for _ in 0..changes {
+                    let index = random.usize(0..2 * instances);
+                    let start = random.u32(..);
+                    all.set(
+                        index,
+                        CrowdEntry {
+                            start,
+                            ..CrowdEntry::zeroed()
+                        },
+                    );
+                    distinct.insert(index);
+                }
+                let bytes = taken(&mut all, &mut known);
+                assert!(known == all.entries);
+                let few = distinct.len() <= listed_changes(known.len());
+                let most = if few {
+                    20 * distinct.len() + 256
+                } else {
+                    whole
+                };
+                assert!(bytes <= most.min(whole), "{bytes} of {most}");
+                assert_eq!(taken(&mut all, &mut known), 0);
+            }
         }
-        assert_eq!(ranges(&mut all), [(0, 2), (63, 3), (130, 1), (199, 1)]);
+    }
+
+    /// The bytes of a frame in which a hundredth of 10 000 instances changed: 1600 of them are entries.
+    #[test]
+    fn a_hundredth_of_the_instances_takes_two_kilobytes() {
+        let mut all = Instances::new(10_000, 2, CrowdEntry::zeroed()).unwrap();
+        let mut known = vec![CrowdEntry::zeroed(); 20_000];
+        assert_eq!(taken(&mut all, &mut known), 320_000);
+        for index in 0..100 {
+            let start = index as u32 + 1;
+            all.set(
+                index * 199 + 7,
+                CrowdEntry {
+                    start,
+                    ..CrowdEntry::zeroed()
+                },
+            );
+        }
+        assert_eq!(taken(&mut all, &mut known), 2000);
+        assert!(known == all.entries);
+    }
+
+    #[test]
+    fn lists_go_to_the_device_once() {
+        let mut all = Instances::new(9, 1, CrowdEntry::zeroed()).unwrap();
+        let visible = |all: &mut Instances| match all.take_frame(1) {
+            CrowdFrame {
+                visible: VisibleInstances::List(list),
+                instances,
+                ..
+            } => {
+                assert_eq!(list.len(), instances as usize);
+                Some(list.to_vec())
+            }
+            CrowdFrame {
+                visible, instances, ..
+            } => {
+                let is_all = visible == VisibleInstances::All;
+                assert_eq!(instances, if is_all { 9 } else { 2 });
+                is_all.then(Vec::new)
+            }
+        };
+        assert_eq!(visible(&mut all), Some(vec![]));
+        all.set_visible(Some(vec![7, 2]));
+        assert_eq!(visible(&mut all), Some(vec![7, 2]));
+        assert_eq!(visible(&mut all), None);
         all.forget();
-        assert_eq!(ranges(&mut all), [(0, 200)]);
+        assert_eq!(visible(&mut all), Some(vec![7, 2]));
+        all.set_visible(None);
+        assert_eq!(visible(&mut all), Some(vec![]));
+        all.set_visible(Some(vec![7, 2]));
+        assert_eq!(visible(&mut all), Some(vec![7, 2]));
     }
 }

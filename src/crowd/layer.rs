@@ -1,5 +1,6 @@
 //! What one layer of an instance plays, and the 16 bytes that say so to the kernels.
 
+use crate::crowd::fade::weight_units;
 use crate::crowd_error::{CrowdError, FASTEST, MAX_MASKS};
 use crate::shader::{
     CrowdClip, CrowdEntry, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, WEIGHT_UNIT, WRAP_HOLD,
@@ -80,10 +81,7 @@ impl CrowdLayer {
             Some(mask) if mask < masks.min(MAX_MASKS) => mask as u32 + 1,
             Some(mask) => return missing("mask", mask, masks),
         };
-        if !(0.0..=1.0).contains(&self.weight) {
-            let weight = self.weight;
-            return Err(CrowdError::Weight { weight });
-        }
+        let weight = weight_units(self.weight)?;
         if self.speed.is_nan() || self.speed.abs() >= FASTEST {
             let speed = self.speed;
             return Err(CrowdError::Speed { speed });
@@ -97,7 +95,6 @@ impl CrowdLayer {
         let units = (self.speed.abs() * SPEED_UNITS).round() as u32;
         let units = units.min(SPEED_MAGNITUDE);
         let backwards = self.speed < 0.0;
-        let weight = (self.weight / WEIGHT_UNIT).round() as u32;
         let modes = if backwards { RUNS_BACKWARDS } else { 0 }
             | mask << 24
             | wrap << 29

@@ -10,6 +10,7 @@
 //! * [`CrowdLibrary`]: the clips of a skeleton, its masks and reference poses.
 //! * [`Crowd`]: instances with up to four [`CrowdLayer`]s each, and the clock; made by
 //!   [`Engine::crowd`](crate::Engine::crowd).
+//! * [`CrowdFade`]: a layer's weight as a function of the clock.
 //! * [`CrowdOutput`]: what an evaluation stores of each joint ([`CrowdValues`]), in 32 or 16 bits.
 //! * [`MotionTables`] and [`MotionStates`]: a library's clips without instances, for those who train on motion.
 //!
@@ -27,7 +28,7 @@
 //
 // A library's clips are flat tables (`clip_tables`): per clip its time bases, per time base its spans, per joint a
 // rotation, a translation and a scale, each with a form and cells of four numbers. Each layer of an instance is an
-// entry of 16 bytes (`instances`). Positions are found by `twin::crowd_times`; layers are laid over each other by
+// entry of 16 bytes (`instances`); weights that fade are written into it as the clock moves (`fade`). Positions are found by `twin::crowd_times`; layers are laid over each other by
 // `lay_over` and `twin::crowd_layers`; `gpu::crowd` runs the kernels, `on_cpu` their twins.
 //
 // Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
@@ -35,6 +36,7 @@
 // evaluation; positions live for a window alone.
 
 pub(crate) mod clip_tables;
+pub(crate) mod fade;
 pub(crate) mod instances;
 pub(crate) mod lay_over;
 pub(crate) mod layer;
@@ -43,6 +45,7 @@ pub(crate) mod on_cpu;
 pub(crate) mod player;
 pub(crate) mod states;
 
+pub use crate::crowd::fade::CrowdFade;
 pub use crate::crowd::layer::CrowdLayer;
 pub use crate::crowd::library::CrowdLibrary;
 pub use crate::crowd::player::Crowd;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::crowd::clip_tables::{ClipTables, arcs, constants_of, runs_of};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
 use crate::shader::{

@@ -4,8 +4,11 @@
 //! Kernels do not evaluate formulas: they evaluate the polynomials that are fitted to
 //! them, the same form for all.
 
-use crate::math::dual::Scalar;
-use crate::math::quaternion::{Quaternion, Vector, dot, exp_by, product, square, sum};
+use crate::curve::options::{Axes, Quantity};
+use crate::math::dual::{Dual, Scalar};
+use crate::math::quaternion::{
+    Quaternion, Real, Vector, dot, exp_by, product, rotated, square, step, sum,
+};
 
 /// How many numbers a formula may take.
 pub(crate) const NUMBERS: usize = 25;
@@ -35,8 +38,8 @@ impl From<RotationVectorNumbers> for FormulaNumbers {
     }
 }
 
-/// The numbers of [`DeCasteljau`], [`Squad`], [`Linear`] and [`Hermite`] curves: the keys at both ends, and
-/// the control rotations or tangents between them.
+/// The numbers of [`DeCasteljau`]'s curves and of many others: the keys at both ends, and the control
+/// rotations or tangents between them. They are four quaternions, one behind the other.
 #[derive(Default)]
 pub(crate) struct ControlNumbers {
     pub(crate) start: Quaternion,
@@ -87,7 +90,7 @@ pub(crate) trait Formula: 'static {
 
 /// The quaternion that starts at an offset among the numbers.
 #[inline(always)]
-fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize) -> [S; 4] {
+pub(crate) fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize) -> [S; 4] {
     [
         S::constant(numbers[offset]),
         S::constant(numbers[offset + 1]),
@@ -98,7 +101,7 @@ fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize) -> [S;
 
 /// The vector that starts at an offset among the numbers, times `k`.
 #[inline(always)]
-fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize, k: S) -> [S; 3] {
+pub(crate) fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize, k: S) -> [S; 3] {
     [
         S::constant(numbers[offset]) * k,
         S::constant(numbers[offset + 1]) * k,
@@ -108,20 +111,20 @@ fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize, k: S) -> [
 
 /// The exponential of a half-rotation vector.
 #[inline(always)]
-fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
+pub(crate) fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
     exp_by(a, square(a).waves())
 }
 
 /// `q / |q|`, whatever the length.
 #[inline(always)]
-fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
+pub(crate) fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
     let scale = dot(q, q).reciprocal_root();
     [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 
 /// `a u + b v`.
 #[inline(always)]
-fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
+pub(crate) fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
     [
         a[0] * u + b[0] * v,
         a[1] * u + b[1] * v,
@@ -136,7 +139,7 @@ fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
 /// The sines are written `x sinc(x²)`, and the square of the angle is a smooth function of the
 /// chord between the ends, so that small angles are no special case.
 #[inline(always)]
-fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
+pub(crate) fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
     let minus = S::all(-1.0);
     let difference = weighted(b, S::all(1.0), a, minus);
     let chord = dot(difference, difference) * S::all(0.25);
@@ -231,38 +234,6 @@ impl Formula for DeCasteljau {
     }
 }
 
-/// Spherical quadrangle interpolation (Shoemake 1987):
-/// `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))`.
-///
-/// Numbers: `q0`, `s0`, `s1`, `q1`. The arcs are those that the signs give.
-pub(crate) struct Squad;
-
-impl Formula for Squad {
-    #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
-        let along = slerp(quaternion(numbers, 0), quaternion(numbers, 12), t);
-        let beside = slerp(quaternion(numbers, 4), quaternion(numbers, 8), t);
-        let weight = S::all(2.0) * t * (S::all(1.0) - t);
-        slerp(along, beside, weight)
-    }
-}
-
-/// `((1-t) q0 + t q1) / |…|`. Numbers: `q0`, two quaternions that are not used, `q1`.
-pub(crate) struct Linear;
-
-impl Formula for Linear {
-    #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
-        let rest = S::all(1.0) - t;
-        normalised(weighted(
-            quaternion(numbers, 0),
-            rest,
-            quaternion(numbers, 12),
-            t,
-        ))
-    }
-}
-
 /// A straight line, not normalised. Numbers: its value at 0, and its slope.
 pub(crate) struct StraightLine;
 
@@ -274,28 +245,38 @@ impl Formula for StraightLine {
     }
 }
 
-/// `((2t³-3t²+1) q0 + (t³-2t²+t) m0 + (3t²-2t³) q1 + (t³-t²) m1) / |…|`.
-///
-/// Numbers: `q0`, `m0`, `m1`, `q1`; the tangents are multiplied by the interval's length.
-pub(crate) struct Hermite;
+/// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
+/// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
+#[inline(always)]
+pub(crate) fn quantity_value<R: Real>(
+    quantity: Quantity,
+    rotation: [Dual<R>; 4],
+    rate: R,
+) -> [R; 4] {
+    let at = rotation.map(|dual| dual.value);
+    let (derivative, scale, axes) = match quantity {
+        Quantity::Rotation => return at,
+        Quantity::Velocity(axes) => (rotation.map(|dual| dual.first), rate, axes),
+        Quantity::Acceleration(axes) => (rotation.map(|dual| dual.second), rate * rate, axes),
+    };
+    // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
+    let [x, y, z, _] = step(at, derivative);
+    // No closure: those are not always inlined.
+    let twice = R::all(2.0) * scale;
+    let body = [clamped(twice * x), clamped(twice * y), clamped(twice * z)];
+    let [x, y, z] = match axes {
+        Axes::Body => body,
+        // This holds for accelerations too: ω × ω = 0.
+        Axes::Parent => rotated(at, body),
+    };
+    [x, y, z, R::all(0.0)]
+}
 
-impl Formula for Hermite {
-    #[inline(always)]
-    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
-        let one = S::all(1.0);
-        let rest = one - t;
-        let two = S::all(2.0);
-        let start = (one + two * t) * rest * rest;
-        let end = t * t * (S::all(3.0) - two * t);
-        let leaving = t * rest * rest;
-        let arriving = t * t * (t - one);
-        let keys = weighted(quaternion(numbers, 0), start, quaternion(numbers, 12), end);
-        let tangents = weighted(
-            quaternion(numbers, 4),
-            leaving,
-            quaternion(numbers, 8),
-            arriving,
-        );
-        normalised(weighted(keys, one, tangents, one))
-    }
+/// Between keys at almost the same time velocities would overflow f32. NaN stays NaN.
+#[inline(always)]
+pub(crate) fn clamped<R: Real>(x: R) -> R {
+    let largest = 0.25 * f64::from(f32::MAX);
+    let [low, high] = [-largest, largest].map(R::all);
+    let raised = low.up_to(x, x, x.up_to(low, low, x));
+    high.up_to(raised, high, raised)
 }

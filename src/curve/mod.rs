@@ -1,6 +1,4 @@
-//! Curves between keys: the options that any method takes, the formulas in f64, and the segments
-//! that kernels evaluate.
+//! Curves between keys: the options that any method takes, and the formulas in f64.
 
 pub(crate) mod formula;
 pub(crate) mod options;
-pub(crate) mod segment;

@@ -259,7 +259,7 @@ pub enum InterpolationError {
     },
     /// Under [`WrapMode::Mirror`](crate::time::wrap::WrapMode::Mirror) velocities would change
     /// their signs from copy to copy.
-    #[error("velocities are not mirrored; hold, loop or extrapolate them")]
+    #[error("velocities cannot be mirrored; hold, loop or extrapolate them")]
     MirroredVelocity,
     /// Under [`Ends::Clamped`] a velocity is not finite, or too large.
     #[error(
@@ -282,7 +282,7 @@ pub enum InterpolationError {
     },
     /// Under [`Ends::Loop`] the last key must repeat the first.
     #[error(
-        "track {track}: the last key is {degrees:.3}° from the first; a loop needs the last key to repeat the first"
+        "track {track}: the last key is {degrees:.3}° from the first; a loop needs a last key that equals the first"
     )]
     OpenLoop {
         /// The track's index in the set.

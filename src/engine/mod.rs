@@ -3,6 +3,7 @@
 #[cfg(feature = "vulkan")]
 mod application_device;
 mod auto;
+pub(crate) mod clip;
 mod stream;
 
 use std::sync::Arc;
@@ -10,12 +11,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::checks::check_encoding;
-use crate::clip::Clip;
-use crate::clip::request::Request;
 use crate::cpu::engine::CpuEngine;
 use crate::device::{Device, VulkanDevice};
+use crate::engine::clip::Clip;
+use crate::engine::clip::request::Request;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
 use crate::gpu::engine::choices::EngineChoices;
@@ -29,8 +30,7 @@ use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
-use crate::prepare::clip_data::PrepareRequest;
-use crate::prepare::request::SetRequest;
+use crate::prepare::preparation::SetRequest;
 use crate::simd::dispatch::VectorWidth;
 use crate::threads::lock;
 use crate::time::frames::{SampleTimes, Timeline};
@@ -269,16 +269,6 @@ impl Engine {
         interpolation: impl Into<Interpolation>,
     ) -> Result<Clip, Error> {
         let uploaded = Uploaded::whole(&self.backend, set, interpolation.into())?;
-        Ok(Clip::new(self.clone(), uploaded))
-    }
-
-    pub(crate) fn upload_prepared(
-        &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        to_prepare: PrepareRequest<'_>,
-    ) -> Result<Clip, Error> {
-        let uploaded = Uploaded::new(&self.backend, set, interpolation, to_prepare, None)?;
         Ok(Clip::new(self.clone(), uploaded))
     }
 

@@ -6,15 +6,14 @@ use glam::Quat;
 use crate::checks::{check_encoding, check_window};
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::pieces::{SetPieces, segment_bytes};
+use crate::evaluate::uploaded::pieces::SetPieces;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
-use crate::prepare::batch::Batch;
-use crate::prepare::clip_data::{ClipData, PrepareRequest};
-use crate::prepare::request::SetRequest;
+use crate::prepare::clip_data::ClipData;
+use crate::prepare::preparation::SetRequest;
 use crate::stream::{Chunk, run};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
@@ -45,30 +44,31 @@ impl Engine {
             };
             return run(window.cut(chunk), interpolation.quantity, fill, sink);
         }
-        // A chunk has some samples of many tracks, or some of one track: every chunk needs
-        // segments that others need too, so all are prepared at once, unless that takes too much.
+        // A chunk has some samples of many tracks, or some of one track: every chunk needs segments that others
+        // need too, so all that the window needs are prepared at once, unless that takes too much.
         let limit = self.backend.budget().unwrap_or(SEGMENT_BYTES);
-        if segment_bytes(set, &interpolation) > limit {
+        let pieces = SetPieces {
+            backend: &self.backend,
+            set,
+            interpolation: &interpolation,
+            timeline,
+            encoding: Encoding::F32,
+            limit,
+        };
+        let windows = window.cut(chunk);
+        if pieces.bytes(window) > limit {
             ClipData::unprepared(set, interpolation).map_err(Error::from)?;
-            let pieces = SetPieces {
-                backend: &self.backend,
-                set,
-                interpolation: &interpolation,
-                timeline,
-                encoding: Encoding::F32,
-                limit,
-            };
             let fill = |window: &Window, output: &mut [Quat]| {
                 Ok(pieces.evaluate_into(window, bytemuck::cast_slice_mut(output))?)
             };
-            return run(window.cut(chunk), interpolation.quantity, fill, sink);
+            return run(windows, interpolation.quantity, fill, sink);
         }
-        let to_prepare = PrepareRequest {
-            only_for: Some(timeline),
-            ..PrepareRequest::all(set)
+        let prepared = pieces.prepared(window).map_err(Error::from)?;
+        let fill = |window: &Window, output: &mut [Quat]| {
+            let output = bytemuck::cast_slice_mut(output);
+            Ok(prepared.evaluate_into(window, Encoding::F32, output)?)
         };
-        let clip = self.upload_prepared(set, interpolation, to_prepare)?;
-        clip.stream_window(timeline, window, chunk, sink)
+        run(windows, interpolation.quantity, fill, sink)
     }
 
     /// Evaluates a window of a set's result into memory, encoded, if they fit.
@@ -104,26 +104,19 @@ impl Engine {
                 return Ok(());
             }
         }
-        if let Some(limit) = self.backend.budget() {
-            let pieces = SetPieces {
-                backend: &self.backend,
-                set,
-                interpolation: &interpolation,
-                timeline,
-                encoding,
-                limit,
-            };
-            ClipData::unprepared(set, interpolation)?;
-            return Ok(pieces.evaluate_into(window, output)?);
-        }
-        let timeline = timeline.of_tracks(tracks.clone());
-        let to_prepare = PrepareRequest {
-            batch: Batch::Tracks(tracks.clone()),
-            only_for: Some(&timeline),
-            ..PrepareRequest::all(set)
+        let pieces = |limit| SetPieces {
+            backend: &self.backend,
+            set,
+            interpolation: &interpolation,
+            timeline,
+            encoding,
+            limit,
         };
-        let clip = self.upload_prepared(set, interpolation, to_prepare)?;
-        let window = Window::of(0..tracks.len(), window.samples.clone(), window.layout);
-        clip.encode_window_into(&timeline, &window, encoding, output)
+        if let Some(limit) = self.backend.budget() {
+            ClipData::unprepared(set, interpolation)?;
+            return Ok(pieces(limit).evaluate_into(window, output)?);
+        }
+        let prepared = pieces(usize::MAX).prepared(window)?;
+        Ok(prepared.evaluate_into(window, encoding, output)?)
     }
 }

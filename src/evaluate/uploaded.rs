@@ -5,7 +5,7 @@ pub(crate) mod pieces;
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::evaluate::uploaded::pieces::{SetPieces, segment_bytes};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};

@@ -25,10 +25,10 @@
 //! | [`block::TrackStretch`] | which lanes are consecutive intervals of which track |
 //! | [`tangent_weights::KeyWeights`] | how the steps on both sides of a key count in its tangent |
 //! | [`fast::handles::HandlesF32`] | steps, handles and curves of the same intervals in f32 |
-//! | [`exact::shape::Shape`] | a formula, and how its curves are sampled |
+//! | [`exact::fit::Shape`] | a formula, and how its curves are sampled |
 //! | [`exact::fit::FitBlock`] | up to 128 curves of one shape that wait to be fitted |
 //! | [`exact::cut::Cutter`] | curves that one polynomial does not fit |
-//! | [`exact::curve::IntervalCurve`] | one curve by its formula, in f64 |
+//! | [`exact::fit::IntervalCurve`] | one curve by its formula, in f64 |
 //! | [`nodes::Nodes`] | where curves are sampled, and how powers follow from the samples |
 //!
 //! # From a key to its stored curve

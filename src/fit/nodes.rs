@@ -78,14 +78,17 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
         nodes
     }
 
-    /// The `i`th of all nodes: the middle, then those before it, then those after it.
-    #[inline(always)]
-    pub(crate) fn offset(&self, i: usize) -> f64 {
-        match i {
-            0 => 0.0,
-            _ if i <= PAIRS => f64::from(-self.at[i - 1]),
-            _ => f64::from(self.at[i - 1 - PAIRS]),
+    /// All nodes, `COUNT` = 2 `PAIRS` + 1: the middle, then those before it, then those after it.
+    pub(crate) const fn offsets<const COUNT: usize>(&self) -> [f64; COUNT] {
+        assert!(COUNT == 2 * PAIRS + 1);
+        let mut offsets = [0.0; COUNT];
+        let mut k = 0;
+        while k < PAIRS {
+            offsets[1 + k] = -self.at[k] as f64;
+            offsets[1 + PAIRS + k] = self.at[k] as f64;
+            k += 1;
         }
+        offsets
     }
 
     /// The coefficients of s, s³, … and of s², s⁴, … of component `c`. Divided differences give
@@ -122,7 +125,7 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
 
 /// An estimate of twice the truncation error of a component's fit, from its last Chebyshev
 /// coefficients, which follow from those of the powers. If the curves are
-/// [entire](crate::fit::exact::shape::Shape::entire), the last two coefficients suffice.
+/// [entire](crate::fit::exact::fit::Shape::entire), the last two coefficients suffice.
 #[inline(always)]
 pub(crate) fn tail<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
@@ -204,7 +207,7 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
 }
 
 /// Sets the coefficients of the polynomials through samples. Returns estimates of twice the
-/// truncation error, which depend on whether the curves are [entire](Shape::entire).
+/// truncation error, which depend on whether the curves are [entire](crate::fit::exact::fit::Shape::entire).
 #[allow(clippy::needless_range_loop)]
 #[inline(always)]
 pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(

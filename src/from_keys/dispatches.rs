@@ -12,9 +12,8 @@ use rayon::prelude::*;
 use crate::curve::options::{Ends, InterpolationError};
 use crate::fit::tangent_weights::{TrackWeights, WeightRule};
 use crate::from_keys::KeyCurve;
-use crate::prepare::batch::{Batch, BatchSize, batches};
 use crate::prepare::error::SetError;
-use crate::prepare::request::SetRequest;
+use crate::prepare::preparation::{Batch, BatchSize, SetRequest, batches};
 use crate::shader::{
     IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_NEGATED, TangentWeights,
 };

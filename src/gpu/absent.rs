@@ -248,8 +248,8 @@ pub(crate) mod crowd {
     use crate::gpu::Never;
     use crate::gpu::engine::VulkanEngine;
     use crate::gpu::error::VulkanError;
-    use crate::output::crowd::CrowdOutput;
-    use crate::shader::{CrowdDispatch, CrowdEntry};
+    use crate::output::crowd::{CrowdFrame, CrowdOutput};
+    use crate::shader::CrowdDispatch;
 
     pub(crate) struct CrowdTables {
         pub(crate) instances: u32,
@@ -279,18 +279,7 @@ pub(crate) mod crowd {
     }
 
     pub(crate) struct CrowdReader {
-        pub(crate) target: CrowdTarget,
         pub(crate) results: Results,
-    }
-
-    pub(crate) struct CrowdTarget {
-        never: Never,
-    }
-
-    impl CrowdTarget {
-        pub(crate) fn output(&self) -> CrowdOutput {
-            match self.never {}
-        }
     }
 
     pub(crate) struct Results {
@@ -307,20 +296,21 @@ pub(crate) mod crowd {
         pub(crate) fn new(
             crowd: &Arc<DeviceCrowd>,
             _output: CrowdOutput,
+            _room: u32,
         ) -> Result<Self, VulkanError> {
             match crowd.never {}
         }
 
-        pub(crate) fn submit<'e>(
-            &mut self,
-            _clock: u64,
-            _changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
-        ) -> Result<(), VulkanError> {
-            match self.target.never {}
+        pub(crate) fn fits(&self, _output: CrowdOutput, _instances: u32) -> bool {
+            match self.results.never {}
+        }
+
+        pub(crate) fn submit(&mut self, _frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
+            match self.results.never {}
         }
 
         pub(crate) fn wait_into(&mut self, _output: &mut [u8]) -> Result<(), VulkanError> {
-            match self.target.never {}
+            match self.results.never {}
         }
     }
 }

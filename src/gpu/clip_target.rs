@@ -16,7 +16,7 @@ use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 
 /// Samples of a clip that are recorded into an application's commands, and the buffer that they go to
-/// ([`Request::target`](crate::clip::request::Request::target)). What kernels read of the samples lies on the
+/// ([`Request::target`](crate::engine::clip::request::Request::target)). What kernels read of the samples lies on the
 /// device: recording neither lists nor allocates anything.
 pub struct ClipTarget {
     engine: Arc<VulkanEngine>,

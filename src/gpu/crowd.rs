@@ -1,5 +1,6 @@
 //! A crowd on a Vulkan device: its tables, which stay there, and where its results go. Each evaluation records
-//! what changed and the dispatches, without waiting and without allocating.
+//! what changed and the dispatches, without waiting and without allocating. Each barrier names the buffers that it
+//! orders.
 
 use std::sync::Arc;
 
@@ -12,9 +13,12 @@ use crate::gpu::in_flight::KernelResults;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Commands, DescriptorPool};
-use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::output::crowd::{
+    CrowdFrame, CrowdOutput, CrowdValues, EntryChanges, VisibleInstances, listed_changes,
+};
 use crate::shader::{
-    CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
+    CROWD_WORKGROUP, CrowdChange, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED,
+    WORKGROUP,
 };
 
 /// The fewest instances of a window: so many that windows start at multiples of 256 bytes.
@@ -51,28 +55,37 @@ pub(crate) struct DeviceCrowd {
     pub(crate) tables: CrowdTables,
     /// `[instance][layer]`
     pub(crate) entries: Buffer,
+    /// Entries that changed, on their way among the others.
+    changes: Buffer,
+    /// The instances that are evaluated, where that is not all.
+    visible: Buffer,
 }
 
 impl DeviceCrowd {
     pub(crate) fn new(engine: Arc<VulkanEngine>, tables: CrowdTables) -> Result<Self, VulkanError> {
         let device = &engine.device;
         let arguments = &tables.arguments;
-        let entries = u64::from(tables.instances) * u64::from(arguments.layers);
+        let instances = u64::from(tables.instances);
+        let entries = instances * u64::from(arguments.layers);
+        let listed = listed_changes(entries as usize) * size_of::<CrowdChange>();
         let entries = entries * size_of::<CrowdEntry>() as u64;
         let poses = LEAST_WINDOW * MATRIX * u64::from(arguments.joints);
         let physical = &device.physical;
         physical.check_range("a crowd's instances", entries)?;
         physical.check_range("a window of a crowd's poses", poses)?;
+        let new = |name, size| Buffer::new(device, name, size, Residence::Device);
         Ok(Self {
-            entries: Buffer::new(device, "tumble crowd entries", entries, Residence::Device)?,
+            entries: new("tumble crowd entries", entries)?,
+            changes: new("tumble crowd changes", listed as u64)?,
+            visible: new("tumble crowd visible instances", 4 * instances)?,
             engine,
             tables,
         })
     }
 
+    /// Bytes of the result for an instance.
     pub(crate) fn bytes(&self, output: CrowdOutput) -> u64 {
-        let joints = u64::from(self.tables.instances) * u64::from(self.tables.arguments.joints);
-        joints * output.bytes() as u64
+        u64::from(self.tables.arguments.joints) * output.bytes() as u64
     }
 
     /// Bytes of the positions of the layers of an instance.
@@ -128,15 +141,15 @@ impl DeviceCrowd {
         kernels
     }
 
-    /// The buffers that a kernel binds: `positions` are where each layer of a window's instances is in its clip,
-    /// `values` are in 32 bits, and `output` is what is left of them.
-    pub(crate) fn bindings(
-        &self,
-        kernel: Kernel,
-        [positions, values, output]: [Binding; 3],
-    ) -> Vec<Binding> {
+    /// The buffers that a kernel binds.
+    fn bindings(&self, kernel: Kernel, window: &WindowBuffers) -> Vec<Binding> {
         let (tables, whole) = (&self.tables, Binding::whole);
-        let entries = whole(&self.entries);
+        let WindowBuffers {
+            entries,
+            positions,
+            values,
+            output,
+        } = *window;
         match kernel {
             Kernel::CrowdTimes => {
                 let [clips, bases, spans] =
@@ -154,8 +167,33 @@ impl DeviceCrowd {
     }
 }
 
-/// The most bytes that one command may write into a buffer.
-const UPDATE: usize = 1 << 16;
+/// What the kernels of a window work on.
+#[derive(Clone, Copy)]
+struct WindowBuffers {
+    /// All entries, or those of the window's instances.
+    entries: Binding,
+    /// Where each layer of the window's instances is in its clip.
+    positions: Binding,
+    /// The values in 32 bits.
+    values: Binding,
+    /// What is left of them.
+    output: Binding,
+}
+
+/// A kernel with its buffers.
+struct BoundKernel {
+    kernel: Kernel,
+    pipeline: Arc<Pipeline>,
+    set: vk::DescriptorSet,
+}
+
+/// A window of instances: the kernels that run for it, one after another.
+struct Window {
+    kernels: Vec<BoundKernel>,
+    /// The sets of those that read entries, the first ones, where these are gathered.
+    on_gathered: [vk::DescriptorSet; 2],
+    buffers: WindowBuffers,
+}
 
 /// A range of an application's buffer that a crowd is evaluated into
 /// ([`Crowd::target`](crate::crowd::player::Crowd::target)), with all that recording needs.
@@ -163,35 +201,44 @@ pub struct CrowdTarget {
     /// What it was made for; its buffers are in the sets.
     pub(crate) crowd: Arc<DeviceCrowd>,
     output: CrowdOutput,
-    pipelines: Vec<(Kernel, Arc<Pipeline>)>,
+    /// Where the result goes.
+    pub(crate) range: Binding,
+    /// The most instances that fit.
+    pub(crate) room: u32,
+    scatter: BoundKernel,
+    gather: BoundKernel,
     /// Instances of a window.
     window: u32,
-    /// The descriptor sets of each window, one for each kernel.
-    windows: Vec<Vec<vk::DescriptorSet>>,
+    windows: Vec<Window>,
     // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
     // flight when the target is dropped.
     _pool: DescriptorPool,
-    _buffers: (Buffer, Option<Buffer>),
+    positions: Buffer,
+    gathered: Buffer,
+    /// Values of a window before they are rounded to 16 bits.
+    values: Option<Buffer>,
 }
 
 impl CrowdTarget {
-    /// For a range of a buffer from `offset` on, which is as long as the result.
+    /// For a range of a buffer from `offset` on, with room for so many instances.
     pub(crate) fn new(
         crowd: &Arc<DeviceCrowd>,
         output: CrowdOutput,
-        buffer: vk::Buffer,
-        offset: u64,
+        (buffer, offset): (vk::Buffer, u64),
+        room: u32,
     ) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let (window, instances) = (crowd.window(), crowd.tables.instances);
-        let joints = u64::from(crowd.tables.arguments.joints);
+        let arguments = &crowd.tables.arguments;
+        let window = crowd.window();
+        let each = crowd.bytes(output);
         let new = |name, each: u64| {
             let size = u64::from(window) * each;
             Buffer::new(&engine.device, name, size, Residence::Device)
         };
         let positions = new("tumble crowd places", crowd.position_bytes())?;
-        // Values of a window before they are rounded to 16 bits.
-        let values = joints * output.vector_count() as u64 * 16;
+        let entry_bytes = size_of::<CrowdEntry>() as u64 * u64::from(arguments.layers);
+        let gathered = new("tumble crowd gathered entries", entry_bytes)?;
+        let values = u64::from(arguments.joints) * output.vector_count() as u64 * 16;
         let whole = (output.is_half).then(|| new("tumble crowd values", values));
         let whole = whole.transpose()?;
         let pipelines = crowd
@@ -199,31 +246,72 @@ impl CrowdTarget {
             .into_iter()
             .map(|kernel| Ok((kernel, engine.pipeline(kernel)?)))
             .collect::<Result<Vec<_>, VulkanError>>()?;
-        let count = instances.div_ceil(window);
+        let count = room.div_ceil(window);
         let mut pool = DescriptorPool::new(&engine.device);
-        pool.make_room(count * pipelines.len() as u32)?;
+        pool.make_room(2 + count * (pipelines.len() as u32 + 2))?;
+        let entries = Binding::whole(&crowd.entries);
+        let mut bound = |kernel, bindings: &[Binding]| -> Result<_, VulkanError> {
+            let pipeline = engine.pipeline(kernel)?;
+            let set = pool.set(&pipeline, bindings)?;
+            Ok(BoundKernel {
+                kernel,
+                pipeline,
+                set,
+            })
+        };
+        let changes = Binding::whole(&crowd.changes);
+        let scatter = bound(Kernel::CrowdScatter, &[changes, entries])?;
+        let visible = Binding::whole(&crowd.visible);
+        let all = [entries, visible, Binding::whole(&gathered)];
+        let gather = bound(Kernel::CrowdGather, &all)?;
         let mut windows = Vec::new();
-        for first in (0..instances).step_by(window as usize) {
-            let count = window.min(instances - first);
-            let each = joints * output.bytes() as u64;
+        for first in (0..room).step_by(window as usize) {
+            let count = window.min(room - first);
             let start = offset + u64::from(first) * each;
             let range = Binding::range(buffer, start, u64::from(count) * each);
-            let values = whole.as_ref().map_or(range, Binding::whole);
-            let bound = [Binding::whole(&positions), values, range];
-            let sets = pipelines
+            let buffers = WindowBuffers {
+                entries,
+                positions: Binding::whole(&positions),
+                values: whole.as_ref().map_or(range, Binding::whole),
+                output: range,
+            };
+            let on_gathered = WindowBuffers {
+                entries: Binding::whole(&gathered),
+                ..buffers
+            };
+            let [times, joints] = [&pipelines[0], &pipelines[1]].map(|(kernel, pipeline)| {
+                pool.set(pipeline, &crowd.bindings(*kernel, &on_gathered))
+            });
+            let kernels = pipelines
                 .iter()
-                .map(|(kernel, pipeline)| pool.set(pipeline, &crowd.bindings(*kernel, bound)))
-                .collect::<Result<_, _>>()?;
-            windows.push(sets);
+                .map(|(kernel, pipeline)| {
+                    let set = pool.set(pipeline, &crowd.bindings(*kernel, &buffers))?;
+                    Ok(BoundKernel {
+                        kernel: *kernel,
+                        pipeline: Arc::clone(pipeline),
+                        set,
+                    })
+                })
+                .collect::<Result<_, VulkanError>>()?;
+            windows.push(Window {
+                kernels,
+                on_gathered: [times?, joints?],
+                buffers,
+            });
         }
         Ok(Self {
             crowd: Arc::clone(crowd),
             output,
-            pipelines,
+            range: Binding::range(buffer, offset, u64::from(room) * each),
+            room,
+            scatter,
+            gather,
             window,
             windows,
             _pool: pool,
-            _buffers: (positions, whole),
+            positions,
+            gathered,
+            values: whole,
         })
     }
 
@@ -233,60 +321,131 @@ impl CrowdTarget {
         self.output
     }
 
-    /// Records an evaluation at a time of the clock: the entries that changed, then the dispatches.
-    /// `changes` are ranges of entries, with the entries themselves. What is recorded must be submitted
-    /// in the order of the calls.
-    pub(crate) fn record<'e>(
-        &self,
-        commands: Commands<'_>,
-        clock: u64,
-        changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
-    ) {
-        let tables = &self.crowd.tables;
-        commands.barrier(Access::Any, Access::Any);
-        let each = size_of::<CrowdEntry>();
-        for (first, entries) in changes {
-            let first_entries = (first..).step_by(UPDATE / each);
-            for (first_entry, part) in first_entries.zip(entries.chunks(UPDATE / each)) {
-                let bytes = bytemuck::cast_slice(part);
-                commands.update(self.crowd.entries.raw, (first_entry * each) as u64, bytes);
-            }
-        }
-        commands.barrier(Access::Copy, Access::Kernel);
-        let firsts = (0..tables.instances).step_by(self.window as usize);
-        for (first_instance, sets) in firsts.zip(&self.windows) {
-            let instances = self.window.min(tables.instances - first_instance);
+    /// Bytes of the result of a frame.
+    fn bytes(&self, frame: &CrowdFrame<'_>) -> u64 {
+        u64::from(frame.instances) * self.crowd.bytes(self.output)
+    }
+
+    /// Records the evaluation of a frame, which has an instance and no more than there is room for: what changed, then
+    /// the dispatches. What is recorded must be submitted in the order of the calls.
+    pub(crate) fn record(&self, commands: Commands<'_>, frame: &CrowdFrame<'_>) {
+        let (crowd, whole) = (&self.crowd, Binding::whole);
+        let result = Binding {
+            size: self.bytes(frame),
+            ..self.range
+        };
+        // Evaluations before this one may use the crowd's buffers, and anything the result's.
+        let used = [
+            whole(&crowd.entries),
+            whole(&crowd.changes),
+            whole(&crowd.visible),
+            whole(&self.positions),
+            whole(&self.gathered),
+            self.values.as_ref().map_or(result, whole),
+        ];
+        let used = &used[..5 + usize::from(self.values.is_some())];
+        let scratch = &used[3..5];
+        commands.barrier_over(Access::KernelAndCopy, Access::KernelAndCopy, used);
+        commands.barrier_over(Access::Any, Access::Kernel, &[result]);
+        self.record_changes(commands, frame);
+        let arguments = CrowdDispatch {
+            clock_low: frame.clock as u32,
+            clock_high: (frame.clock >> 32) as u32,
+            ..crowd.tables.arguments
+        };
+        let is_gathered = frame.visible != VisibleInstances::All;
+        let firsts = (0..frame.instances).step_by(self.window as usize);
+        for (first_instance, window) in firsts.zip(&self.windows) {
+            let instances = self.window.min(frame.instances - first_instance);
             let arguments = CrowdDispatch {
                 first_instance,
-                clock_low: clock as u32,
-                clock_high: (clock >> 32) as u32,
-                ..tables.arguments
+                ..arguments
             };
-            self.record_window(commands, sets, instances, arguments);
+            if first_instance > 0 {
+                commands.barrier_over(Access::Kernel, Access::Kernel, scratch);
+            }
+            if is_gathered {
+                let count = instances * arguments.layers;
+                self.dispatch(commands, &self.gather, CrowdDispatch { count, ..arguments });
+                commands.barrier_over(Access::Kernel, Access::Kernel, &[whole(&self.gathered)]);
+            }
+            self.record_window(commands, window, is_gathered, instances, arguments);
         }
-        commands.barrier(Access::Kernel, Access::Any);
+        commands.barrier_over(Access::Kernel, Access::Any, &[result]);
+    }
+
+    /// Records what the device does not know yet: entries, and which instances are evaluated.
+    fn record_changes(&self, commands: Commands<'_>, frame: &CrowdFrame<'_>) {
+        let crowd = &self.crowd;
+        let [entries, changes, visible] =
+            [&crowd.entries, &crowd.changes, &crowd.visible].map(Binding::whole);
+        if let VisibleInstances::List(list) = frame.visible {
+            commands.update(visible.buffer, 0, bytemuck::cast_slice(list));
+            commands.barrier_over(Access::Copy, Access::Kernel, &[visible]);
+        }
+        match frame.changes {
+            EntryChanges::None => {}
+            EntryChanges::Range(first, changed) => {
+                let offset = first * size_of::<CrowdEntry>();
+                commands.update(entries.buffer, offset as u64, bytemuck::cast_slice(changed));
+                commands.barrier_over(Access::Copy, Access::Kernel, &[entries]);
+            }
+            EntryChanges::List(list) => {
+                commands.update(changes.buffer, 0, bytemuck::cast_slice(list));
+                commands.barrier_over(Access::Copy, Access::Kernel, &[changes]);
+                let count = list.len() as u32;
+                let arguments = CrowdDispatch {
+                    count,
+                    ..crowd.tables.arguments
+                };
+                self.dispatch(commands, &self.scatter, arguments);
+                commands.barrier_over(Access::Kernel, Access::Kernel, &[entries]);
+            }
+        }
+    }
+
+    /// Records a dispatch of as many invocations as its arguments count.
+    fn dispatch(&self, commands: Commands<'_>, bound: &BoundKernel, arguments: CrowdDispatch) {
+        let groups = self.crowd.engine.workgroups(arguments.count);
+        let bytes = bytemuck::bytes_of(&arguments);
+        commands.dispatch(&bound.pipeline, bound.set, bytes, groups);
     }
 
     /// Records the dispatches of a window, each of which sees what the one before it wrote.
     fn record_window(
         &self,
         commands: Commands<'_>,
-        sets: &[vk::DescriptorSet],
+        window: &Window,
+        is_gathered: bool,
         instances: u32,
         arguments: CrowdDispatch,
     ) {
         const _: () = assert!(CROWD_WORKGROUP == WORKGROUP);
         let joints = instances * arguments.joints;
-        for ((kernel, pipeline), &set) in self.pipelines.iter().zip(sets) {
-            let dispatch = |count, arguments| {
-                if count > 0 {
-                    let arguments = CrowdDispatch { count, ..arguments };
-                    let groups = self.crowd.engine.workgroups(count);
-                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&arguments), groups);
-                    commands.barrier(Access::Kernel, Access::Kernel);
-                }
+        let order = |range| commands.barrier_over(Access::Kernel, Access::Kernel, &[range]);
+        let WindowBuffers {
+            positions, values, ..
+        } = window.buffers;
+        for (index, bound) in window.kernels.iter().enumerate() {
+            let gathered = window.on_gathered.get(index).filter(|_| is_gathered);
+            let mut arguments = arguments;
+            let mut set = bound.set;
+            if let Some(&on_gathered) = gathered {
+                (set, arguments.first_instance) = (on_gathered, 0);
+            }
+            let dispatch = |arguments: CrowdDispatch, invocations| {
+                let groups = self.crowd.engine.workgroups(invocations);
+                let bytes = bytemuck::bytes_of(&arguments);
+                commands.dispatch(&bound.pipeline, set, bytes, groups);
             };
-            let count = match kernel {
+            // What the kernel before left for this one.
+            match index {
+                0 => {}
+                1 => order(positions),
+                _ if bound.kernel == Kernel::CrowdWalk => {}
+                _ => order(values),
+            }
+            let count = match bound.kernel {
                 Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
                 Kernel::CrowdSkin => 3 * joints,
                 Kernel::CrowdHalf => joints * self.output.vector_count() as u32,
@@ -298,9 +457,7 @@ impl CrowdTarget {
                         first_link: self.crowd.tables.levels[levels],
                         ..arguments
                     };
-                    let groups = self.crowd.engine.workgroups(instances * WORKGROUP);
-                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&walk), groups);
-                    commands.barrier(Access::Kernel, Access::Kernel);
+                    dispatch(walk, instances * WORKGROUP);
                     continue;
                 }
                 Kernel::CrowdWalk => {
@@ -311,13 +468,23 @@ impl CrowdTarget {
                             first_link: level[0],
                             ..arguments
                         };
-                        dispatch(instances * level_arguments.joints, level_arguments);
+                        let count = instances * level_arguments.joints;
+                        if count > 0 {
+                            order(values);
+                            dispatch(
+                                CrowdDispatch {
+                                    count,
+                                    ..level_arguments
+                                },
+                                count,
+                            );
+                        }
                     }
                     continue;
                 }
                 _ => joints,
             };
-            dispatch(count, arguments);
+            dispatch(CrowdDispatch { count, ..arguments }, count);
         }
     }
 }
@@ -330,29 +497,34 @@ pub(crate) struct CrowdReader {
 }
 
 impl CrowdReader {
-    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput) -> Result<Self, VulkanError> {
+    /// With room for so many instances.
+    pub(crate) fn new(
+        crowd: &Arc<DeviceCrowd>,
+        output: CrowdOutput,
+        room: u32,
+    ) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let bytes = crowd.bytes(output);
+        let bytes = u64::from(room) * crowd.bytes(output);
         let mut results = KernelResults::new(&engine.device)?;
         let staged = !engine.device.placing.in_place;
         let buffer = results.room(&engine.device, bytes, staged)?.raw;
         Ok(Self {
             results,
-            target: CrowdTarget::new(crowd, output, buffer, 0)?,
+            target: CrowdTarget::new(crowd, output, (buffer, 0), room)?,
         })
     }
 
-    /// Submits an evaluation; the one before must have been waited for.
-    pub(crate) fn submit<'e>(
-        &mut self,
-        clock: u64,
-        changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
-    ) -> Result<(), VulkanError> {
+    /// Whether it is for that output, and has room for so many instances.
+    pub(crate) fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
+        self.target.output == output && self.target.room >= instances
+    }
+
+    /// Submits the evaluation of a frame; the one before must have been waited for.
+    pub(crate) fn submit(&mut self, frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
         self.results.kernels.begin(0)?;
         let commands = self.results.kernels.commands();
-        self.target.record(commands, clock, changes);
-        let bytes = self.target.crowd.bytes(self.target.output);
-        self.results.submit(Some(bytes))
+        self.target.record(commands, frame);
+        self.results.submit(Some(self.target.bytes(frame)))
     }
 
     /// Waits, and copies the result, of which `output` has as many bytes.

@@ -30,7 +30,7 @@ pub enum VulkanError {
     NoDevice,
     /// A card of NVIDIA's, and no file that names its Vulkan driver.
     #[error(
-        "no Vulkan driver for the NVIDIA card that /dev/nvidiactl shows: in a container, add the capability `graphics` (NVIDIA_DRIVER_CAPABILITIES=all); slices of a card that MIG made have no Vulkan"
+        "no Vulkan driver for the NVIDIA card that /dev/nvidiactl shows: in a container, add the capability `graphics` (NVIDIA_DRIVER_CAPABILITIES=all); MIG instances of a card do not support Vulkan"
     )]
     NoNvidiaDriver,
     /// The process was forked from one that uses Vulkan, and no driver can be used on both sides of a fork.
@@ -76,11 +76,11 @@ pub enum VulkanError {
     )]
     QueueLock,
     /// The queue for copies is the one that computes.
-    #[error("the queue for copies is the one that computes; give another, or none")]
+    #[error("the copy queue is the compute queue; give another, or none")]
     SameQueue,
     /// A driver ends the process that loads it.
     #[error(
-        "a Vulkan driver fails as it is loaded: {how}; remove it, or name those to load in VK_DRIVER_FILES"
+        "a Vulkan driver fails while it is loaded: {how}; remove it, or list the drivers to load in VK_DRIVER_FILES"
     )]
     Driver {
         /// How a process that loaded it ended.

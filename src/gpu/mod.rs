@@ -30,7 +30,8 @@
 //!    overwrites the rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys go to [`engine::from_keys`] without segments. Crowds have their own tables and
-//! targets ([`crowd`]); [`clip_target`] records a clip into an application's commands.
+//! targets ([`crowd`]); [`clip_target`] records a clip into an application's commands, and [`pass_target`] passes over
+//! poses from buffer to buffer.
 //!
 //! # Where memory lies
 //!
@@ -69,6 +70,7 @@ pub(crate) mod job;
 pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
 pub(crate) mod options;
+pub(crate) mod pass_target;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
 pub(crate) mod pipeline_cache;

@@ -328,11 +328,30 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_fill_buffer(self.raw, to.raw, 0, bytes.min(to.size), word) };
     }
 
-    /// Records that some bytes, a multiple of 4 and at most 65 536, are written into a buffer.
+    /// Records a copy of `size` bytes between ranges of buffers.
+    pub(crate) fn copy_range(
+        self,
+        (from, from_offset): (vk::Buffer, u64),
+        (to, to_offset): (vk::Buffer, u64),
+        size: u64,
+    ) {
+        let region = [vk::BufferCopy::default()
+            .src_offset(from_offset)
+            .dst_offset(to_offset)
+            .size(size)];
+        // SAFETY: as in `dispatch`; both ranges lie within their buffers.
+        unsafe { (self.device).cmd_copy_buffer(self.raw, from, to, &region) };
+    }
+
+    /// Records that some bytes, a multiple of 4, are written into a buffer. They lie in the commands.
     pub(crate) fn update(self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
-        // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are few and copied
-        // into the commands.
-        unsafe { self.device.cmd_update_buffer(self.raw, to, offset, bytes) };
+        /// The most bytes that one command may write.
+        const UPDATE: usize = 1 << 16;
+        for (start, part) in (offset..).step_by(UPDATE).zip(bytes.chunks(UPDATE)) {
+            // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are copied into the
+            // commands.
+            unsafe { self.device.cmd_update_buffer(self.raw, to, start, part) };
+        }
     }
 
     /// Records that a range, which kernels and copies of a queue family have written, is handed to users outside
@@ -350,6 +369,40 @@ impl<'a> Commands<'a> {
         let none = vk::DependencyFlags::empty();
         // SAFETY: as in `dispatch`; the range lies within the buffer.
         unsafe { (self.device).cmd_pipeline_barrier(self.raw, from, to, none, &[], &memory, &[]) };
+    }
+
+    /// Records a barrier over a few ranges of buffers alone: what `from` wrote there before it is visible to `to` after
+    /// it, and what `from` read there may be overwritten.
+    pub(crate) fn barrier_over(self, from: Access, to: Access, ranges: &[Binding]) {
+        /// The most ranges; what is recorded allocates nothing.
+        const MAX_RANGES: usize = 6;
+        let (source_stage, source_access) = from.scope(true);
+        let (destination_stage, destination_access) = to.scope(false);
+        let mut memory = [vk::BufferMemoryBarrier::default(); MAX_RANGES];
+        for (barrier, range) in memory.iter_mut().zip(ranges) {
+            *barrier = barrier
+                .src_access_mask(source_access)
+                .dst_access_mask(destination_access)
+                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .buffer(range.buffer)
+                .offset(range.offset)
+                .size(range.size);
+        }
+        let memory = &memory[..ranges.len()];
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: as in `dispatch`; the ranges lie within their buffers.
+        unsafe {
+            self.device.cmd_pipeline_barrier(
+                self.raw,
+                source_stage,
+                destination_stage,
+                none,
+                &[],
+                memory,
+                &[],
+            );
+        }
     }
 
     /// Records a barrier: what `from` wrote before it is visible to `to` after it.
@@ -380,6 +433,8 @@ impl<'a> Commands<'a> {
 pub(crate) enum Access {
     Kernel,
     Copy,
+    /// Kernels and copies, which may overwrite what others have read or written.
+    KernelAndCopy,
     Host,
     /// Whatever comes before on the queue, or later.
     Any,
@@ -393,6 +448,14 @@ impl Access {
             (Self::Kernel, false) => (S::COMPUTE_SHADER, A::SHADER_READ | A::SHADER_WRITE),
             (Self::Copy, true) => (S::TRANSFER, A::TRANSFER_WRITE),
             (Self::Copy, false) => (S::TRANSFER, A::TRANSFER_READ),
+            (Self::KernelAndCopy, true) => (
+                S::COMPUTE_SHADER | S::TRANSFER,
+                A::SHADER_WRITE | A::TRANSFER_WRITE,
+            ),
+            (Self::KernelAndCopy, false) => (
+                S::COMPUTE_SHADER | S::TRANSFER,
+                A::SHADER_READ | A::SHADER_WRITE | A::TRANSFER_READ | A::TRANSFER_WRITE,
+            ),
             (Self::Host, true) => (S::HOST, A::HOST_WRITE),
             (Self::Host, false) => (S::HOST, A::HOST_READ),
             (Self::Any, true) => (S::ALL_COMMANDS, A::MEMORY_WRITE),

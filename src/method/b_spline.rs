@@ -3,7 +3,7 @@
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, put};
 use crate::fit::exact::handles::BetweenNeighbours;
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::PRODUCT;
 use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
 use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
@@ -11,7 +11,6 @@ use crate::method::vector_method::VectorMethod;
 use crate::method::{
     Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults,
 };
-use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
@@ -29,14 +28,12 @@ pub const B_SPLINE: Method = Method {
     interpolates: false,
     symmetric: false,
     cost: Cost::new(220.0, 3.0),
-    reference: reference::b_spline::B_SPLINE,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
-static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::PRODUCT, curves).with(MethodInput::Numbers(spacing)),
-);
+static CURVES: CurveKind =
+    CurveKind::Smooth(SmoothCurves::new(&PRODUCT, curves).with(MethodInput::Numbers(spacing)));
 
 /// The durations of the two intervals before this one and of the two after it, in units of its own
 /// duration.

@@ -2,32 +2,30 @@
 //! its two neighbours.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::BERNSTEIN;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
 /// equal to [`CATMULL_ROM`](crate::method::CATMULL_ROM) for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
-    summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",
+    summary: "the default: smooth through keys at any spacing; equals catmull-rom on even spacing",
     formula: "t_i = ((s⁻)^h_i (s⁺)^h_{i-1})^(1/(h_{i-1}+h_i)), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3)",
     source: "Overhauser 1968; on rotations in the form of Kim, Kim, Shin 1995",
     continuity: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     symmetric: false,
     cost: Cost::new(210.0, 2.8),
-    reference: reference::handles::BESSEL_OVERHAUSER,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<BesselOverhauserRule>)
+    SmoothCurves::new(&BERNSTEIN, ends::curves::<BesselOverhauserRule>)
         .fast::<BesselOverhauserRule>(WeightRule::ByTime),
 );
 

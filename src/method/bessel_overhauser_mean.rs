@@ -2,12 +2,11 @@
 //! through three keys, computed with logarithms.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule, KeyInterval};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
 /// curve is the same forwards and backwards in time.
@@ -15,23 +14,19 @@ use crate::reference;
 /// The Python package `splines` calls it (non-uniform) Catmull-Rom.
 pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     name: "bessel-overhauser-mean",
-    summary: "smooth through keys at any times, the same in both directions of time",
+    summary: "smooth through keys at any spacing; the same curve for reversed keys",
     formula: "log t_i = (h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3), de Casteljau",
     source: "Overhauser 1968; Shoemake 1985; Geier, splines 0.3 (Python)",
     continuity: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(840.0, 3.2),
-    reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves {
     steady_alone: true,
-    ..SmoothCurves::new(
-        Shape::DE_CASTELJAU,
-        ends::curves::<BesselOverhauserMeanRule>,
-    )
+    ..SmoothCurves::new(&DE_CASTELJAU, ends::curves::<BesselOverhauserMeanRule>)
 });
 
 struct BesselOverhauserMeanRule;

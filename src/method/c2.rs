@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 use crate::curve::formula::RotationVectorNumbers;
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::ROTATION_VECTOR;
 use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
@@ -15,7 +15,6 @@ use crate::method::vector_method::VectorMethod;
 use crate::method::{
     Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults,
 };
-use crate::reference;
 use crate::threads::stop;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
@@ -35,7 +34,7 @@ use crate::tracks::signs::Signs;
 /// no cubic as seen from the next.
 pub const C2: Method = Method {
     name: "c2",
-    summary: "continuous angular acceleration through keys at any times (W014 where there is none)",
+    summary: "continuous angular acceleration through keys at any spacing (W014 if impossible)",
     formula: "q(t) = q_i exp(θ(t)/2), θ cubic, θ(0) = 0, θ(1) = 2 log(q_i⁻¹ q_{i+1}), angular velocity and acceleration continuous",
     source: "Mayorov 2019, Smooth attitude interpolation (SciPy's RotationSpline)",
     continuity: Continuity::C2,
@@ -44,17 +43,16 @@ pub const C2: Method = Method {
     symmetric: false,
     ends: Ends::Secant,
     cost: Cost::new(1100.0, 3.2),
-    reference: reference::c2::C2,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
-static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::ROTATION_VECTOR, curves).with(MethodInput::Velocities {
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(&ROTATION_VECTOR, curves).with(
+    MethodInput::Velocities {
         solve: velocities,
         jumps,
-    }),
-);
+    },
+));
 
 fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
     for lane in stretches.iter().flat_map(TrackStretch::lanes) {

@@ -1,13 +1,12 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::BERNSTEIN;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;
@@ -20,13 +19,12 @@ pub const CATMULL_ROM: Method = Method {
     keeps_constant_velocity: Keys::Even,
     symmetric: false,
     cost: Cost::new(150.0, 2.6),
-    reference: reference::handles::CATMULL_ROM,
     curves: &CURVES,
     ..defaults(VectorMethod::CatmullRom)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<CatmullRomRule>)
+    SmoothCurves::new(&BERNSTEIN, ends::curves::<CatmullRomRule>)
         .fast::<CatmullRomRule>(WeightRule::Alike),
 );
 

@@ -1,14 +1,15 @@
 //! The cubic spline of glTF.
 
-use crate::curve::formula::ControlNumbers;
+use crate::curve::formula::{ControlNumbers, Formula, NUMBERS, normalised, quaternion, weighted};
 use crate::curve::options::{Ends, KeySigns};
 use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::fit::Shape;
+use crate::fit::exact::shape::shape_of;
+use crate::math::dual::Scalar;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurves, defaults};
-use crate::reference;
 use crate::tracks::set::Track;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
@@ -17,21 +18,47 @@ use crate::tracks::set::Track;
 /// asked for. In a track without tangents all of them are 0.
 pub const GLTF_CUBIC: Method = Method {
     name: "gltf-cubic",
-    summary: "glTF's CUBICSPLINE, exactly as specified, with given tangents",
+    summary: "glTF's CUBICSPLINE, exactly as specified; tangents are given",
     formula: "p(t) = (2t³-3t²+1) q0 + h (t³-2t²+t) out0 + (3t²-2t³) q1 + h (t³-t²) in1, q = p/|p|",
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,
     uses_neighbours: false,
     signs: Some(KeySigns::AsAuthored),
     cost: Cost::new(350.0, 3.8),
-    reference: reference::two_keys::GLTF_CUBIC,
     curves: &CURVES,
     ..defaults(VectorMethod::GltfCubic)
 };
 
-static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::HERMITE, curves).with(MethodInput::Numbers(numbers)),
-);
+static SHAPE: Shape = shape_of::<Hermite>(16);
+
+/// `((2t³-3t²+1) q0 + (t³-2t²+t) m0 + (3t²-2t³) q1 + (t³-t²) m1) / |…|`.
+///
+/// Numbers: `q0`, `m0`, `m1`, `q1`; the tangents are multiplied by the interval's length.
+struct Hermite;
+
+impl Formula for Hermite {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let one = S::all(1.0);
+        let rest = one - t;
+        let two = S::all(2.0);
+        let start = (one + two * t) * rest * rest;
+        let end = t * t * (S::all(3.0) - two * t);
+        let leaving = t * rest * rest;
+        let arriving = t * t * (t - one);
+        let keys = weighted(quaternion(numbers, 0), start, quaternion(numbers, 12), end);
+        let tangents = weighted(
+            quaternion(numbers, 4),
+            leaving,
+            quaternion(numbers, 8),
+            arriving,
+        );
+        normalised(weighted(keys, one, tangents, one))
+    }
+}
+
+static CURVES: CurveKind =
+    CurveKind::Smooth(SmoothCurves::new(&SHAPE, curves).with(MethodInput::Numbers(numbers)));
 
 /// The tangents with which an interval leaves its first key and reaches its last.
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {

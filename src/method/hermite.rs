@@ -3,12 +3,11 @@
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, put};
 use crate::fit::exact::handles::BetweenHandles;
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::BERNSTEIN;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurves, defaults};
-use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
@@ -17,21 +16,19 @@ use crate::tracks::set::Track;
 /// key is at rest.
 pub const HERMITE: Method = Method {
     name: "hermite",
-    summary: "given angular velocities at the keys; without them each key is at rest",
+    summary: "angular velocities are given at the keys; without them each key is at rest",
     formula: "a_i = q_i exp(ω_i h_i/6), b_i = q_i exp(-ω_i h_{i-1}/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
     continuity: Continuity::C1,
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(160.0, 2.8),
-    reference: reference::two_keys::HERMITE,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
-static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::BERNSTEIN, curves).with(MethodInput::Numbers(numbers)),
-);
+static CURVES: CurveKind =
+    CurveKind::Smooth(SmoothCurves::new(&BERNSTEIN, curves).with(MethodInput::Numbers(numbers)));
 
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     [interval, interval + 1].map(|key| {

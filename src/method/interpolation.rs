@@ -192,7 +192,7 @@ impl ReferenceCurve {
             ..
         } = interpolation;
         let path = method.signs.unwrap_or(path);
-        let curve = Self::of_track(method.reference, path, ends, interpolation.tcb, track);
+        let curve = Self::of_track(method.reference(), path, ends, interpolation.tcb, track);
         match interpolation.speed {
             Speed::AsKeyed => curve,
             Speed::Constant => curve.at_constant_speed(),

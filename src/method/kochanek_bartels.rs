@@ -1,7 +1,7 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
@@ -10,7 +10,6 @@ use crate::method::vector_method::VectorMethod;
 use crate::method::{
     Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults, ends,
 };
-use crate::reference;
 use crate::tracks::set::Track;
 
 /// Kochanek-Bartels, with [`Tcb`](crate::tracks::set::key_data::Tcb) for each key
@@ -25,13 +24,12 @@ pub const KOCHANEK_BARTELS: Method = Method {
     continuity: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(860.0, 3.2),
-    reference: reference::handles::KOCHANEK_BARTELS,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::DE_CASTELJAU, ends::curves::<KochanekBartelsRule>)
+    SmoothCurves::new(&DE_CASTELJAU, ends::curves::<KochanekBartelsRule>)
         .with(MethodInput::Numbers(numbers)),
 );
 

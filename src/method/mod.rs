@@ -47,8 +47,8 @@ use std::str::FromStr;
 
 use crate::curve::options::{Ends, KeySigns};
 use crate::fit::block::{Intervals, TrackStretch};
+use crate::fit::exact::fit::Shape;
 use crate::fit::exact::handles::{ExactSteps, HandleRule};
-use crate::fit::exact::shape::Shape;
 use crate::fit::fast::handles::HandlesF32;
 use crate::fit::fast::long_tangents::set_long;
 use crate::fit::tangent_weights::WeightRule;
@@ -122,8 +122,6 @@ pub struct Method {
     pub cost: Cost,
     /// The method for translations and scales where this one is asked for everything.
     pub vector_method: VectorMethod,
-    /// Its textbook definition in f64.
-    pub reference: Definition,
     /// How its curves follow from the keys. This is a reference to a static because every crate
     /// that names a constant would compile its functions again, and all that they call, for each
     /// vector width.
@@ -131,7 +129,7 @@ pub struct Method {
 }
 
 /// What most methods have in common, and how they are unless they say otherwise. Names, formula,
-/// textbook definition, curves and the method for vectors are each method's own.
+/// curves and the method for vectors differ from method to method.
 const fn defaults(vector_method: VectorMethod) -> Method {
     Method {
         name: "",
@@ -148,7 +146,6 @@ const fn defaults(vector_method: VectorMethod) -> Method {
         ends: Ends::Parabolic,
         signs: None,
         cost: Cost::new(0.0, 0.0),
-        reference: reference::two_keys::STEP,
         curves: &CurveKind::Steps,
         vector_method,
     }
@@ -306,7 +303,27 @@ pub enum Keys {
     Any,
 }
 
+/// A method without a definition in the reference is an error of the compiler.
+const _: () = {
+    let mut i = 0;
+    while i < METHODS.len() {
+        let definition = reference::definition(METHODS[i].name);
+        assert!(
+            definition.is_some(),
+            "a method has no Definition in src/reference/"
+        );
+        i += 1;
+    }
+};
+
 impl Method {
+    /// Its textbook definition in f64. A method does not carry it: only programs that compare with the
+    /// reference link it.
+    #[must_use]
+    pub fn reference(&self) -> Definition {
+        reference::definition(self.name).expect("every method has one, as is checked above")
+    }
+
     /// How smooth it is, in words.
     #[must_use]
     pub fn smoothness(&self) -> String {

@@ -1,29 +1,27 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::math::quaternion::{Real as _, dot, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
 /// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
-    summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
+    summary: "historical, for comparison only; three times too fast at its keys",
     formula: "a_i = Bisect(Double(q_{i-1}, q_i), q_{i+1}), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach I",
     cost: Cost::new(1500.0, 4.1),
-    reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
-    Shape::DE_CASTELJAU,
+    &DE_CASTELJAU,
     ends::curves::<Bisector<1>>,
 ));
 

@@ -1,26 +1,24 @@
 //! Shoemake's construction, as published.
 
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::method::shoemake::Bisector;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
 /// time steps, so its velocity jumps on uneven keys.
 pub const SHOEMAKE_1985: Method = Method {
     name: "shoemake-1985",
-    summary: "Bezier curves of rotations as their author has them; smooth through evenly spaced keys",
+    summary: "Bezier curves of rotations as published; smooth through evenly spaced keys",
     formula: "a_i = slerp(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1}), 1/3), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985, Animating rotation with quaternion curves, section 4.4",
     keeps_constant_velocity: Keys::Even,
     cost: Cost::new(530.0, 2.8),
-    reference: reference::handles::SHOEMAKE_1985,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
-    Shape::DE_CASTELJAU,
+    &DE_CASTELJAU,
     ends::curves::<Bisector<3>>,
 ));

@@ -1,26 +1,24 @@
 //! Shoemake's second approach, as lectured.
 
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::method::shoemake::Bisector;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
 /// one and a half times too fast;
 /// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
-    summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",
+    summary: "historical, for comparison only; 1.5 times too fast at its keys",
     formula: "a_i = Bisect(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1})), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach II",
     cost: Cost::new(700.0, 3.1),
-    reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
-    Shape::DE_CASTELJAU,
+    &DE_CASTELJAU,
     ends::curves::<Bisector<2>>,
 ));

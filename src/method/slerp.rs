@@ -3,10 +3,9 @@
 use crate::curve::formula::RotationVectorNumbers;
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::ROTATION_VECTOR;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults};
-use crate::reference;
 use crate::shader::Form;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.
@@ -20,12 +19,11 @@ pub const SLERP: Method = Method {
     uses_neighbours: false,
     form: Form::Arc,
     cost: Cost::new(10.0, 1.7),
-    reference: reference::two_keys::SLERP,
     curves: &CURVES,
     ..defaults(VectorMethod::Linear)
 };
 
-static CURVES: CurveKind = CurveKind::Arcs(SmoothCurves::new(Shape::ROTATION_VECTOR, curves));
+static CURVES: CurveKind = CurveKind::Arcs(SmoothCurves::new(&ROTATION_VECTOR, curves));
 
 /// The formula `q0 exp(t log(q0⁻¹ q1))`, for quantities that need derivatives.
 fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {

@@ -1,28 +1,46 @@
 //! Spherical quadrangle interpolation.
 
+use crate::curve::formula::{Formula, NUMBERS, quaternion, slerp};
+use crate::fit::exact::fit::Shape;
 use crate::fit::exact::handles::{BothSides, EndHandle, HandlePair, HandleRule};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::shape::shape_of;
+use crate::math::dual::Scalar;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
-use crate::reference;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
 pub const SQUAD: Method = Method {
     name: "squad",
-    summary: "smooth through evenly spaced keys, as many engines have it",
+    summary: "smooth through evenly spaced keys; common in engines",
     formula: "slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t)), s_i = q_i exp(-(log(q_i⁻¹ q_{i+1}) + log(q_i⁻¹ q_{i-1}))/4)",
     source: "Shoemake 1987, Quaternion calculus and fast animation",
     keeps_constant_velocity: Keys::Even,
     cost: Cost::new(300.0, 2.9),
-    reference: reference::handles::SQUAD,
     curves: &CURVES,
     ..defaults(VectorMethod::BesselOverhauser)
 };
 
-static CURVES: CurveKind =
-    CurveKind::Smooth(SmoothCurves::new(Shape::SQUAD, ends::curves::<SquadRule>));
+static SHAPE: Shape = shape_of::<Squad>(16);
+
+/// Spherical quadrangle interpolation (Shoemake 1987):
+/// `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))`.
+///
+/// Numbers: `q0`, `s0`, `s1`, `q1`. The arcs are those that the signs give.
+struct Squad;
+
+impl Formula for Squad {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let along = slerp(quaternion(numbers, 0), quaternion(numbers, 12), t);
+        let beside = slerp(quaternion(numbers, 4), quaternion(numbers, 8), t);
+        let weight = S::all(2.0) * t * (S::all(1.0) - t);
+        slerp(along, beside, weight)
+    }
+}
+
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(&SHAPE, ends::curves::<SquadRule>));
 
 /// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
 struct SquadRule;

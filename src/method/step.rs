@@ -2,12 +2,11 @@
 
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Method, defaults};
-use crate::reference;
 
 /// Holds each key until the next: for things that switch and do not move.
 pub const STEP: Method = Method {
     name: "step",
-    summary: "holds each key until the next; for what switches",
+    summary: "holds each key until the next; for switched values",
     formula: "q(t) = q0",
     source: "glTF 2.0, section 3.11, STEP",
     continuity: Continuity::Jumps,
@@ -15,7 +14,6 @@ pub const STEP: Method = Method {
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(3.4, 0.87),
-    reference: reference::two_keys::STEP,
     curves: &CurveKind::Steps,
     ..defaults(VectorMethod::Step)
 };

@@ -1,6 +1,7 @@
 //! What a crowd's evaluation stores, and how large it is.
 
 use crate::names::names;
+use crate::shader::{CrowdChange, CrowdEntry};
 
 /// What is stored of every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -66,4 +67,39 @@ impl CrowdOutput {
     pub fn bytes(self) -> usize {
         self.vector_count() * if self.is_half { 8 } else { 16 }
     }
+}
+
+/// What a device needs to know for an evaluation.
+pub(crate) struct CrowdFrame<'a> {
+    /// The clock, ticks.
+    pub(crate) clock: u64,
+    pub(crate) changes: EntryChanges<'a>,
+    /// How many instances are evaluated.
+    pub(crate) instances: u32,
+    pub(crate) visible: VisibleInstances<'a>,
+}
+
+/// The entries that changed since the evaluation before.
+pub(crate) enum EntryChanges<'a> {
+    None,
+    /// Those from an index on, one after another; some of them may be as they were.
+    Range(usize, &'a [CrowdEntry]),
+    /// Those here and there; no more than [`listed_changes`].
+    List(&'a [CrowdChange]),
+}
+
+/// Which instances are evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VisibleInstances<'a> {
+    All,
+    /// Those of the list that the device has.
+    AsBefore,
+    /// Those of a list that the device does not have yet.
+    List(&'a [u32]),
+}
+
+/// The most changes that are listed, of so many entries. Of more, all entries from the first that changed to the last
+/// are written.
+pub(crate) fn listed_changes(entries: usize) -> usize {
+    entries.div_ceil(4)
 }

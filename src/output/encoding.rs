@@ -2,6 +2,7 @@
 //! called, what it looks like in memory, and how it is made and read on the CPU.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use glam::{Mat3, Quat};
@@ -22,6 +23,8 @@ pub(crate) struct Representation {
     component_type: ComponentType,
     shape: &'static [usize],
     components: &'static [&'static str],
+    /// Those of its components that are angles in degrees.
+    angles: Range<usize>,
     /// The largest angle between a rotation and what is read of it, radians; `None` if no rotations
     /// can be stored.
     pub(crate) error_bound: Option<f64>,
@@ -46,6 +49,7 @@ const QUATERNION: Representation = Representation {
     component_type: ComponentType::F32,
     shape: &[4],
     components: &["x", "y", "z", "w"],
+    angles: 0..0,
     error_bound: Some(0.0),
     takes_vectors: true,
     store: Store::F32,
@@ -189,6 +193,7 @@ representations! {
         name: "axis-angle",
         summary: "x y z of the axis, and degrees, 0 to 360",
         components: &["x", "y", "z", "degrees"],
+        angles: 3..4,
         store: Store::AxisAngle,
         encode: by!(axis_angle::store),
         decode: |number, _| {
@@ -248,6 +253,7 @@ representations! {
         summary: "three angles, degrees",
         shape: &[3],
         components: sequence.angle_names(),
+        angles: 0..3,
         store: Store::Euler,
         detail: sequence.detail(),
         encode: by!(euler::store),
@@ -332,7 +338,11 @@ impl FromStr for Encoding {
     type Err = UnknownNameError;
 
     fn from_str(name: &str) -> Result<Self, UnknownNameError> {
-        named("encoding", &Self::ALL, Self::name, name)
+        let mut found = named("encoding", &Self::ALL, Self::name, name);
+        if let Err(error) = &mut found {
+            error.known.dedup(); // those that differ by their options
+        }
+        found
     }
 }
 
@@ -368,10 +378,39 @@ impl Encoding {
         self.row().components
     }
 
+    /// Those of its numbers that are angles, in degrees: the last of an axis and an angle, all of Euler angles.
+    #[must_use]
+    pub fn angles(self) -> Range<usize> {
+        self.row().angles
+    }
+
     /// What each of its numbers is stored as.
     #[must_use]
     pub fn component_type(self) -> ComponentType {
         self.row().component_type
+    }
+
+    /// Every representation with every value of its options, in the order of [`Encoding::ALL`].
+    pub(crate) fn with_all_options() -> Vec<Self> {
+        let mut all = Vec::new();
+        for encoding in Self::ALL {
+            for order in MatrixOrder::ALL {
+                for sequence in EulerSequence::all() {
+                    let encoding = encoding.with(EncodingOptions { order, sequence });
+                    if !all.contains(&encoding) {
+                        all.push(encoding);
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// Those that a store of the kernels makes.
+    pub(crate) fn of_store(store: Store) -> Vec<Self> {
+        let mut all = Self::with_all_options();
+        all.retain(|encoding| encoding.row().store == store);
+        all
     }
 
     /// Whether its numbers are `x y z w`, in any precision.
@@ -467,6 +506,38 @@ mod tests {
             for (a, b) in rotation.iter().zip(decoded) {
                 assert!((a - b).abs() <= bound, "{encoding:?}: {a} {b}");
             }
+        }
+    }
+
+    #[test]
+    fn every_store_makes_an_encoding_whose_row_is_whole() {
+        for kernel in &crate::shader::KERNELS {
+            if let Some((_, _, store)) = kernel.segments {
+                assert!(!Encoding::of_store(store).is_empty(), "{store:?}");
+            }
+        }
+        let all = Encoding::with_all_options();
+        assert_eq!(
+            Encoding::of_store(Store::Euler).len(),
+            EulerSequence::all().len()
+        );
+        assert_eq!(
+            Encoding::of_store(Store::Matrix3x4).len(),
+            MatrixOrder::ALL.len()
+        );
+        for encoding in all {
+            let numbers = encoding.components().len();
+            assert_eq!(
+                encoding.shape().iter().product::<usize>(),
+                numbers,
+                "{encoding}"
+            );
+            assert!(encoding.angles().end <= numbers, "{encoding}");
+            assert_eq!(
+                encoding.bytes() % 4,
+                0,
+                "{encoding}: kernels store whole words"
+            );
         }
     }
 }

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
-use crate::output::pose_error::PoseError;
+use crate::output::pose_error::{PoseError, check_skeleton};
 use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
@@ -63,14 +63,7 @@ impl Engine {
             local.rotations.sample_count(),
         );
         check(local)?;
-        if skeleton.len() != tracks {
-            let joints = skeleton.len();
-            return Err(PoseError::Skeleton {
-                skeleton_tracks: joints,
-                tracks,
-            }
-            .into());
-        }
+        check_skeleton(skeleton.len(), tracks)?;
         if let Some(bind) = inverse_bind
             && bind.len() != tracks
         {

@@ -6,12 +6,14 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
-use crate::output::pose_error::{LARGEST_WEIGHT, PoseError};
+use crate::output::pose_error::{
+    PoseError, check_fraction, check_references, check_skeleton, check_weights,
+};
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
@@ -35,11 +37,7 @@ impl Engine {
             same_shape(first, layer, index)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
-        let is_refused = |weight: &f32| weight.is_nan() || weight.abs() > LARGEST_WEIGHT;
-        if let Some(layer) = weights.iter().position(is_refused) {
-            let weight = weights[layer];
-            return Err(PoseError::WeightNotFinite { layer, weight }.into());
-        }
+        check_weights(&weights)?;
         let mut gathered: Vec<Quat> = Vec::new();
         self.each_rotation(first, layers.len(), |device, start, output| {
             gathered.clear();
@@ -65,7 +63,7 @@ impl Engine {
     /// When their shapes differ, the weight lies outside, or the device fails.
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to, 1)?;
-        fraction(weight)?;
+        check_fraction(weight)?;
         self.each_rotation(from, 1, |device, start, output| {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
@@ -93,15 +91,8 @@ impl Engine {
         weight: f32,
     ) -> Result<Rotations, Error> {
         same_shape(base, layer, 1)?;
-        fraction(weight)?;
-        if reference.len() != base.track_count() {
-            let (reference_count, tracks) = (reference.len(), base.track_count());
-            return Err(PoseError::References {
-                references: reference_count,
-                tracks,
-            }
-            .into());
-        }
+        check_fraction(weight)?;
+        check_references(reference.len(), base.track_count())?;
         let mut repeated: Vec<[f32; 4]> = Vec::new();
         self.each_rotation(base, 1, |device, start, output| {
             let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
@@ -146,14 +137,7 @@ impl Engine {
     /// When the skeleton has not one link for each track, or the device fails.
     pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
         let (tracks, samples) = (local.track_count(), local.sample_count());
-        if skeleton.len() != tracks {
-            let joints = skeleton.len();
-            return Err(PoseError::Skeleton {
-                skeleton_tracks: joints,
-                tracks,
-            }
-            .into());
-        }
+        check_skeleton(skeleton.len(), tracks)?;
         let links = skeleton.links();
         self.on_device(|device| {
             let count = tracks.saturating_mul(samples).saturating_mul(2);
@@ -286,13 +270,6 @@ fn same_shape(first: &Rotations, other: &Rotations, layer: usize) -> Result<(), 
             shape,
             first,
         }),
-    }
-}
-
-fn fraction(weight: f32) -> Result<(), PoseError> {
-    match (0.0..=1.0).contains(&weight) {
-        true => Ok(()),
-        false => Err(PoseError::WeightOutOfRange { weight }),
     }
 }
 

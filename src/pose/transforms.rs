@@ -1,7 +1,7 @@
 //! Rotations with the translations and the scales beside them.
 
-use crate::clip::Clip;
 use crate::engine::Engine;
+use crate::engine::clip::Clip;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::fit::exact::curve::{INDISTINCT, IntervalCurve};
+use crate::fit::exact::fit::{INDISTINCT, IntervalCurve};
 use crate::fit::motion::arc_length::ArcLengths;
 use crate::math::quaternion::round_quat;
 use crate::prepare::fitting::Fitting;

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 
 use crate::curve::options::Ends;
 use crate::fit::block::{CONTEXT, Intervals, LANES, ROW_LEN, TrackStretch};
-use crate::fit::exact::curve::INDISTINCT;
+use crate::fit::exact::fit::INDISTINCT;
 use crate::fit::fast::fit_range::{LONGEST_DEGREE_8, LONGEST_WHOLE, WHOLE, WHOLE_DEGREE_8};
 use crate::fit::fast::handles::{
     CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT, SPARE_LANES,

@@ -3,10 +3,8 @@
 
 use crate::curve::options::Quantity;
 use crate::fit::block::Intervals;
-use crate::fit::exact::curve::IntervalCurve;
 use crate::fit::exact::cut::Cutter;
-use crate::fit::exact::fit::{FitBlock, Tier, tier};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::fit::{FitBlock, IntervalCurve, Shape, Tier};
 use crate::prepare::prepared::{CurveSlot, Prepared};
 use crate::threads::stop;
 use crate::time::runs::NONE;
@@ -47,7 +45,7 @@ impl Fitting {
     /// The lane is read later, by [`Fitting::copy_queued`], which comes before the lanes of `curves` change.
     #[inline]
     pub(crate) fn queue(&mut self, curves: &Intervals, lane: usize, slot: CurveSlot) {
-        let queue = match tier(curves.squared_extents[lane]) {
+        let queue = match self.shape.tier(curves.squared_extents[lane]) {
             Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {

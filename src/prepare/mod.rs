@@ -13,7 +13,7 @@
 //!
 //! | type | what it is |
 //! |---|---|
-//! | [`batch::Batch`] | the intervals that are prepared together: whole tracks, or some of a long one |
+//! | [`preparation::Batch`] | the intervals that are prepared together: whole tracks, or some of a long one |
 //! | [`preparation::Preparation`] | applies an interpolation to a batch, by one of three strategies |
 //! | [`arcs::ArcPreparation`] | the strategy for slerp: up to 64 arcs at once |
 //! | [`smooth::SmoothPreparation`] | the strategy for all other curves: blocks of 128 intervals |
@@ -52,7 +52,6 @@
 //! ```
 
 pub(crate) mod arcs;
-pub(crate) mod batch;
 pub(crate) mod clip_data;
 pub(crate) mod constant_speed;
 pub(crate) mod error;
@@ -60,6 +59,5 @@ pub(crate) mod fast;
 pub(crate) mod fitting;
 pub(crate) mod preparation;
 pub(crate) mod prepared;
-pub(crate) mod request;
 pub(crate) mod smooth;
 pub(crate) mod vectors;

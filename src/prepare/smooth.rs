@@ -5,12 +5,14 @@ use std::ops::Range;
 
 use bytemuck::Zeroable as _;
 
+use crate::curve::formula::{RotationVectorNumbers, clamped, quantity_value};
 use crate::curve::options::{Axes, Ends, Quantity, Speed};
 use crate::fit::block::{CONTEXT, Intervals, LANES, TrackStretch, at, put};
 use crate::fit::constant_velocity::arc_polynomial;
-use crate::fit::exact::curve::IntervalCurve;
+use crate::fit::exact::fit::IntervalCurve;
 use crate::fit::exact::handles::FindFrames;
-use crate::fit::motion::derivatives::clamped;
+use crate::fit::exact::shape::ROTATION_VECTOR;
+use crate::math::dual::Dual;
 use crate::math::quaternion::{Vector, rotated, round_quat};
 use crate::method::interpolation::Interpolation;
 use crate::method::{CurveKind, MethodInput, SmoothCurves};
@@ -387,9 +389,8 @@ impl SmoothPreparation {
             let Some(lane) = lane else { continue };
             let is_extrapolated = self.extrapolates(outside);
             if is_extrapolated {
-                prepared
-                    .exact
-                    .push(self.curve(lane).extended_from(end as f64));
+                let extended = extended_from(&self.curve(lane), end as f64);
+                prepared.exact.push(extended);
                 let index = prepared.exact.len() as u32 - 1;
                 let extension = prepared.parts[stretch.part].extension_mut(stretch.span);
                 *[&mut extension.from_before, &mut extension.from_after][end] = index;
@@ -420,4 +421,19 @@ impl SmoothPreparation {
             }
         }
     }
+}
+
+/// The curve that continues from `t` at the constant angular velocity that this one has there;
+/// its parameter is in seconds.
+fn extended_from(curve: &IntervalCurve, t: f64) -> IntervalCurve {
+    let rotation = curve.moving(Dual::parameter(t));
+    let velocity = Quantity::Velocity(Axes::Body);
+    let [x, y, z, _] = quantity_value(velocity, rotation, curve.rate);
+    let half = [0.5 * x, 0.5 * y, 0.5 * z];
+    let numbers = RotationVectorNumbers {
+        base: rotation.map(|dual| dual.value),
+        linear: half,
+        ..RotationVectorNumbers::default()
+    };
+    IntervalCurve::new(&ROTATION_VECTOR, numbers.into(), curve.quantity, 1.0)
 }

@@ -8,8 +8,8 @@ use glam::{DVec3, Vec3};
 
 use crate::curve::formula::LineNumbers;
 use crate::curve::options::Quantity;
-use crate::fit::exact::curve::IntervalCurve;
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::fit::IntervalCurve;
+use crate::fit::exact::shape::LINE;
 use crate::math::canonical::{canonical, round_f32};
 use crate::math::quaternion::{ratio, round_quat};
 use crate::method::interpolation::Interpolation;
@@ -147,5 +147,5 @@ fn line(from: DVec3, slope: DVec3) -> IntervalCurve {
         start: [from.x, from.y, from.z, 0.0],
         slope: [slope.x, slope.y, slope.z, 0.0],
     };
-    IntervalCurve::new(Shape::LINE, numbers.into(), Quantity::Rotation, 1.0)
+    IntervalCurve::new(&LINE, numbers.into(), Quantity::Rotation, 1.0)
 }

@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3, DVec4};
 
 use crate::curve::options::{Ends, KeySigns};
-use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::reference::curve::ReferenceCurve;
+use crate::reference::handles::BESSEL_OVERHAUSER;
 use crate::reference::quaternion::slerp;
 use crate::reference::vector::VectorCurve;
 
@@ -53,9 +53,8 @@ impl Value for DQuat {
 
     fn bessel_overhauser(times: &[f64], keys: &[Self]) -> Box<dyn Fn(f64) -> Self> {
         let keys: Vec<_> = keys.iter().map(|key| key.as_quat()).collect();
-        let definition = BESSEL_OVERHAUSER.reference;
         let curve = ReferenceCurve::new(
-            definition,
+            BESSEL_OVERHAUSER,
             KeySigns::Shortest,
             Ends::Parabolic,
             times,

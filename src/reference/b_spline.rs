@@ -10,8 +10,9 @@ use crate::reference::track::ReferenceTrack;
 use crate::reference::two_keys::with_frozen_ends;
 
 /// The cumulative cubic B-spline.
-pub(crate) const B_SPLINE: Definition =
-    Definition::new(|track, ends| with_frozen_ends(track, ends, |i| b_spline(track, ends, i)));
+pub(crate) const B_SPLINE: Definition = Definition::new("b-spline", |track, ends| {
+    with_frozen_ends(track, ends, |i| b_spline(track, ends, i))
+});
 
 fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;

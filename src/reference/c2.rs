@@ -12,7 +12,7 @@ use crate::reference::track::ReferenceTrack;
 use crate::reference::two_keys::smooth;
 
 /// Cubic rotation vectors with continuous angular acceleration.
-pub(crate) const C2: Definition = Definition::new(|track, ends| {
+pub(crate) const C2: Definition = Definition::new("c2", |track, ends| {
     let velocities = velocities(track, ends);
     smooth(track, ends, |i| Segment::RotationVector {
         base: track.keys[i],

@@ -12,22 +12,28 @@ use crate::reference::track::ReferenceTrack;
 use crate::tracks::set as tracks;
 use crate::tracks::set::key_data::Tcb;
 
-/// A method by the book: how the curve of a track follows from its keys. Every method has one.
+/// A method by the book: how the curve of a track follows from its keys. Every method has one, under its name.
 #[derive(Clone, Copy)]
 pub struct Definition {
+    /// The name of the method.
+    pub(super) method: &'static str,
     /// The curve of every interval of a track.
     pub(super) segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>,
 }
 
 impl fmt::Debug for Definition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Definition").finish_non_exhaustive()
+        f.debug_tuple("Definition").field(&self.method).finish()
     }
 }
 
 impl Definition {
-    pub(crate) const fn new(segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>) -> Self {
-        Self { segments }
+    /// The definition of the method of that name.
+    pub(crate) const fn new(
+        method: &'static str,
+        segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>,
+    ) -> Self {
+        Self { method, segments }
     }
 }
 

@@ -6,12 +6,24 @@ use glam::{DQuat, DVec3};
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
 use crate::reference::quaternion::{
-    exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,
+    exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp, squad,
 };
 use crate::reference::segment::{Segment, cumulative};
 use crate::reference::track::ReferenceTrack;
 use crate::reference::two_keys::smooth;
 use crate::tracks::set::key_data::Tcb;
+
+/// The definitions of this file.
+pub(super) const DEFINITIONS: &[Definition] = &[
+    CATMULL_ROM,
+    BESSEL_OVERHAUSER,
+    BESSEL_OVERHAUSER_MEAN,
+    KOCHANEK_BARTELS,
+    SQUAD,
+    SHOEMAKE,
+    SHOEMAKE_2,
+    SHOEMAKE_1985,
+];
 
 /// How one method finds the handles of its curves.
 #[derive(Clone, Copy)]
@@ -38,7 +50,9 @@ impl HandleRule {
             parabolic: |whole, other| 2.0 / 3.0 * whole - other,
             natural: |rest, _| rest / 2.0,
             by_rate: |rate, _| rate / 3.0,
-            segment: |track, i, out, incoming| Segment::Bezier(controls(track, i, out, incoming)),
+            segment: |track, i, out, incoming| {
+                Segment::Between(bezier, controls(track, i, out, incoming))
+            },
         }
     }
 
@@ -126,85 +140,112 @@ impl Sides {
 /// A definition whose curves follow from these [`HandleRule`]: a macro, because a function pointer cannot
 /// capture them.
 macro_rules! by_handles {
-    ($handles:expr) => {
-        Definition::new(|track, ends| $handles.segments(track, ends))
+    ($method:literal, $handles:expr) => {
+        Definition::new($method, |track, ends| $handles.segments(track, ends))
     };
 }
 
 /// A cumulative cubic with tangents from the neighbouring keys.
-pub(crate) const CATMULL_ROM: Definition = by_handles!(HandleRule::cumulative(|sides| {
-    let sum = sides.l + sides.r;
-    let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
-    (sixth, sixth)
-}));
+pub(crate) const CATMULL_ROM: Definition = by_handles!(
+    "catmull-rom",
+    HandleRule::cumulative(|sides| {
+        let sum = sides.l + sides.r;
+        let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
+        (sixth, sixth)
+    })
+);
 
 /// A cumulative cubic with tangents of the parabola through three keys.
-pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(HandleRule::cumulative(|sides| {
-    let (before, after) = (sides.h_before, sides.h_after);
-    let (left, right) = (sides.l * (after / before), sides.r * (before / after));
-    let product = multiply(exponential(left), exponential(right));
-    let tangent = nearest_branch(product, left + right) / sides.both;
-    (tangent * (before / 3.0), tangent * (after / 3.0))
-}));
+pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(
+    "bessel-overhauser",
+    HandleRule::cumulative(|sides| {
+        let (before, after) = (sides.h_before, sides.h_after);
+        let (left, right) = (sides.l * (after / before), sides.r * (before / after));
+        let product = multiply(exponential(left), exponential(right));
+        let tangent = nearest_branch(product, left + right) / sides.both;
+        (tangent * (before / 3.0), tangent * (after / 3.0))
+    })
+);
 
 /// Bézier curves with the mean of the logarithms of the slopes.
-pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = by_handles!(HandleRule::bezier(|sides| {
-    let (before, after) = (sides.h_before, sides.h_after);
-    let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
-    (mean * (before / 3.0), mean * (after / 3.0))
-}));
+pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = by_handles!(
+    "bessel-overhauser-mean",
+    HandleRule::bezier(|sides| {
+        let (before, after) = (sides.h_before, sides.h_after);
+        let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
+        (mean * (before / 3.0), mean * (after / 3.0))
+    })
+);
 
 /// Bézier curves with tension, continuity and bias.
-pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(HandleRule::bezier(|sides| {
-    let Tcb {
-        tension,
-        continuity,
-        bias,
-    } = sides.tcb;
-    let (before, after) = (sides.h_before, sides.h_after);
-    let tight = 1.0 - tension;
-    // The names are those of Geier's documentation of `splines`.
-    let a = tight * (1.0 + continuity) * (1.0 + bias);
-    let b = tight * (1.0 - continuity) * (1.0 - bias);
-    let c = tight * (1.0 - continuity) * (1.0 + bias);
-    let d = tight * (1.0 + continuity) * (1.0 - bias);
-    let (rate_in, rate_out) = (sides.l / before, sides.r / after);
-    let mean = |u: f64, v: f64| (u * after * rate_in + v * before * rate_out) / sides.both;
-    (mean(c, d) * before / 3.0, mean(a, b) * after / 3.0)
-}));
+pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(
+    "kochanek-bartels",
+    HandleRule::bezier(|sides| {
+        let Tcb {
+            tension,
+            continuity,
+            bias,
+        } = sides.tcb;
+        let (before, after) = (sides.h_before, sides.h_after);
+        let tight = 1.0 - tension;
+        // The names are those of Geier's documentation of `splines`.
+        let a = tight * (1.0 + continuity) * (1.0 + bias);
+        let b = tight * (1.0 - continuity) * (1.0 - bias);
+        let c = tight * (1.0 - continuity) * (1.0 + bias);
+        let d = tight * (1.0 + continuity) * (1.0 - bias);
+        let (rate_in, rate_out) = (sides.l / before, sides.r / after);
+        let mean = |u: f64, v: f64| (u * after * rate_in + v * before * rate_out) / sides.both;
+        (mean(c, d) * before / 3.0, mean(a, b) * after / 3.0)
+    })
+);
 
 /// Spherical quadrangles. One starts with `log(q0⁻¹ q1) + 2 log(q0⁻¹ s0)`.
-pub(crate) const SQUAD: Definition = by_handles!(HandleRule {
-    inner: |&Sides { l, r, .. }| ((r - l) / 4.0, (l - r) / 4.0),
-    parabolic: |_, other| -other,
-    natural: |_, other| -other / 2.0,
-    by_rate: |rate, whole| (rate - whole) / 2.0,
-    segment: |track, i, out, incoming| Segment::Squad(controls(track, i, out, incoming)),
-});
+pub(crate) const SQUAD: Definition = by_handles!(
+    "squad",
+    HandleRule {
+        inner: |&Sides { l, r, .. }| ((r - l) / 4.0, (l - r) / 4.0),
+        parabolic: |_, other| -other,
+        natural: |_, other| -other / 2.0,
+        by_rate: |rate, whole| (rate - whole) / 2.0,
+        segment: |track, i, out, incoming| Segment::Between(
+            squad,
+            controls(track, i, out, incoming)
+        ),
+    }
+);
 
 /// Bézier curves, their control rotations the bisectors.
-pub(crate) const SHOEMAKE: Definition = by_handles!(HandleRule {
-    parabolic: |whole, other| {
-        let handle: DVec3 = 2.0 * whole - other;
-        // No arc leads to the opposite of a quaternion more than any other: the rotation itself then.
-        match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs() < 1e-5 {
-            true => whole,
-            false => handle,
-        }
-    },
-    ..HandleRule::bezier(|sides| shoemake(sides, |_, bisector| bisector))
-});
+pub(crate) const SHOEMAKE: Definition = by_handles!(
+    "shoemake",
+    HandleRule {
+        parabolic: |whole, other| {
+            let handle: DVec3 = 2.0 * whole - other;
+            // No arc leads to the opposite of a quaternion more than any other: the rotation itself then.
+            match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs()
+                < 1e-5
+            {
+                true => whole,
+                false => handle,
+            }
+        },
+        ..HandleRule::bezier(|sides| shoemake(sides, |_, bisector| bisector))
+    }
+);
 
 /// Bézier curves, their control rotations half way to the bisectors.
-pub(crate) const SHOEMAKE_2: Definition = by_handles!(HandleRule {
-    parabolic: |whole, other| whole - other,
-    ..HandleRule::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
-});
+pub(crate) const SHOEMAKE_2: Definition = by_handles!(
+    "shoemake-2",
+    HandleRule {
+        parabolic: |whole, other| whole - other,
+        ..HandleRule::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
+    }
+);
 
 /// Bézier curves, their control rotations a third of the way to the bisectors.
-pub(crate) const SHOEMAKE_1985: Definition = by_handles!(HandleRule::bezier(|sides| {
-    shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0))
-}));
+pub(crate) const SHOEMAKE_1985: Definition = by_handles!(
+    "shoemake-1985",
+    HandleRule::bezier(|sides| { shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0)) })
+);
 
 /// Handles whose outgoing control rotation `control_of` finds between the key and the bisector of its
 /// neighbours.
@@ -215,6 +256,12 @@ fn shoemake(sides: &Sides, control_of: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3
     let b = double(a, q);
     let to = |control: DQuat| logarithm(multiply(invert(q), control));
     (-to(b), to(a))
+}
+
+/// De Casteljau's construction on the sphere (Shoemake 1985).
+fn bezier([q0, a, b, q1]: [DQuat; 4], t: f64) -> DQuat {
+    let (first, second, third) = (slerp(q0, a, t), slerp(a, b, t), slerp(b, q1, t));
+    slerp(slerp(first, second, t), slerp(second, third, t), t)
 }
 
 /// The control rotations `q, q exp(out), r exp(-in), r`.

@@ -9,10 +9,11 @@
 //! **The way of the data.**
 //!
 //! 1. `ReferenceTrack`: a track's keys in f64, their signs aligned.
-//! 2. [`Definition`]: how a method's curves follow from a track, one a method. Most are a
-//!    `HandleRule`: two control rotations a key. Those that need only two keys are in
+//! 2. [`Definition`]: how a method's curves follow from a track, one a method, found by the method's
+//!    name. Most are a `HandleRule`: two control rotations a key. Those that need only two keys are in
 //!    `two_keys`, those with other equations in `b_spline` and `c2`.
-//! 3. `Segment`: the curve between two keys, as a formula. Its velocity is the formula's
+//! 3. `Segment`: the curve between two keys, as a formula: one of the few that several methods share, or
+//!    any function of four quaternions, which stands beside its definition. Its velocity is the formula's
 //!    where that is simple, else a difference of high order; its acceleration always is a difference.
 //! 4. [`ReferenceCurve`]: one track's segments, evaluated at any time, at constant speed by
 //!    `CurveLengths`.
@@ -44,3 +45,36 @@ pub use crate::reference::quaternion::{
     slerp_from_start_left, squad,
 };
 pub use crate::reference::vector::VectorCurve;
+
+/// The definitions of all methods.
+const DEFINITIONS: &[&[Definition]] = &[
+    two_keys::DEFINITIONS,
+    handles::DEFINITIONS,
+    &[b_spline::B_SPLINE, c2::C2],
+];
+
+/// The definition of the method of that name.
+pub(crate) const fn definition(method: &str) -> Option<Definition> {
+    let mut i = 0;
+    while i < DEFINITIONS.len() {
+        let mut j = 0;
+        while j < DEFINITIONS[i].len() {
+            let definition = DEFINITIONS[i][j];
+            if is_same(definition.method.as_bytes(), method.as_bytes()) {
+                return Some(definition);
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    None
+}
+
+/// Whether two names are the same; `==` is not there yet when constants are computed.
+const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    let mut i = 0;
+    while i < a.len() && i < b.len() && a[i] == b[i] {
+        i += 1;
+    }
+    i == a.len() && i == b.len()
+}

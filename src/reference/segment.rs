@@ -4,8 +4,7 @@ use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::reference::quaternion::{
-    exponential, from_parts, invert, logarithm, multiply, nlerp, normalise, rotated, slerp, squad,
-    vector,
+    exponential, from_parts, invert, logarithm, multiply, rotated, slerp, vector,
 };
 use crate::reference::track::ReferenceTrack;
 
@@ -14,20 +13,15 @@ use crate::reference::track::ReferenceTrack;
 pub(crate) enum Segment {
     Constant(DQuat),
     Arc(DQuat, DQuat),
-    Line(DQuat, DQuat),
     /// `base Π exp(w_j B_j(t))` (Kim, Kim, Shin 1995).
     Product {
         base: DQuat,
         w: [DVec3; 3],
         basis: Basis,
     },
-    /// De Casteljau's construction on the sphere (Shoemake 1985).
-    Bezier([DQuat; 4]),
-    /// `q0 s0 s1 q1` (Shoemake 1987).
-    Squad([DQuat; 4]),
-    /// Keys and tangents of each component (glTF 2.0, appendix C.5): `p0 m0 m1 p1`, the tangents
-    /// multiplied by the interval's length.
-    Cubic([DQuat; 4]),
+    /// Any formula of up to four quaternions, as of the two keys and two control rotations. Its velocity is a
+    /// difference.
+    Between(fn([DQuat; 4], f64) -> DQuat, [DQuat; 4]),
     /// `base exp(a t + b t² + c t³)`.
     RotationVector {
         base: DQuat,
@@ -145,20 +139,11 @@ impl Segment {
         match self {
             Self::Constant(key) => key,
             Self::Arc(from, to) => slerp(from, to, t),
-            Self::Line(from, to) => nlerp(from, to, t),
             Self::Product { base, w, basis } => {
                 let b = basis.values(t);
                 (0..3).fold(base, |q, j| multiply(q, exponential(w[j] * b[j])))
             }
-            Self::Bezier([q0, a, b, q1]) => {
-                let (first, second, third) = (slerp(q0, a, t), slerp(a, b, t), slerp(b, q1, t));
-                slerp(slerp(first, second, t), slerp(second, third, t), t)
-            }
-            Self::Squad(controls) => squad(controls, t),
-            Self::Cubic([p0, m0, m1, p1]) => {
-                let [from, out, to, incoming] = hermite(t);
-                normalise(p0 * from + m0 * out + p1 * to + m1 * incoming)
-            }
+            Self::Between(formula, controls) => formula(controls, t),
             Self::RotationVector { base, powers } => {
                 let v = powers[0] * t + powers[1] * (t * t) + powers[2] * (t * t * t);
                 multiply(base, exponential(v))

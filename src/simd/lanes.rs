@@ -99,6 +99,18 @@ pub(crate) trait Lanes: Number + Pod {
     /// Stores to [`Lanes::COUNT`] consecutive samples.
     fn store(self, samples: &mut [f32]);
 
+    /// Loads what [`Lanes::store_unordered`] stored.
+    #[inline(always)]
+    fn load_unordered(numbers: &[f32]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
+    }
+
+    /// Stores the numbers in this vector's order of lanes, which takes no instruction to convert.
+    #[inline(always)]
+    fn store_unordered(self, numbers: &mut [f32]) {
+        numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
+
     /// Loads the first [`Lanes::COUNT`] rotations, a vector for each of `x y z w`.
     #[inline(always)]
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {

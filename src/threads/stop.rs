@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The work was stopped ([`Stop`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the work was stopped before its end, as asked (Stop)")]
+#[error("the work was cancelled (Stop)")]
 pub struct StoppedError;
 
 thread_local! {

@@ -1,9 +1,11 @@
 //! From seconds to frames, in f64: where spans start and end among the frames, and how the
 //! parameter of a sample follows from its frame number.
 
+use std::ops::Range;
+
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
-use crate::time::track_copy::{CopyPosition, TrackCopy};
+use crate::time::moment::Moment;
 
 /// How the parameter of a frame within a span follows from the frame's number.
 pub(crate) struct InFrames {
@@ -187,5 +189,52 @@ impl FrameClock {
     /// Frames per second, as f64 has it.
     pub(crate) fn rate(self) -> f64 {
         self.rate.frames_in(1.0)
+    }
+}
+
+/// Consecutive samples that lie in one copy of a track.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TrackCopy {
+    pub(crate) samples: Range<usize>,
+    pub(crate) position: CopyPosition,
+}
+
+/// Where a copy lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CopyPosition {
+    /// It is the track itself.
+    Track,
+    /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
+    Frames {
+        first: f64,
+        at_first: f64,
+        backwards: bool,
+    },
+    /// The track's time at the copy's only sample: copies that are too short, or too far out, to be laid
+    /// out in frames.
+    At(Moment),
+}
+
+impl TrackCopy {
+    /// The track itself.
+    pub(crate) fn of_track(samples: Range<usize>) -> Self {
+        Self {
+            samples,
+            position: CopyPosition::Track,
+        }
+    }
+
+    pub(crate) fn is_track(&self) -> bool {
+        self.position == CopyPosition::Track
+    }
+
+    pub(crate) fn is_backwards(&self) -> bool {
+        matches!(
+            self.position,
+            CopyPosition::Frames {
+                backwards: true,
+                ..
+            }
+        )
     }
 }

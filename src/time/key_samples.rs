@@ -8,7 +8,7 @@ use bytemuck::Zeroable as _;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::FrameClock;
-use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
+use crate::time::runs::{IntervalBlock, IntervalBlocks};
 use crate::tracks::track_keys::TrackKeys;
 
 /// The key and the parameter of every frame of a window, and what they were found for.

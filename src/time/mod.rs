@@ -19,8 +19,8 @@
 //! | [`frame_rate::FrameRate`] | frames per second, as an exact ratio |
 //! | [`frame_clock::FrameClock`] | from key times to frame coordinates, for a track or one of its copies |
 //! | [`moment::Moment`] | an exact time as the sum of two f64, for copies far from the track |
-//! | [`track_copy::TrackCopy`] | consecutive samples in one copy of a track that repeats |
-//! | [`interval_blocks::IntervalBlock`] | frame coordinates of 32 intervals, and the samples in each |
+//! | [`frame_clock::TrackCopy`] | consecutive samples in one copy of a track that repeats |
+//! | [`runs::IntervalBlock`] | frame coordinates of 32 intervals, and the samples in each |
 //! | [`spans::Spans`], [`spans::TrackPart`] | where in time the segments of prepared tracks lie |
 //! | [`runs::Run`] | consecutive samples with one source: the unit of work of every device |
 //! | [`key_samples::FramePlan`] | for each frame the key before it, where there are no segments |
@@ -52,12 +52,10 @@ pub(crate) mod error;
 pub(crate) mod frame_clock;
 pub(crate) mod frame_rate;
 pub(crate) mod frames;
-pub(crate) mod interval_blocks;
 pub(crate) mod key_samples;
 pub(crate) mod moment;
 pub(crate) mod runs;
 pub(crate) mod spans;
 pub(crate) mod time_base;
 pub(crate) mod times;
-pub(crate) mod track_copy;
 pub(crate) mod wrap;

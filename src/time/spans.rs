@@ -7,13 +7,13 @@ use bytemuck::Zeroable as _;
 
 use crate::math::canonical::round_f32;
 use crate::time::error::SampleTimesError;
-use crate::time::frame_clock::{FrameClock, finite_scale};
+use crate::time::frame_clock::{CopyPosition, FrameClock, TrackCopy, finite_scale};
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::time::moment::Moment;
-use crate::time::runs::{Affine, Distance, Emit, NONE, Parameter, Run, RunSource};
+use crate::time::runs::{
+    Affine, Distance, Emit, IntervalBlock, IntervalBlocks, NONE, Parameter, Run, RunSource,
+};
 use crate::time::times::interval_at;
-use crate::time::track_copy::{CopyPosition, TrackCopy};
 
 /// Spans of tracks' time, each from its start to the start of the next one. Each field has a list
 /// of its own, because many spans are met with the samples at once, in vector lanes.

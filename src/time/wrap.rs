@@ -6,11 +6,10 @@ use std::ops::Range;
 use rayon::iter::Either;
 
 use crate::names::names;
-use crate::time::frame_clock::{FrameStart, rounding};
+use crate::time::frame_clock::{CopyPosition, FrameStart, TrackCopy, rounding};
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::moment::{InCopy, Moment, Period};
-use crate::time::track_copy::{CopyPosition, TrackCopy};
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

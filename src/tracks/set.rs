@@ -10,10 +10,11 @@ pub(crate) mod vectors;
 
 use std::ops::Range;
 
-use glam::{DVec3, Quat};
+use glam::{DQuat, DVec3, Quat};
 
-use crate::tracks::check::{check_times, unit_key};
-use crate::tracks::error::TrackError;
+use crate::math::canonical::canonical;
+use crate::math::quaternion::unit_f32;
+use crate::tracks::error::{LATEST, NORM_TOLERANCE, TrackError};
 use crate::tracks::rotation::Rotation;
 use crate::tracks::set::key_data::{KeyData, Tcb};
 use crate::tracks::set::vectors::VectorTracks;
@@ -352,6 +353,103 @@ impl TrackSet {
         };
         self.span = Some((first, last));
     }
+}
+
+pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
+    if times.len() != keys {
+        return Err(TrackError::LengthMismatch {
+            track,
+            keys,
+            times: times.len(),
+        });
+    }
+    if times.is_empty() {
+        return Err(TrackError::Empty { track });
+    }
+    // Numbers that increase between two that are in range are in range, and finite. The loop goes to
+    // the end in any case, so that it is compiled to vectors.
+    let increase = |all: bool, pair: &[f64]| all & (pair[0] < pair[1]);
+    let (first, last) = (times[0], times[keys - 1]);
+    if first >= -LATEST && last <= LATEST && times.windows(2).fold(true, increase) {
+        return Ok(());
+    }
+    if let Some(key) = times.iter().position(|time| !time.is_finite()) {
+        return Err(TrackError::TimeNotFinite {
+            track,
+            key,
+            time: times[key],
+        });
+    }
+    if let Some(i) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        return Err(TrackError::TimeNotIncreasing {
+            track,
+            key: i + 1,
+            time: times[i + 1],
+            previous: times[i],
+        });
+    }
+    match times.iter().position(|time| time.abs() > LATEST) {
+        Some(key) => Err(TrackError::TimeOutOfRange {
+            track,
+            key,
+            time: times[key],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses data beside the rotations of which there is not one value for each key.
+pub(crate) fn check_length(
+    track: usize,
+    quantity: &'static str,
+    keys: usize,
+    values: usize,
+) -> Result<(), TrackError> {
+    if values == keys {
+        Ok(())
+    } else {
+        Err(TrackError::DataLength {
+            track,
+            quantity,
+            keys,
+            values,
+        })
+    }
+}
+
+/// Refuses data that is NaN or infinite at a key.
+pub(crate) fn check_finite<T>(
+    track: usize,
+    quantity: &'static str,
+    values: &[T],
+    is_finite: impl Fn(&T) -> bool,
+) -> Result<(), TrackError> {
+    match values.iter().position(|value| !is_finite(value)) {
+        Some(key) => Err(TrackError::DataNotFinite {
+            track,
+            key,
+            quantity,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// A key whose norm differs from 1 by at most this is kept bit for bit, so that results which are
+/// written and loaded again do not change. Rounding to f32 moves the norm of a unit quaternion by
+/// at most about 2 × 2^-24.
+pub const UNIT_TOLERANCE: f64 = 4.0e-7;
+
+/// A key as it is kept: unit, and with its tiny components at +0.
+pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
+    let exact: DQuat = quat.as_dquat();
+    let norm = exact.length();
+    if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
+        return Err(TrackError::NotUnit { track, key, norm });
+    }
+    if (norm - 1.0).abs() <= UNIT_TOLERANCE {
+        return Ok(Quat::from_array(quat.to_array().map(canonical)));
+    }
+    Ok(unit_f32(exact))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::shader::{
     FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
 };
 use crate::simd::lanes::Number;
-use crate::twin::evaluate::Evaluate as _;
+use crate::twin::Evaluate as _;
 use crate::twin::quaternion::over;
 
 /// The function of the shader with this name does what `pose` of `shaders/poses/add.wgsl` does.

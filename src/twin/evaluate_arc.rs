@@ -5,8 +5,8 @@ use glam::Vec4;
 use crate::math::quaternion::dot;
 use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::evaluate::{Evaluate, Parameters};
 use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter};
+use crate::twin::{Evaluate, Parameters};
 
 impl Evaluate for ArcSegment {
     #[inline(always)]

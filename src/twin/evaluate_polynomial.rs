@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::evaluate::{Evaluate, Parameters};
+use crate::twin::{Evaluate, Parameters};
 
 impl Evaluate for PolynomialSegment {
     /// A quarter of the lanes: with all four components of a rotation side by side, the

@@ -1,14 +1,15 @@
 //! Twins: the functions of the shaders once more in Rust, with the same names and the same order of
-//! operations, so that the CPU gives the bits of an exact Vulkan device.
+//! operations, so that the CPU gives the bits of an exact Vulkan device. Those of `shaders/forms/` are
+//! an [`Evaluate`], which the loops over a run's samples call.
 
 pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;
 pub(crate) mod axis_angle;
+pub(crate) mod crowd_entries;
 pub(crate) mod crowd_layers;
 pub(crate) mod crowd_matrices;
 pub(crate) mod crowd_times;
 pub(crate) mod euler;
-pub(crate) mod evaluate;
 pub(crate) mod evaluate_arc;
 pub(crate) mod evaluate_polynomial;
 pub(crate) mod f16;
@@ -24,6 +25,89 @@ pub(crate) mod self_test;
 pub(crate) mod sine_cosine;
 pub(crate) mod small_angle;
 pub(crate) mod snorm16;
+
+use std::slice;
+
+use bytemuck::NoUninit;
+use glam::Vec4;
+
+use crate::simd::lanes::Lanes;
+
+/// The formula of one form, for segments of constants `x y z w`, that of the middle first. A run is
+/// evaluated in iterations, each of as many samples as are computed at once.
+pub(crate) trait Evaluate: NoUninit {
+    /// A number that is the same for all samples of a run.
+    #[inline(always)]
+    fn constant(&self) -> f32 {
+        0.0
+    }
+
+    /// Number of samples of an iteration.
+    fn samples<L: Lanes>() -> usize;
+
+    /// Loads the distances of an iteration's samples, in the lanes in which [`Evaluate::evaluate`] takes
+    /// their parameters.
+    fn load<L: Lanes>(distances: &[f32]) -> L;
+
+    /// The smallest number of iterations in a run for which it pays to begin samples several iterations
+    /// ahead (software pipelining), if it ever pays. A sample takes a long chain of dependent operations, and a processor
+    /// looks ahead no farther than an iteration or two.
+    const PIPELINE_FROM: Option<usize> = None;
+
+    /// Intermediate results of samples of later iterations.
+    type Begun<L: Lanes>: Copy;
+
+    /// An array of vectors with the rotations of an iteration's samples, side by side.
+    type Vectors<L: Lanes>: AsRef<[L]>;
+
+    /// Begins the samples of the first iteration and, if `IS_PIPELINED`, those of later ones.
+    fn begin<L: Lanes, const IS_PIPELINED: bool>(
+        constant: L,
+        parameters: &mut impl Parameters<L>,
+    ) -> Self::Begun<L>;
+
+    /// Finishes the samples of an iteration. Returns the intermediate results for the iterations after it,
+    /// and the rotations. With `FILTER` all components are made
+    /// [`canonical`](crate::math::canonical::canonical).
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
+        &self,
+        constant: L,
+        begun: Self::Begun<L>,
+        parameters: &mut impl Parameters<L>,
+    ) -> (Self::Begun<L>, Self::Vectors<L>);
+
+    /// The rotation at one parameter.
+    fn at(&self, parameter: f32) -> Vec4;
+
+    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any
+    /// sample, so that no filter is needed. Each component is a sum `m + r` with that of the
+    /// segment's middle, `m`. If |m| >= 2^-40, either |r| < |m|/2, and the sum is more than 2^-41;
+    /// or both are multiples of 2^-64, and so is the sum, which is +0 if they cancel. If all
+    /// constants of the component are +0, it is +0.
+    #[inline(always)]
+    fn is_canonical(&self) -> bool {
+        let constants: &[[f32; 4]] = bytemuck::cast_slice(slice::from_ref(self));
+        let middle = Vec4::from_array(constants[0]).abs();
+        middle.cmpge(Vec4::splat(COARSE)).all() || are_coarse_or_zero(constants)
+    }
+}
+
+/// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] is true for it.
+pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
+
+/// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is not
+/// inlined.
+#[inline(never)]
+fn are_coarse_or_zero(constants: &[[f32; 4]]) -> bool {
+    let is_zero = |c: usize| constants.iter().all(|constant| constant[c].to_bits() == 0);
+    (0..4).all(|c| constants[0][c].abs() >= COARSE || is_zero(c))
+}
+
+/// The parameters of a run's samples, an iteration at a time. After the last sample it gives more
+/// numbers, of which nothing is used.
+pub(crate) trait Parameters<L> {
+    fn next(&mut self) -> L;
+}
 
 #[cfg(test)]
 #[path = "../../tests/twins/mod.rs"]

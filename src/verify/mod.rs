@@ -220,7 +220,7 @@ pub fn verify(
 }
 
 /// By how much the norms of keys differ from 1, beyond what rounding a unit quaternion to f32 does.
-/// Keys within [`UNIT_TOLERANCE`](crate::tracks::check::UNIT_TOLERANCE) are kept as they are, and
+/// Keys within [`UNIT_TOLERANCE`](crate::tracks::set::UNIT_TOLERANCE) are kept as they are, and
 /// curves through them are as long as they.
 fn norm_excess(set: &TrackSet) -> f64 {
     let keys = set.tracks().flat_map(|track| track.keys);

@@ -3,22 +3,25 @@
 //! device sees, and copied on a queue of their own. Every bit is compared with the CPU's.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
-use glam::Quat;
+use glam::{Quat, Vec3};
 
-use crate::clip::Clip;
 use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
 use crate::device::{Device, VulkanDevice};
 use crate::engine::Engine;
+use crate::engine::clip::Clip;
 use crate::error::Error;
 use crate::gpu::application::{Application, ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::gpu::clip_target::ClipTarget;
 use crate::gpu::crowd::CrowdTarget;
 use crate::gpu::options::{EngineOptions, ReadBack, Transfer};
+use crate::gpu::pass_target::PassTarget;
 use crate::method::{self, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
+use crate::pose::pass::PosePass;
+use crate::pose::skeleton::Skeleton;
 use crate::time::frames::SampleTimes;
 use crate::verify::differences;
 use crate::verify::golden::GoldenError;
@@ -168,6 +171,12 @@ pub(crate) fn record(
     unsafe { crowd.record(target, commands) }
 }
 
+/// Records a pass.
+fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
+    // SAFETY: as in `record_clip`.
+    unsafe { target.record(commands) }
+}
+
 /// Works on a device that is made here as a renderer's is. With `validation` the Khronos validation layer
 /// watches both the application's calls and the engine's.
 ///
@@ -191,6 +200,7 @@ pub fn renderer(
     let methods = [method::SLERP, method::C2, method::BESSEL_OVERHAUSER];
     let methods = if validation { &methods[..2] } else { &methods };
     buffer_to_buffer(&mut renderer, &cpu, seed, methods, &mut report)?;
+    passes(&mut renderer, &cpu, seed, &mut report)?;
     frames_in_flight(&mut renderer, &cpu, seed, &mut report)?;
     report.validation_messages = renderer.application.validation_messages();
     if let Some(queue) = renderer.application.copy_queue {
@@ -290,6 +300,125 @@ fn buffer_to_buffer(
             report.checks.push(check);
         }
     }
+    Ok(())
+}
+
+/// Two clips are evaluated, and their poses blended, mixed and added, and a skeleton walked, in one submission; twice.
+fn passes(
+    renderer: &mut Renderer,
+    cpu: &Engine,
+    seed: u64,
+    report: &mut RendererReport,
+) -> Result<(), GoldenError> {
+    const TRACKS: usize = 37;
+    let layout = Layout::FrameMajor;
+    let frames = SampleTimes::fps(60).between(-0.5, 6.0);
+    let angles = [0.0, 1e-4, 0.02, 0.4, 2.0];
+    let (mut clips, mut layers) = (Vec::new(), Vec::new());
+    for (salt, method) in [(0x43, method::SLERP), (0x47, method::BESSEL_OVERHAUSER)] {
+        let set = random_set(seed ^ salt, TRACKS, 14, &angles, true);
+        clips.push(renderer.engine.upload(&set, method)?);
+        layers.push(
+            cpu.request(&set, method, &frames)
+                .layout(layout)
+                .evaluate()?,
+        );
+    }
+    let [from, to] = [&layers[0], &layers[1]];
+    let mut random = SeededRandom(seed ^ 0x53);
+    let mut coordinate = || random.between(-1.0, 1.0) as f32;
+    let reference: Vec<Quat> = from.as_quats()[..TRACKS].to_vec();
+    let parents = (0..TRACKS).map(|track| track.checked_sub(1 + track % 3));
+    let offsets = (0..TRACKS).map(|_| Vec3::from_array([(); 3].map(|()| coordinate())));
+    let skeleton = Skeleton::new(parents.collect(), offsets.collect()).map_err(Error::from)?;
+    let mixed = cpu.mix(from, to, 0.4)?;
+    let world = cpu.world(&mixed, &skeleton)?;
+    let expected: [Vec<u8>; 4] = [
+        bytemuck::cast_slice(cpu.blend(&[(to, 0.3), (from, 0.9)])?.as_quats()).to_vec(),
+        bytemuck::cast_slice(mixed.as_quats()).to_vec(),
+        bytemuck::cast_slice(cpu.add(from, to, &reference, 0.7)?.as_quats()).to_vec(),
+        bytemuck::cast_slice(world.as_slice()).to_vec(),
+    ];
+    let samples = from.sample_count();
+    let size = (from.as_quats().len() * size_of::<Quat>()) as u64;
+    let step = size.next_multiple_of(256);
+    let room = 5 * step + 2 * size;
+    let buffer = renderer.untouched(room)?;
+    let host = (renderer.application).buffer(room, ApplicationMemory::Host);
+    let host = host.map_err(Error::from)?;
+    let range = |index: u64| buffer.range(index * step, size);
+    let [from, to] = [range(0), range(1)];
+    let passes = [
+        PosePass::Blend {
+            layers: &[(to, 0.3), (from, 0.9)],
+        },
+        PosePass::Mix {
+            from,
+            to,
+            weight: 0.4,
+        },
+        PosePass::Add {
+            base: from,
+            layer: to,
+            reference: &reference,
+            weight: 0.7,
+        },
+        PosePass::World {
+            local: range(3),
+            skeleton: &skeleton,
+        },
+    ];
+    let mut of_clips = Vec::new();
+    for (clip, index) in clips.iter().zip(0..) {
+        let begins = (&buffer, index * step);
+        of_clips.push(Renderer::clip_target(
+            clip,
+            &frames,
+            (layout, Encoding::F32),
+            begins,
+        )?);
+    }
+    let mut of_passes = Vec::new();
+    for (pass, index) in passes.into_iter().zip(2..) {
+        let request = renderer.engine.pass(pass, TRACKS, samples, layout);
+        let result = buffer.range(index * step, request.bytes());
+        // SAFETY: the buffer is of the same application, and outlives the target, which is made after it.
+        of_passes.push(unsafe { request.target(result) }?);
+    }
+    let recorded = renderer.application.recorded(false, |commands| {
+        for target in &of_clips {
+            record_clip(target, commands, 0)?;
+        }
+        for target in &of_passes {
+            record_pass(target, commands);
+        }
+        Ok::<_, Error>(())
+    })?;
+    let names = ["blend", "mix", "add", "world"];
+    let mut checks = names.map(|pass| RendererCheck {
+        name: format!("passes from buffer to buffer, {pass}"),
+        values: 0,
+        differing: 0,
+    });
+    for _ in 0..2 {
+        (renderer.application)
+            .run(&[recorded])
+            .map_err(Error::from)?;
+        let found = renderer.bytes(&buffer, &host, room as usize)?;
+        for ((check, expected), index) in checks.iter_mut().zip(&expected).zip(2..) {
+            let start = (index * step) as usize;
+            let (found, behind) = found[start..].split_at(expected.len());
+            let beside = behind.len().min((step - size) as usize);
+            check.values += (expected.len() / size_of::<Quat>()) as u64;
+            check.differing += differences(found, expected, size_of::<Quat>()).0;
+            let changed = behind[..beside].iter().filter(|&&byte| byte != 0xff);
+            check.differing += changed.count() as u64;
+        }
+        renderer.fill(&buffer)?;
+    }
+    drop((of_clips, of_passes));
+    renderer.application.forget_commands();
+    report.checks.extend(checks);
     Ok(())
 }
 

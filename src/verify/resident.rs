@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::checks::check_encoding;
-use crate::clip::Clip;
 use crate::engine::Engine;
+use crate::engine::clip::Clip;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
 pub use crate::gpu::engine::write_rates::WriteRates;

@@ -147,3 +147,149 @@ fn thrown_away_frames_are_told() {
         application.device.free_memory(memory, None);
     }
 }
+
+/// Lists of instances and scattered changes in frames that are recorded: the rows of the CPU's whole crowd, in a
+/// buffer with room for some.
+#[test]
+fn frames_of_visible_instances_are_recorded() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    const INSTANCES: usize = 400;
+    const ROOM: usize = 40;
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let mut random = Random(37);
+    let library = library(&mut random, 7, &[method::SLERP, method::BESSEL_OVERHAUSER]);
+    for output in [
+        CrowdOutput::from(CrowdValues::Model),
+        CrowdOutput::half(CrowdValues::Rotations),
+    ] {
+        let (mut crowd, mut expected) = (
+            engine.crowd(&library, INSTANCES, 2).unwrap(),
+            cpu().crowd(&library, INSTANCES, 2).unwrap(),
+        );
+        let each = 7 * output.bytes();
+        let size = (ROOM * each) as u64;
+        let (buffer, memory) = application.buffer(size);
+        let range = VulkanBuffer {
+            buffer,
+            offset: 0,
+            size,
+        };
+        // SAFETY: the buffer is as it must be, and outlives the target; here and below.
+        let refused = unsafe { crowd.target(output, range) }.unwrap_err();
+        assert!(matches!(refused, CrowdError::Buffer { .. }));
+        crowd.set_visible(&[0]).unwrap();
+        let target = unsafe { crowd.target(output, range) }.unwrap();
+        let commands = Commands::new(&application);
+        for (frame, count) in [3, ROOM, 0, 17, 17].into_iter().enumerate() {
+            let list = super::visible::some(&mut random, INSTANCES, count);
+            crowd.set_visible(&list).unwrap();
+            for slot in 0..2 * INSTANCES {
+                if frame == 0 || random.next().is_multiple_of(30) {
+                    let plays = layer(&mut random, &library);
+                    crowd.set(slot / 2, slot % 2, plays).unwrap();
+                    expected.set(slot / 2, slot % 2, plays).unwrap();
+                }
+            }
+            crowd.advance(0.1).unwrap();
+            expected.advance(0.1).unwrap();
+            // SAFETY: the commands are in recording, and submitted below.
+            let recorded = commands.recorded(|command_buffer| {
+                unsafe { crowd.record(&target, command_buffer) }.unwrap();
+            });
+            commands.run(&[recorded]);
+            let found = application.bytes(memory, size);
+            let mut bytes = vec![0u8; INSTANCES * each];
+            match output.is_half {
+                true => {
+                    let values: &mut [[u16; 4]] = bytemuck::cast_slice_mut(&mut bytes);
+                    expected.evaluate_half_into(output.values, values).unwrap();
+                }
+                false => {
+                    let values: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut bytes);
+                    expected.evaluate_into(output.values, values).unwrap();
+                }
+            }
+            for (row, &instance) in found.chunks_exact(each).zip(&list) {
+                let of_all = &bytes[instance as usize * each..][..each];
+                assert!(row == of_all, "{output:?}, frame {frame}, {instance}");
+            }
+        }
+        let list = super::visible::some(&mut random, INSTANCES, ROOM + 1);
+        crowd.set_visible(&list).unwrap();
+        commands.recorded(|command_buffer| {
+            // SAFETY: nothing is recorded.
+            let refused = unsafe { crowd.record(&target, command_buffer) }.unwrap_err();
+            let needed = ((ROOM + 1) * each) as u64;
+            let offset = 0;
+            assert_eq!(
+                refused,
+                CrowdError::Buffer {
+                    offset,
+                    size,
+                    needed
+                }
+            );
+        });
+        drop(target);
+        // SAFETY: nothing is in flight.
+        unsafe {
+            application.device.destroy_buffer(buffer, None);
+            application.device.free_memory(memory, None);
+        }
+    }
+}
+
+/// Prints how long the host takes for a frame in which a hundredth of 10 000 instances changes: to set what they play
+/// and move the clock, and to record. Nothing is submitted.
+#[test]
+#[ignore = "a measurement"]
+fn how_long_a_frame_takes_to_record() {
+    const INSTANCES: usize = 10_000;
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let mut random = Random(73);
+    let library = library(&mut random, 60, &[method::SLERP, method::SLERP]);
+    for values in [CrowdValues::Rotations, CrowdValues::Model] {
+        let mut crowd = engine.crowd(&library, INSTANCES, 1).unwrap();
+        let size = (crowd.output_len(values) * 16) as u64;
+        let (buffer, memory) = application.buffer(size);
+        let range = VulkanBuffer {
+            buffer,
+            offset: 0,
+            size,
+        };
+        // SAFETY: the buffer is as it must be, and outlives the target.
+        let target = unsafe { crowd.target(values, range) }.unwrap();
+        let commands = Commands::new(&application);
+        let mut times: [Vec<u128>; 2] = Default::default();
+        for frame in 0..200 {
+            let started = std::time::Instant::now();
+            for index in 0..INSTANCES / 100 {
+                let instance = (index * 101 + frame * 37) % INSTANCES;
+                crowd.set(instance, 0, CrowdLayer::new(0)).unwrap();
+            }
+            crowd.advance(1.0 / 60.0).unwrap();
+            times[0].push(started.elapsed().as_nanos());
+            commands.recorded(|command_buffer| {
+                let started = std::time::Instant::now();
+                // SAFETY: never submitted.
+                unsafe { crowd.record(&target, command_buffer) }.unwrap();
+                times[1].push(started.elapsed().as_nanos());
+            });
+        }
+        let [set, recorded] = times.map(|mut times| {
+            times.sort_unstable();
+            times[times.len() / 2] as f64 / 1e3
+        });
+        println!("{values:?}: set {set:.1} µs, recorded {recorded:.1} µs");
+        drop((target, commands));
+        // SAFETY: nothing is in flight.
+        unsafe {
+            application.device.destroy_buffer(buffer, None);
+            application.device.free_memory(memory, None);
+        }
+    }
+}

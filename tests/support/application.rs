@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk;
 use tumble::vulkan::tuning::Mapping;
-use tumble::vulkan::{QueueLock, VulkanHandles, VulkanQueue};
+use tumble::vulkan::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 use tumble::{Engine, EngineOptions, Error};
 
 pub(crate) struct Application {
@@ -24,13 +24,30 @@ pub(crate) struct Application {
 
 impl Application {
     pub(crate) fn new() -> Self {
+        Self::on(0)
+    }
+
+    /// One on each device of this machine.
+    pub(crate) fn all() -> Vec<Self> {
+        let first = Self::new();
+        // SAFETY: the instance is alive.
+        let count = unsafe { first.instance.enumerate_physical_devices() }
+            .unwrap()
+            .len();
+        std::iter::once(first)
+            .chain((1..count).map(Self::on))
+            .collect()
+    }
+
+    /// On the device of that index.
+    fn on(index: usize) -> Self {
         // SAFETY: plain creation; everything is destroyed in `drop`.
         unsafe {
             let entry = ash::Entry::load().unwrap();
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
             let info = vk::InstanceCreateInfo::default().application_info(&application);
             let instance = entry.create_instance(&info, None).unwrap();
-            let physical_device = instance.enumerate_physical_devices().unwrap()[0];
+            let physical_device = instance.enumerate_physical_devices().unwrap()[index];
             let families = instance.get_physical_device_queue_family_properties(physical_device);
             let copies = |family: &vk::QueueFamilyProperties| {
                 use vk::QueueFlags as Flags;
@@ -126,9 +143,11 @@ impl Application {
     pub(crate) fn buffer(&self, size: u64) -> (vk::Buffer, vk::DeviceMemory) {
         // SAFETY: plain creation on a device that is alive.
         unsafe {
-            let info = vk::BufferCreateInfo::default()
-                .size(size)
-                .usage(vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_DST);
+            let info = vk::BufferCreateInfo::default().size(size).usage(
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::TRANSFER_DST
+                    | vk::BufferUsageFlags::TRANSFER_SRC,
+            );
             let buffer = self.device.create_buffer(&info, None).unwrap();
             let needs = self.device.get_buffer_memory_requirements(buffer);
             let types = self
@@ -161,6 +180,59 @@ impl Application {
             let bytes = bytes.to_vec();
             self.device.unmap_memory(memory);
             bytes
+        }
+    }
+}
+
+/// A buffer of an application's in memory that the host can see, freed when it is dropped.
+pub(crate) struct ApplicationBuffer<'a> {
+    application: &'a Application,
+    pub(crate) buffer: vk::Buffer,
+    memory: vk::DeviceMemory,
+    size: u64,
+}
+
+impl<'a> ApplicationBuffer<'a> {
+    /// One of these bytes.
+    pub(crate) fn of(application: &'a Application, bytes: &[u8]) -> Self {
+        let size = bytes.len() as u64;
+        let (buffer, memory) = application.buffer(size);
+        // SAFETY: nothing else uses the memory now.
+        unsafe {
+            let flags = vk::MemoryMapFlags::empty();
+            let device = &application.device;
+            let pointer = device.map_memory(memory, 0, size, flags).unwrap();
+            std::slice::from_raw_parts_mut(pointer.cast::<u8>(), bytes.len())
+                .copy_from_slice(bytes);
+            device.unmap_memory(memory);
+        }
+        Self {
+            application,
+            buffer,
+            memory,
+            size,
+        }
+    }
+
+    pub(crate) fn range(&self, offset: u64, size: u64) -> VulkanBuffer {
+        VulkanBuffer {
+            buffer: self.buffer,
+            offset,
+            size,
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        self.application.bytes(self.memory, self.size)
+    }
+}
+
+impl Drop for ApplicationBuffer<'_> {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in flight.
+        unsafe {
+            self.application.device.destroy_buffer(self.buffer, None);
+            self.application.device.free_memory(self.memory, None);
         }
     }
 }

@@ -1,10 +1,11 @@
 //! The kernels over a crowd, each function beside its twin.
 
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan, FORM_ARC,
-    FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, ROTATION, RUNS_BACKWARDS, SCALE,
-    START_BIAS, TRANSLATION,
+    CHANNELS, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdEntry, CrowdPosition,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, ROTATION,
+    RUNS_BACKWARDS, SCALE, START_BIAS, TRANSLATION,
 };
+use crate::twin::crowd_entries::{change, gather, scatter};
 use crate::twin::crowd_layers::{Layers, cubic, laid_over, rotation_added, sampled};
 use crate::twin::crowd_matrices::{
     Rows, affine_product, row_product, to_any_half, transform, transform_row,
@@ -24,6 +25,19 @@ const LOCALS: &str = "crowd_locals";
 impl Cells for CrowdEntry {
     fn put(&self, cells: &mut Vec<u64>) {
         let words = [
+            self.clip_and_weight,
+            self.speed_and_modes,
+            self.start,
+            self.anchor,
+        ];
+        words.put(cells);
+    }
+}
+
+impl Cells for CrowdChange {
+    fn put(&self, cells: &mut Vec<u64>) {
+        let words = [
+            self.index,
             self.clip_and_weight,
             self.speed_and_modes,
             self.start,
@@ -549,6 +563,58 @@ pub(super) fn layers() -> Vec<Twin> {
 
 fn rows(random: &mut Random) -> Rows {
     [random.vector(), random.vector(), random.vector()]
+}
+
+/// Entries of any words.
+fn any_entries(random: &mut Random, count: u32) -> Vec<CrowdEntry> {
+    let any = |random: &mut Random| CrowdEntry {
+        clip_and_weight: random.word(),
+        speed_and_modes: random.word(),
+        start: random.word(),
+        anchor: random.word(),
+    };
+    (0..count).map(|_| any(random)).collect()
+}
+
+pub(super) fn entries() -> Vec<Twin> {
+    vec![
+        with_globals("crowd_gather", "crowd_work", |random, trial| {
+            const INSTANCES: u32 = 5;
+            let layers = 1 + random.below(4);
+            let all = any_entries(random, INSTANCES * layers);
+            let visible: Vec<u32> = (0..4).map(|_| random.below(INSTANCES)).collect();
+            let (first_instance, index) = (random.below(2), random.below(3 * layers));
+            trial.argument(index);
+            let dispatch = CrowdDispatch {
+                first_instance,
+                layers,
+                ..CrowdDispatch::default()
+            };
+            dispatch.put(trial);
+            trial.global("all", all.as_slice().to_cells());
+            trial.global("visible", visible.clone());
+            trial.output("gathered");
+            trial.expect(vec![[UNTOUCHED; 4]; index as usize]);
+            let window = &visible[first_instance as usize..];
+            let mut gathered = gather(&all, window, layers as usize);
+            trial.expect(gathered.nth(index as usize).unwrap());
+        }),
+        with_globals("crowd_scatter", "crowd_work", |random, trial| {
+            const ENTRIES: u32 = 5;
+            let mut all = any_entries(random, ENTRIES);
+            let changes: Vec<CrowdChange> = any_entries(random, 4)
+                .iter()
+                .map(|entry| change(random.below(ENTRIES), entry))
+                .collect();
+            let index = random.below(4);
+            trial.argument(index);
+            trial.global("changes", changes.as_slice().to_cells());
+            trial.global("all", all.as_slice().to_cells());
+            trial.output("all");
+            scatter(&changes[index as usize], &mut all);
+            trial.expect(all);
+        }),
+    ]
 }
 
 pub(super) fn matrices() -> Vec<Twin> {

@@ -4,13 +4,13 @@ use crate::fit::constant_velocity::arc_component;
 use crate::math::quaternion::{cross3, dot, dot3, product};
 use crate::shader::{ArcSegment, PolynomialSegment, TangentWeights};
 use crate::simd::lanes::canonical;
+use crate::twin::Evaluate as _;
 use crate::twin::arc_between::arc_between;
 use crate::twin::arc_tangent::{
     arc_tangent, flushed, magnitude, reciprocal, reciprocal_root, root,
 };
 use crate::twin::axis_angle::axis_angle;
 use crate::twin::euler::{euler, wrapped};
-use crate::twin::evaluate::Evaluate as _;
 use crate::twin::evaluate_arc::norm_squared;
 use crate::twin::evaluate_polynomial::polynomial;
 use crate::twin::f16::to_half;

@@ -11,7 +11,7 @@ use crate::shader::{
 };
 use crate::simd::dispatch::in_lanes;
 use crate::time::runs::Affine;
-use crate::twin::evaluate::Evaluate;
+use crate::twin::Evaluate;
 
 use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;

@@ -22,7 +22,7 @@ use crate::method::slerp::SLERP;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
-use crate::prepare::request::SetRequest;
+use crate::prepare::preparation::SetRequest;
 use crate::shader::{
     Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample, TangentWeights,
     WORKGROUP,

@@ -1,9 +1,13 @@
 //! The functions that read and store elements of buffers.
 
-use crate::output::encoding::{Encoding, MatrixOrder};
-use crate::output::euler::EulerSequence;
-use crate::shader::{LINE, WORKGROUP};
+use std::fs;
+use std::path::Path;
 
+use crate::output::encoding::Encoding;
+use crate::output::euler::EulerSequence;
+use crate::shader::{Form, KERNELS, LINE, List, Store, WORKGROUP};
+
+use super::source;
 use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;
 use crate::gpu::kernel_check::random::Random;
@@ -15,38 +19,61 @@ pub(super) fn euler_detail(random: &mut Random) -> u32 {
     Encoding::Euler(sequence).row().detail
 }
 
-fn encoding(kind: &str, random: &mut Random) -> Encoding {
-    let order = match random.below(2) {
-        0 => MatrixOrder::RowMajor,
-        _ => MatrixOrder::ColumnMajor,
-    };
-    match kind {
-        "f16" => Encoding::F16,
-        "snorm16" => Encoding::Snorm16,
-        "axis_angle" => Encoding::AxisAngle,
-        "matrix3x3" => Encoding::Matrix3x3(order),
-        "matrix3x4" => Encoding::Matrix3x4(order),
-        "euler" => {
-            let all = EulerSequence::all();
-            Encoding::Euler(all[random.below(all.len() as u32) as usize])
+fn pick(random: &mut Random, encodings: &[Encoding]) -> Encoding {
+    encodings[random.below(encodings.len() as u32) as usize]
+}
+
+/// The kernels of a list that evaluate arcs, one for each store.
+fn over_arcs(list: List) -> impl Iterator<Item = (&'static str, Vec<Encoding>)> {
+    KERNELS.iter().filter_map(move |code| match code.segments {
+        Some((Form::Arc, of_list, store)) if of_list == list => {
+            Some((code.kernel.code(false).0, Encoding::of_store(store)))
         }
-        "vector" => Encoding::Vector,
-        _ => Encoding::F32,
+        _ => None,
+    })
+}
+
+/// How many words one part has that a kernel stores, if its values have several.
+fn words_of_part(kernel: &str) -> Option<usize> {
+    let text = source(kernel);
+    if !text.contains("\nfn parts(") {
+        return None;
+    }
+    let (_, stored) = text
+        .split_once("alias Stored = ")
+        .expect("every store names it");
+    let (stored, _) = stored.split_once(';').expect("a line of WGSL");
+    match stored.strip_prefix("vec") {
+        Some(components) => components[..1].parse().ok(),
+        None => Some(1),
     }
 }
 
+/// The functions of a store's file, if it is that of a kernel over the frames of arcs.
+pub(super) fn functions_of_file(kernel: &str) -> Vec<String> {
+    let Some(name) = kernel.strip_prefix("arc_frames_") else {
+        return Vec::new();
+    };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("shaders/stores/{name}.wgsl"));
+    let text = fs::read_to_string(file).unwrap_or_default(); // texel variants have no file of that name
+    let functions = text.lines().filter_map(|line| line.strip_prefix("fn "));
+    let named = functions.filter_map(|line| line.split_once('('));
+    named.map(|(name, _)| name.to_owned()).collect()
+}
+
 /// What a kernel's `store` of a rotation leaves in its buffer.
-fn store(kernel: &'static str, kind: &'static str) -> Twin {
+fn store(kernel: &'static str, encodings: Vec<Encoding>, is_wide: bool) -> Twin {
     with_globals(kernel, "store", move |random, trial| {
-        let encoding = encoding(kind, random);
+        let encoding = pick(random, &encodings);
         let rotation = random.rotation();
         let index = random.below(3);
         trial.argument((index, rotation));
         trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
         trial.output("rotations");
-        let cells: Vec<u64> = match kind {
-            "f32_wide" => bytemuck::pod_collect_to_vec(bytemuck::bytes_of(&rotation)),
-            _ => words(encoding, rotation),
+        let cells: Vec<u64> = if is_wide {
+            bytemuck::pod_collect_to_vec(bytemuck::bytes_of(&rotation))
+        } else {
+            words(encoding, rotation)
         };
         trial.expect(vec![UNTOUCHED; index as usize * cells.len()]);
         trial.expect(cells);
@@ -72,36 +99,26 @@ fn reader(
 }
 
 pub(super) fn stores() -> Vec<Twin> {
-    let mut all = vec![
-        store("arc_frames_f32", "f32"),
-        store("arc_frames_f32_texels", "f32_wide"),
-        store("arc_frames_f16", "f16"),
-        store("arc_frames_snorm16", "snorm16"),
-        store("arc_frames_axis_angle", "axis_angle"),
-        store("arc_frames_matrix3x3", "matrix3x3"),
-        store("arc_frames_matrix3x4", "matrix3x4"),
-        store("arc_frames_euler", "euler"),
-        store("arc_frames_vector", "vector"),
-    ];
-    for (kernel, kind) in [
-        ("arc_frames_matrix3x3", "matrix3x3"),
-        ("arc_frames_matrix3x4", "matrix3x4"),
-        ("arc_frames_euler", "euler"),
-        ("arc_frames_vector", "vector"),
-    ] {
-        all.push(with_globals(kernel, "parts", move |random, trial| {
-            let (encoding, rotation) = (encoding(kind, random), random.rotation());
-            trial.argument(rotation);
-            trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
-            trial.expect(words(encoding, rotation));
-        }));
+    let mut all = vec![store(
+        "arc_frames_f32_texels",
+        Encoding::of_store(Store::F32),
+        true,
+    )];
+    for (kernel, encodings) in over_arcs(List::Frames) {
+        all.push(store(kernel, encodings.clone(), false));
+        if words_of_part(kernel).is_some() {
+            all.push(with_globals(kernel, "parts", move |random, trial| {
+                let (encoding, rotation) = (pick(random, &encodings), random.rotation());
+                trial.argument(rotation);
+                trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
+                trial.expect(words(encoding, rotation));
+            }));
+        }
     }
-    for (kernel, kind, size) in [
-        ("arc_frames_coalesced_matrix3x3", "matrix3x3", 1),
-        ("arc_frames_coalesced_matrix3x4", "matrix3x4", 4),
-        ("arc_frames_coalesced_euler", "euler", 1),
-    ] {
-        all.push(together(kernel, kind, size));
+    for (kernel, encodings) in over_arcs(List::FramesCoalesced) {
+        if let Some(size) = words_of_part(kernel) {
+            all.push(together(kernel, encodings, size));
+        }
     }
     all.push(with_globals(
         "arc_frames_coalesced_f32",
@@ -130,9 +147,9 @@ fn words(encoding: Encoding, rotation: [f32; 4]) -> Vec<u64> {
 }
 
 /// The parts, of so many words each, that an invocation stores of what its neighbours have put together.
-fn together(kernel: &'static str, kind: &'static str, size: usize) -> Twin {
+fn together(kernel: &'static str, encodings: Vec<Encoding>, size: usize) -> Twin {
     with_globals(kernel, "finish", move |random, trial| {
-        let encoding = encoding(kind, random);
+        let encoding = pick(random, &encodings);
         let (lane, rotation) = (random.below(WORKGROUP), random.rotation());
         let (within, line) = (lane % LINE, 2 * LINE);
         let is_stored = random.once_in(2);

@@ -89,10 +89,11 @@ pub(super) fn with_globals(
 }
 
 impl Twin {
-    pub(super) fn index(&self, program: &Program) -> usize {
+    /// The index of a function of its kernel.
+    pub(super) fn index_of(&self, name: &str, program: &Program) -> usize {
         let mut all = program.functions.iter();
-        let index = all.position(|function| function.name == self.function);
-        index.unwrap_or_else(|| panic!("{} has no function {}", self.kernel, self.function))
+        let index = all.position(|function| function.name == name);
+        index.unwrap_or_else(|| panic!("{} has no function {name}", self.kernel))
     }
 
     /// Compares every bit of so many samples of random inputs; else the first sample that differs.
@@ -102,7 +103,7 @@ impl Twin {
         mut random: Random,
         samples: usize,
     ) -> Result<(), String> {
-        let function = self.index(program);
+        let function = self.index_of(self.function, program);
         let mut trial = TwinTrial::default();
         let mut machine = Machine::new(program);
         let mut sample = 0;

@@ -39,13 +39,13 @@ unsafe fn vectors<'a, T: Number>(
     output: *mut T,
     count: usize,
 ) -> Result<&'a mut [[T; 4]], Failure> {
-    let needed = 4 * crowd.output_len(values);
+    // Other instances may be visible now than when it was submitted.
+    let needed = 4 * crowd.submitted_len().unwrap_or(crowd.output_len(values));
     if count != needed {
+        let (joints, each) = (crowd.library().joint_count(), 4 * values.vector_count());
+        let instances = needed / (joints * each);
         let message = format!(
-            "`output_count` is {count}; the result has {needed} numbers: {} instances × {} joints × {}",
-            crowd.instance_count(),
-            crowd.library().joint_count(),
-            4 * values.vector_count()
+            "`output_count` is {count}; the result has {needed} numbers: {instances} instances × {joints} joints × {each}"
         );
         return Err(Failure::new(TumbleResult::WrongSize, message));
     }
@@ -54,7 +54,7 @@ unsafe fn vectors<'a, T: Number>(
     Ok(output.as_chunks_mut::<4>().0)
 }
 
-/// How many numbers a result has: 4 or 12 × joints × instances.
+/// How many numbers a result has: 4 or 12 × joints × instances, those that are visible.
 ///
 /// # Safety
 /// `count` has room for a number.
@@ -74,7 +74,7 @@ pub unsafe extern "C" fn tumble_crowd_output_count(
     })
 }
 
-/// Evaluates all instances at the clock's time into the caller's memory, and waits until it is done.
+/// Evaluates all instances, or those that are visible, at the clock's time into the caller's memory, and waits until it is done.
 /// `values` is a `TumbleCrowdValues`; `output_count` is exactly as `tumble_crowd_output_count` says.
 ///
 /// # Safety

@@ -24,7 +24,8 @@ impl Object for TumbleCrowdTarget {
 /// `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
 /// is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
 /// `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
-/// at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`.
+/// at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`: as many instances as have room there may be
+/// visible later.
 ///
 /// The buffer belongs to that device, has memory, and was made for use as
 /// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; it stays the application's, and lives longer than the target.
@@ -54,8 +55,8 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
     })
 }
 
-/// Records an evaluation at the clock's time into the application's `VkCommandBuffer`: 16 bytes for each
-/// layer that changed since the last evaluation, and the dispatches. Nothing is waited for, submitted or
+/// Records an evaluation at the clock's time into the application's `VkCommandBuffer`: up to 20 bytes for each
+/// layer that changed since the last evaluation, 4 for each instance of a new list of visible ones, and the dispatches. Nothing is waited for, submitted or
 /// allocated. What is recorded behind it, or submitted to the same queue later, sees the result; it
 /// waits for all that was recorded before it.
 ///

@@ -4,14 +4,16 @@ use std::ffi::{CStr, c_char};
 use std::ptr::{null, null_mut};
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
-use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::crowd::{Crowd, CrowdFade, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
 use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
 use super::{cpu, defaults, words};
+use crate::crowd::fade::*;
 use crate::crowd::layer::*;
 use crate::crowd::library::*;
 use crate::crowd::output::*;
 use crate::crowd::player::*;
+use crate::crowd::visible::*;
 use crate::engine::*;
 use crate::handle;
 use crate::result::*;
@@ -451,4 +453,88 @@ fn a_crowd_is_not_used_after_a_panic() {
     done(tumble_crowd_free(crowd));
     done(tumble_crowd_library_free(library));
     done(tumble_engine_free(engine));
+}
+
+/// Weights and fades, and lists of visible instances: the bits and the numbers of the engine's.
+#[test]
+fn fades_and_lists_are_those_of_the_engine() {
+    let shape = (37, 3);
+    let (library, rust_library) = libraries();
+    let both = plays(0, shape);
+    let layers: Vec<TumbleCrowdLayer> = both.iter().map(|pair| pair.0).collect();
+    for engine in engines() {
+        let mut expected = rust_crowd(&rust_library, shape);
+        let crowd = c_crowd(engine, library, shape);
+        done(set_layers(crowd, &layers));
+        for (layer, plays) in &both {
+            expected.set(layer.instance, layer.layer, *plays).unwrap();
+        }
+        for instance in 0..37 {
+            let ticks = instance as u64 * 10_000;
+            done(tumble_crowd_fade(crowd, instance, 1, 1.0, ticks));
+            expected.fade(instance, 1, 1.0, ticks).unwrap();
+            let weight = instance as f32 / 36.0;
+            done(tumble_crowd_set_weight(crowd, instance, 2, weight));
+            expected.set_weight(instance, 2, weight).unwrap();
+        }
+        let mut fade = TumbleCrowdFade {
+            size: size_of::<TumbleCrowdFade>(),
+            instance: 5,
+            layer: 2,
+            start: 50_000,
+            ticks: 100_000,
+            from: 0.25,
+            to: 0.75,
+        };
+        let rust_fade = CrowdFade {
+            from: 0.25,
+            to: 0.75,
+            start: 50_000,
+            ticks: 100_000,
+        };
+        let mut is_there = false;
+        // SAFETY: structures, and room for the truth value.
+        unsafe {
+            done(tumble_crowd_set_fade(crowd, &raw const fade));
+            fade.layer = 1;
+            done(tumble_crowd_get_fade(
+                crowd,
+                &raw mut fade,
+                &raw mut is_there,
+            ));
+        }
+        expected.set_fade(5, 2, rust_fade).unwrap();
+        let found = (fade.start, fade.ticks, fade.from, fade.to);
+        let of_engine = expected.get_fade(5, 1).unwrap().unwrap();
+        let CrowdFade {
+            start,
+            ticks,
+            from,
+            to,
+        } = of_engine;
+        assert!(is_there && found == (start, ticks, from, to));
+        let output = CrowdOutput::from(CrowdValues::Model);
+        for list in [&[30u32, 2, 5][..], &[5], &[]] {
+            // SAFETY: as many numbers as stated, and room for one.
+            unsafe {
+                done(tumble_crowd_set_visible(crowd, list.as_ptr(), list.len()));
+                let mut count = 99;
+                done(tumble_crowd_visible_count(crowd, &raw mut count));
+                assert_eq!(count, list.len());
+            }
+            expected.set_visible(list).unwrap();
+            done(tumble_crowd_advance(crowd, 0.1));
+            expected.advance(0.1).unwrap();
+            for submits in [false, true] {
+                let found = bits(crowd, output, submits);
+                assert!(found == rust_bits(&mut expected, output), "{list:?}");
+            }
+        }
+        done(tumble_crowd_set_all_visible(crowd));
+        expected.set_all_visible();
+        assert!(bits(crowd, output, true) == rust_bits(&mut expected, output));
+        done(tumble_crowd_free(crowd));
+        done(tumble_engine_free(engine));
+    }
+    done(tumble_crowd_library_free(library));
 }

@@ -7,11 +7,13 @@ use tumble::crowd::{CrowdOutput, CrowdValues};
 use super::crowd::*;
 use super::crowd_refusals::{evaluate, small};
 use super::{cpu, fails, one_track};
+use crate::crowd::fade::*;
 use crate::crowd::layer::*;
 use crate::crowd::library::*;
 use crate::crowd::output::*;
 use crate::crowd::player::*;
 use crate::crowd::target::*;
+use crate::crowd::visible::*;
 use crate::engine::*;
 use crate::result::*;
 use crate::set::*;
@@ -355,4 +357,98 @@ fn handles_of_vulkan_are_looked_at() {
         pointer,
         "`vulkan->instance` is null",
     );
+}
+
+#[test]
+fn weights_fades_and_lists_are_checked() {
+    let crowd = small();
+    let (range, argument) = (TumbleResult::OutOfRange, TumbleResult::InvalidArgument);
+    let pointer = TumbleResult::InvalidPointer;
+    let output = CrowdOutput::from(CrowdValues::Model);
+    done(tumble_crowd_fade(crowd, 1, 1, 0.5, 0));
+    let before = bits(crowd, output, false);
+    for (instance, layer, weight, code, says) in [
+        (2, 1, 0.5, range, "no instance 2"),
+        (1, 2, 0.5, range, "no layer 2"),
+        (1, 0, 0.5, argument, "the first layer has no weight"),
+        (1, 1, -0.5, argument, "weight is -0.5"),
+        (1, 1, f32::NAN, argument, "weight is NaN"),
+    ] {
+        fails(
+            tumble_crowd_set_weight(crowd, instance, layer, weight),
+            code,
+            says,
+        );
+        fails(
+            tumble_crowd_fade(crowd, instance, layer, weight, 9),
+            code,
+            says,
+        );
+    }
+    let mut fade = TumbleCrowdFade {
+        size: 8,
+        instance: 1,
+        layer: 1,
+        start: 0,
+        ticks: 9,
+        from: 2.0,
+        to: 0.0,
+    };
+    let mut is_there = true;
+    // SAFETY: what is refused, structures, and room for the truth value.
+    unsafe {
+        fails(
+            tumble_crowd_set_fade(crowd, null()),
+            pointer,
+            "`fade` is null",
+        );
+        fails(
+            tumble_crowd_set_fade(crowd, &raw const fade),
+            argument,
+            "`fade->size` is 8",
+        );
+        let found = tumble_crowd_get_fade(crowd, &raw mut fade, &raw mut is_there);
+        fails(found, argument, "`fade->size` is 8");
+        fade.size = size_of::<TumbleCrowdFade>();
+        fails(
+            tumble_crowd_set_fade(crowd, &raw const fade),
+            argument,
+            "weight is 2",
+        );
+        let found = tumble_crowd_get_fade(crowd, &raw mut fade, null_mut());
+        fails(found, pointer, "`fades` is null");
+        fade.instance = 0;
+        done(tumble_crowd_get_fade(
+            crowd,
+            &raw mut fade,
+            &raw mut is_there,
+        ));
+        assert!(!is_there && fade.from == 2.0);
+        fails(
+            tumble_crowd_set_visible(crowd, null(), 1),
+            pointer,
+            "`instances` is null",
+        );
+        let list = [1, 0, 1, 2];
+        fails(
+            tumble_crowd_set_visible(crowd, list.as_ptr(), 3),
+            argument,
+            "instance 1 is in the list again, at 2",
+        );
+        fails(
+            tumble_crowd_set_visible(crowd, list[3..].as_ptr(), 1),
+            range,
+            "no instance 2",
+        );
+        fails(
+            tumble_crowd_visible_count(crowd, null_mut()),
+            pointer,
+            "`count` is null",
+        );
+    }
+    assert!(
+        bits(crowd, output, false) == before,
+        "what is refused changes nothing"
+    );
+    done(tumble_crowd_free(crowd));
 }

@@ -1,4 +1,5 @@
-//! `--device`: which device evaluates, and the error when it is not there.
+//! `--device`: which device evaluates, found among those that `tumble devices` lists, and the error when it is
+//! not there.
 
 use std::convert::Infallible;
 use std::str::FromStr;
@@ -9,8 +10,7 @@ use glam::Quat;
 use tumble::vulkan::VulkanError;
 use tumble::{Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet};
 
-use crate::arguments::command_line::CommandLine;
-use crate::arguments::named_device::named;
+use crate::arguments::options::CommandLine;
 use crate::batch::target::{ChunkSink, ResultError};
 use crate::drivers;
 use crate::messages::exit::{DEVICE, Failure};
@@ -21,17 +21,17 @@ const CHUNK: usize = 1 << 20;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviceArguments {
-    /// auto (the CPU for fewer than 2^20 rotations and where there is no graphics card, else the
-    /// fastest by a measured probe), first (Vulkan device that is exact, else the CPU), cpu, vulkan,
-    /// or a device by its index, part of its name or uuid:UUID (`tumble devices`); the bits are the
-    /// same
+    /// The device: auto (the CPU for fewer than 2^20 rotations, else the CPU or a graphics card, whichever is
+    /// faster in a short measurement), first (the first Vulkan device that gives the CPU's bits, else the CPU),
+    /// cpu, vulkan, or a device by its index, part of its name or uuid:UUID (`tumble devices`). All give the
+    /// same bits
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: DeviceChoice,
     /// Use the device that --device names although its self-tests fail: its bits may differ from
     /// the CPU's
     #[arg(long)]
     allow_inexact: bool,
-    /// Memory of a Vulkan device to use besides results, such as 256MiB
+    /// The memory of a Vulkan device that may be used in addition to the results, such as 256MiB
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     memory: Option<u64>,
     /// Threads of the CPU, for front ends that leave the choice.
@@ -411,4 +411,84 @@ fn short_reason(error: &Error) -> String {
         Error::Vulkan(error) if is_absence(error) => format!("no Vulkan: {error}"),
         _ => error.to_string(),
     }
+}
+
+/// The device of that index, else of that name, else of a name that contains the text (a card's name may
+/// be a number). After `uuid:` stands the UUID that Vulkan reports, by which other programs know the card.
+fn named(requested: &str, devices: &[Device]) -> Result<Device, Failure> {
+    if devices.is_empty() {
+        return Err(Failure::no_vulkan(&VulkanError::NoDevice));
+    }
+    let part = requested.to_lowercase();
+    if let Some(uuid) = part.strip_prefix("uuid:") {
+        return by_uuid(requested, uuid, devices);
+    }
+    if let Some(device) = requested
+        .parse()
+        .ok()
+        .and_then(|index: usize| devices.get(index))
+    {
+        return Ok(device.clone());
+    }
+    let matching = |matches: &dyn Fn(&str) -> bool| -> Vec<&Device> {
+        devices
+            .iter()
+            .filter(|device| matches(&device.name().to_lowercase()))
+            .collect()
+    };
+    let whole = matching(&|name| name == part);
+    let found = if whole.is_empty() {
+        matching(&|name| name.contains(&part))
+    } else {
+        whole
+    };
+    let list = listing(devices);
+    match *found {
+        [one] => Ok(one.clone()),
+        [] => {
+            let known = devices
+                .iter()
+                .map(Device::name)
+                .chain(["auto", "first", "cpu", "vulkan"]);
+            let hint = words::nearest(requested, known)
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_default();
+            let message = format!("there is no device `{requested}`{hint}");
+            Err(Failure::usage(message).with_lines(list))
+        }
+        _ => Err(Failure::usage(format!(
+            "`{requested}` could be several devices; give more of the name, or the index"
+        ))
+        .with_lines(list)),
+    }
+}
+
+/// The device of a UUID, with or without its dashes and NVIDIA's `GPU-` before it.
+fn by_uuid(requested: &str, uuid: &str, devices: &[Device]) -> Result<Device, Failure> {
+    let digits = |text: &str| text.replace('-', "");
+    let requested_digits = digits(uuid.strip_prefix("gpu-").unwrap_or(uuid));
+    let has_uuid = |device: &&Device| {
+        device
+            .uuid()
+            .is_some_and(|known| digits(&known) == requested_digits)
+    };
+    match devices.iter().find(has_uuid) {
+        Some(device) => Ok(device.clone()),
+        None => {
+            let lines = devices.iter().map(|device| {
+                let uuid = device.uuid().unwrap_or_default();
+                format!("  uuid:{uuid}  {}", device.name())
+            });
+            let message = format!("there is no device `{requested}`; there are");
+            Err(Failure::usage(message).with_lines(lines))
+        }
+    }
+}
+
+fn listing(devices: &[Device]) -> Vec<String> {
+    let lines = devices.iter().enumerate();
+    let lines = lines.map(|(index, device)| format!("  {index}  {}", device.name()));
+    std::iter::once("  there are: auto, first, cpu, vulkan, and".to_owned())
+        .chain(lines)
+        .collect()
 }

@@ -16,7 +16,7 @@ use crate::arguments::output::one_of;
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct InterpolationArguments {
-    /// What happens in the first and the last segment (default: the method's own)
+    /// What happens at the first and the last key [default: as the method says]
     #[arg(long, value_name = "ENDS", value_parser = ends())]
     ends: Option<Ends>,
     /// Which way to rotate between neighbouring keys
@@ -31,13 +31,13 @@ pub(crate) struct InterpolationArguments {
     /// The values after the last key
     #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = wrap_mode())]
     after: WrapMode,
-    /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
+    /// kochanek-bartels: 0 is neutral, 1 stops at the keys, -1 doubles the speed at the keys
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     tension: Option<f64>,
-    /// kochanek-bartels: -1 makes corners at the keys
+    /// kochanek-bartels: 0 is smooth, -1 makes corners at the keys
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     continuity: Option<f64>,
-    /// kochanek-bartels: 1 follows the interval before a key, -1 the one after it
+    /// kochanek-bartels: 0 is neutral, 1 uses the velocity of the interval before a key, -1 of the one after it
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     bias: Option<f64>,
 }
@@ -128,12 +128,10 @@ impl InterpolationArguments {
 pub(crate) fn ends() -> impl TypedValueParser<Value = Ends> {
     let help = |ends| match ends {
         Ends::Parabolic => "the parabola through the last three keys or points",
-        Ends::Natural => "no acceleration",
+        Ends::Natural => "no acceleration at the ends",
         Ends::Clamped { .. } => "start and end at rest",
-        Ends::Secant => {
-            "the velocity of the straight way between the last two: slerp's, for rotations"
-        }
-        Ends::Loop => "the last repeats the first",
+        Ends::Secant => "the mean velocity between the last two keys or points",
+        Ends::Loop => "a closed curve: the last key or point equals the first",
         Ends::Frozen => "the first and the last segment stand still",
     };
     one_of(Ends::ALL.map(|ends| (ends.name(), help(ends), ends)))

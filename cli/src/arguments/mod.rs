@@ -1,11 +1,8 @@
 //! Options that several commands share, parsed into validated values.
 
-pub(crate) mod command_line;
 pub(crate) mod device;
-pub(crate) mod gather;
 pub(crate) mod input;
 pub(crate) mod interpolation;
-mod named_device;
 pub(crate) mod options;
 pub(crate) mod output;
 pub(crate) mod path;

@@ -1,11 +1,18 @@
-//! The options of the commands that write results. A row of [`OPTIONS`] is all that the program knows of an
-//! option besides its value: whether it determines the bytes of results, and what it applies to. An option
-//! that has no effect is refused, with a remedy, and never ignored.
+//! The options of a command line: which are explicit, the values of all, and, for the commands that write
+//! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
+//! it determines the bytes of results, and what it applies to. An option that has no effect is refused, with
+//! a remedy, and never ignored.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Command};
 use tumble::{Encoding, Layout};
 use tumble_formats::format::{Format, FormatOption};
 
 use crate::arguments::output::OutputArguments;
+use crate::batch::digest::InputFile;
 
 /// A rule about an option of this name; the name is that of its field, with `_`.
 pub(crate) struct OptionRule {
@@ -99,7 +106,7 @@ const fn of_results(
     }
 }
 
-/// All options of `eval`, `convert`, `follow`, `smooth` and `reduce`. Where several have no effect, the
+/// All options of the commands that write results (they have `--resume`). Where several have no effect, the
 /// message is about the first.
 pub(crate) const OPTIONS: &[OptionRule] = &[
     // Inputs.
@@ -279,9 +286,8 @@ fn encoding(result: &ResultRequest<'_>) -> Option<String> {
         return None;
     }
     let format = result.format;
-    let is_text = format.write.as_ref().is_some_and(|write| write.is_text);
     match result.kind {
-        ResultKind::Rotations if is_text => {
+        ResultKind::Rotations if format.is_text => {
             Some("--encoding is for binary results (NPY); text holds every digit".to_owned())
         }
         ResultKind::Rotations if result.output.is_rotations() => None,
@@ -310,6 +316,80 @@ fn lengths(result: &ResultRequest<'_>, option: &str) -> Option<String> {
     })
 }
 
+/// The options of a command. It must be the first field of the command's arguments: clap removes the
+/// values of the fields after it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct CommandLine {
+    explicit: BTreeSet<String>,
+    values: BTreeMap<String, Vec<String>>,
+}
+
+impl CommandLine {
+    /// Whether the command line names the option, rather than its default.
+    pub(crate) fn has(&self, option: &str) -> bool {
+        self.explicit.contains(option)
+    }
+
+    /// Everything that determines a result besides its input: `layout=track method=slerp`. Options
+    /// without a value or a default are left out.
+    pub(crate) fn options(&self) -> String {
+        let shown = self.values.iter().filter_map(|(name, values)| {
+            let bytes = rule(name).map_or(Bytes::ByValue, |rule| rule.bytes);
+            let values: Vec<String> = match bytes {
+                Bytes::Unchanged => return None,
+                Bytes::ByValue => values.clone(),
+                Bytes::ByContent => values.iter().map(|file| content(file)).collect(),
+            };
+            Some(format!("{name}={}", values.join(",")))
+        });
+        shown.collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// The hash of a file; empty where it cannot be read again, as standard input. The name of a folder.
+fn content(file: &str) -> String {
+    if Path::new(file).is_dir() {
+        return file.to_owned();
+    }
+    let file = InputFile::new(Path::new(file));
+    file.sha256().unwrap_or_default().to_owned()
+}
+
+/// It adds no options.
+impl clap::Args for CommandLine {
+    fn augment_args(command: Command) -> Command {
+        command
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        command
+    }
+}
+
+impl clap::FromArgMatches for CommandLine {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut command_line = Self::default();
+        for id in matches.ids().map(clap::Id::as_str) {
+            // Groups of options are called after their structs.
+            if id.starts_with(char::is_uppercase) {
+                continue;
+            }
+            if matches.value_source(id) == Some(ValueSource::CommandLine) {
+                command_line.explicit.insert(id.to_owned());
+            }
+            let raw = matches.get_raw(id).into_iter().flatten();
+            let values = raw.map(|value| value.to_string_lossy().into_owned());
+            command_line.values.insert(id.to_owned(), values.collect());
+        }
+        Ok(command_line)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -322,9 +402,14 @@ mod tests {
     #[test]
     fn options_of_results_say_what_they_apply_to() {
         let program = crate::Arguments::command();
-        let commands = ["eval", "convert", "follow", "smooth", "reduce"];
-        let named: BTreeSet<&str> = (commands.iter())
-            .flat_map(|name| program.find_subcommand(name).unwrap().get_arguments())
+        let writing = |command: &&Command| {
+            let mut options = command.get_arguments();
+            options.any(|option| option.get_id() == "resume")
+        };
+        let commands: Vec<&Command> = program.get_subcommands().filter(writing).collect();
+        assert!(commands.len() >= 5);
+        let options = commands.iter().flat_map(|command| command.get_arguments());
+        let named: BTreeSet<&str> = options
             .map(|argument| argument.get_id().as_str())
             .filter(|name| *name != "help")
             .collect();

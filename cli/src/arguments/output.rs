@@ -16,7 +16,7 @@ pub(crate) struct OutputArguments {
         value_parser = one_of(outputs())
     )]
     output: OutputKind,
-    /// euler, BVH: the sequence of axes, intrinsic (XYZ, ZXZ …) or extrinsic (xyz, zxz …)
+    /// The sequence of axes: of euler and BVH, intrinsic (XYZ, ZXZ …) or extrinsic (xyz, zxz …)
     /// [default: XYZ; BVH: ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,

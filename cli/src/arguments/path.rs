@@ -24,16 +24,16 @@ pub(crate) const PATHS: &str = "Paths";
 /// `--path-…`; `follow`, which has none of these, gives them their short names.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PathArguments {
-    /// The duration of paths without times, seconds
+    /// The duration, seconds: of paths without times
     #[arg(long, value_name = "S", conflicts_with = "rate", value_parser = positive)]
     seconds: Option<f64>,
     /// The distance that a body covers in a second on paths without times
     #[arg(long, value_name = "UNITS", value_parser = positive)]
     rate: Option<f64>,
-    /// The curve through the points
+    /// How to interpolate: the curve through the points of a path
     #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
     path_method: VectorMethod,
-    /// What happens at the first and the last point
+    /// What happens at the first and the last key: of a path, at its first and last point
     #[arg(long, value_name = "ENDS", default_value_t, value_parser = ends())]
     path_ends: Ends,
     /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK
@@ -57,8 +57,8 @@ pub(crate) struct PathArguments {
     /// What to do with the rotation about the direction that is left over at the end of a closed path
     #[arg(long, value_name = "TWIST", default_value_t, value_parser = twist())]
     twist: Twist,
-    /// keys, constant, or eased:A,B: speeding up over the fraction A of the time, slowing down over the
-    /// fraction B
+    /// The speed along the curve: keys, constant, or eased:A,B, which speeds up over the fraction A of the
+    /// time and slows down over the fraction B
     #[arg(long, value_name = "SPEED", default_value = "keys", value_parser = speed)]
     path_speed: PathSpeed,
     /// The axis of the body that faces forward

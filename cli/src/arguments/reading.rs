@@ -42,7 +42,7 @@ pub(crate) struct ReadingArguments {
     /// The key times of files without times (KITTI): a file of seconds, one line for each pose
     #[arg(long, value_name = "FILE", conflicts_with = "source_fps")]
     source_times: Option<PathBuf>,
-    /// Which array or column holds what, where names do not tell: rotations=keys:wxyz,time=t
+    /// What arrays or columns contain, if their names do not say it, such as rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
     /// The unit of times that are whole numbers
@@ -73,8 +73,8 @@ pub(crate) struct ReadingArguments {
     scale: Option<ScaleArgument>,
     /// Convert to this up axis by rotating the roots: from the up axis that an FBX file states, else by
     /// 90° about x
-    #[arg(long, value_name = "AXIS", value_parser = up_axis())]
-    up: Option<UpAxis>,
+    #[arg(id = "up", long = "up-axis", alias = "up", value_name = "AXIS", value_parser = up_axis())]
+    up_axis: Option<UpAxis>,
 }
 
 fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
@@ -124,8 +124,8 @@ fn time_unit() -> impl TypedValueParser<Value = TimeUnit> {
 
 /// Reads the name of a format, for clap.
 fn format() -> impl TypedValueParser<Value = &'static Format> {
-    let values = FORMATS.map(|format| PossibleValue::new(format.name).help(format.summary));
-    PossibleValuesParser::new(values)
+    let value = |format: &&Format| PossibleValue::new(format.name).help(format.summary);
+    PossibleValuesParser::new(FORMATS.iter().map(value))
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }
 
@@ -175,7 +175,7 @@ impl ReadingArguments {
             offsets,
             body_model,
             scale,
-            up,
+            up_axis,
         } = self;
         *raw_times
             || *bridge_gaps
@@ -190,7 +190,7 @@ impl ReadingArguments {
             || offsets.is_some()
             || body_model.is_some()
             || scale.is_some()
-            || up.is_some()
+            || up_axis.is_some()
     }
 
     pub(crate) fn options(&self, limits: Limits, pipes: bool) -> Result<ReadOptions, Diagnostic> {
@@ -243,12 +243,10 @@ impl ReadingArguments {
             let name = rule.name.replace('_', "-");
             let is_set = self.sets(option);
             if is_set && !formats().any(|format| format.takes(option)) {
-                let all = FORMATS.iter().filter(|format| format.takes(option));
-                let all: Vec<&str> = all.map(|format| format.name).collect();
                 let format_name = formats().next().map_or("", |format| format.name);
                 return Err(format!(
                     "--{name} has no effect on {format_name}; it is for {}; leave it out",
-                    all.join(", ")
+                    Format::names_taking(option)
                 ));
             }
         }
@@ -283,11 +281,11 @@ impl ReadingArguments {
                 })?;
             }
         }
-        if self.up.is_some() && loaded.box_length.is_some() {
-            let message = "--up has no effect on a chain of boxes; leave it out";
+        if self.up_axis.is_some() && loaded.box_length.is_some() {
+            let message = "--up-axis has no effect on a chain of boxes; leave it out";
             return Err(Failure::usage(format!("{}: {message}", names::input(path))));
         }
-        if self.scale.is_some() || self.up.is_some() {
+        if self.scale.is_some() || self.up_axis.is_some() {
             let scale = match (self.scale, loaded.space) {
                 (None, _) => 1.0,
                 (Some(ScaleArgument::Factor(factor)), _) => factor,
@@ -297,7 +295,7 @@ impl ReadingArguments {
                     return Err(Failure::usage(format!("{}: {message}", names::input(path))));
                 }
             };
-            adjust_all(loaded, scale, self.up).map_err(|error| {
+            adjust_all(loaded, scale, self.up_axis).map_err(|error| {
                 Failure::new(exit::ALL_INPUTS, format!("{}: {error}", names::input(path)))
             })?;
         }

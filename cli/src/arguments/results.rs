@@ -1,21 +1,22 @@
 //! Options for outputs and their format.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::EulerSequence;
-use tumble_formats::format::{Document, FormatOption, left_behind};
-use tumble_formats::{Format, Loaded};
+use tumble_formats::format::{Document, FormatOption, MotionOptions, left_behind};
+use tumble_formats::keyed::{KeysError, keys_for};
+use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::sample::Samples;
+use tumble_formats::{Feature, Format, Loaded};
 
-use crate::arguments::gather::GatheredInputs;
-use crate::arguments::input::InputReader;
-use crate::batch::destination::Destination;
+use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
 use crate::batch::output_plan::{self, OutputPlan, OutputRequest};
 use crate::batch::pipeline::{BatchOptions, Pipeline};
-use crate::batch::target::{self, ResultTarget};
-use crate::messages::exit::Failure;
-use crate::messages::names;
-use crate::messages::words;
+use crate::batch::target::{self, Destination, ResultTarget, WrittenFile};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::{names, words};
 
 const ONE_INPUT: &str = "--times-out needs a single input whose result is a single file";
 
@@ -106,7 +107,8 @@ impl ResultArguments {
             let format = target.format();
             if !format.takes(FormatOption::TimesApart) {
                 return Err(Failure::usage(format!(
-                    "--times-out is for kitti, which stores no times; {} stores times or a frame rate: leave it out",
+                    "--times-out is for {}, which stores no times; {} stores times or a frame rate: leave it out",
+                    Format::names_taking(FormatOption::TimesApart),
                     format.name
                 )));
             }
@@ -169,4 +171,53 @@ pub(crate) fn document_to_rewrite<'a>(
         words::note(&format!("{name}: {lost}"));
     }
     (document.writes(target.format()) && why.is_none()).then_some(document)
+}
+
+/// Why a selection of an input makes a new file, rather than the input's file with other keys.
+pub(crate) fn makes_new(inputs: &Inputs) -> Option<&'static str> {
+    inputs.tracks.is_set().then_some("some tracks make")
+}
+
+/// Refuses, before any work, formats that hold results and no keys.
+pub(crate) fn check_holds_keys(plan: &OutputPlan) -> Result<(), Failure> {
+    let holds_results = |target: &&ResultTarget| !target.format().writes_clips();
+    match plan.targets.iter().find(holds_results) {
+        None => Ok(()),
+        Some(target) => Err(Failure::usage(format!(
+            "{target}: {} holds results of `tumble eval`, not keys",
+            target.format().name
+        ))),
+    }
+}
+
+/// Writes the keys of clips: into `document`, where the input's file is written again, else into a new one.
+pub(crate) fn write_keys(
+    name: &str,
+    clips: &[Cow<'_, Motion>],
+    document: Option<&dyn Document>,
+    options: &MotionOptions,
+    target: &ResultTarget,
+) -> Result<WrittenFile, Failure> {
+    let keys = clips.iter().map(|clip| {
+        let keys = keys_for(clip, target.format(), document.is_some());
+        keys.map_err(|error| match error {
+            KeysError::Evaluating(error) => Failure::evaluating(name, &error),
+            error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
+        })
+    });
+    let keys: Vec<(Samples, bool)> = keys.collect::<Result<_, Failure>>()?;
+    // Formats of frames need a rate; others have the times.
+    let has_times = target.format().supports(Feature::UnevenTimes);
+    let rate = |clip: &Motion| match has_times {
+        true => clip.rate,
+        false => clip.rate.or_else(|| clip.rate_of_keys()),
+    };
+    let notes = [("input", name.to_owned())];
+    let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, per_channel))| SampledClip {
+        is_at_keys: *per_channel,
+        ..samples.of(clip, rate(clip), &notes)
+    });
+    let sampled: Vec<SampledClip<'_>> = sampled.collect();
+    let indices = clips.iter().map(|clip| clip.index);
+    target.write_clips(&sampled, indices, document, options)
 }

@@ -24,7 +24,7 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second, from the first key to the last: a number or a ratio, such as 30000/1001
+    /// Frames per second: from the first key to the last, a number or a ratio, such as 30000/1001
     #[arg(
         long,
         value_name = "FPS",
@@ -41,7 +41,7 @@ pub(crate) struct SamplingArguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Start at 0 s where the first key is later, as players of glTF do: it is held until then
+    /// Start at 0 s if the first key is later, and hold the first key until its time, as players of glTF do
     #[arg(long, conflicts_with_all = ["times", "start"])]
     from_zero: bool,
 }
@@ -114,7 +114,7 @@ pub(crate) struct AtKeysArguments {
     /// Evaluate at the key times of another motion file instead
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "times", "start", "end", "from_zero"])]
     at: Option<PathBuf>,
-    /// Do not interpolate between two keys that are more than this many seconds apart
+    /// The longest gap, seconds: keys that are further apart are not interpolated
     #[arg(long, value_name = "SECONDS", requires = "at", value_parser = not_negative)]
     max_gap: Option<f64>,
     /// What to do with times in such gaps

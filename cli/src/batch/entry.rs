@@ -9,8 +9,8 @@ use std::sync::{Arc, LazyLock};
 use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
-use crate::batch::destination::WrittenFile;
 use crate::batch::digest;
+use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
 use crate::messages::words;
 
@@ -49,8 +49,16 @@ impl ManifestEntry {
         (is_beneath(&entry.output) && all.is_none_or(is_beneath)).then_some(entry)
     }
 
+    /// The input's result that it is a part of, and of how many parts.
+    pub(crate) fn whole(&self) -> (&str, usize) {
+        match &self.one_of {
+            Some((all, count)) => (all, *count),
+            None => (&self.output, 1),
+        }
+    }
+
     /// Whether it is the result of the same request.
-    fn is_made_from(&self, input_sha256: &str, options: &str) -> bool {
+    pub(crate) fn is_made_from(&self, input_sha256: &str, options: &str) -> bool {
         self.input_sha256.as_deref() == Some(input_sha256)
             && self.options == options
             && self.kernels_sha256 == kernels_sha256()

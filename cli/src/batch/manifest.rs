@@ -18,11 +18,11 @@ use std::sync::Arc;
 use tumble_formats::beneath::parent_beneath;
 use tumble_formats::output::Output;
 
-use crate::batch::destination::WrittenFile;
 use crate::batch::entry::{
     self, ManifestEntry, ManifestLines, NAME, PreviousEntries, ResultRecorder, line, of_clips,
 };
 use crate::batch::shards::{plan::RecordedPlan, record};
+use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
 
 /// A directory's manifest, open for one batch.

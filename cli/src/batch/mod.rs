@@ -1,7 +1,5 @@
 //! Results written to files: planned, hashed, written completely or not at all; and batches with a manifest.
 
-mod clip_files;
-pub(crate) mod destination;
 pub(crate) mod digest;
 pub(crate) mod entry;
 pub(crate) mod manifest;

@@ -11,14 +11,13 @@ use tumble_formats::beneath::parent_beneath;
 use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
 
-use crate::arguments::gather::{FoundInput, GatheredInputs};
-use crate::batch::destination::{self, Destination};
+use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry;
 use crate::batch::manifest::Manifest;
 use crate::batch::result_names::{ResultName, format, name_results};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
 use crate::batch::shards::record;
-use crate::batch::target::{ResultTarget, choose, extensions, of};
+use crate::batch::target::{self, Destination, ResultTarget, choose, extensions, of};
 use crate::messages::exit::Failure;
 use crate::messages::names;
 
@@ -116,7 +115,7 @@ fn in_folder(
     if let Some(recorded) = &shards {
         refuse_shards(recorded, &names, folder, request)?;
     }
-    destination::create_folder(folder)?;
+    target::create_folder(folder)?;
     let manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tumble_formats::format::Format;
 
-use crate::arguments::gather::FoundInput;
+use crate::arguments::input::FoundInput;
 use crate::batch::shards::record;
 use crate::batch::target::{self, choose};
 use crate::messages::exit::Failure;

@@ -22,8 +22,8 @@ use crate::threads::on_threads;
 #[command(after_help = "\
 `tumble eval` writes a manifest into every directory of results: for each result a line of
 JSON with the SHA-256 of the result and of its input, the options, the kernels, the program's
-version and the device. Of a directory that shards are being written into it checks what is
-there, and says how many shards that is.
+version and the device. If shards are missing in the directory, it checks the results of the
+complete shards, and prints how many there are.
 
 Examples:
   tumble check results/manifest.jsonl
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure::new(DIFFERENCE, message));
     }
-    listing::text(&format!("{total}, every bit as written\n"))?;
+    listing::text(&format!("{total}, unchanged since they were written\n"))?;
     match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
     let (folder, summary) = (folder.display(), progress.summary());
     match progress.is_done() {
-        true => format!("{folder}: {summary}; `tumble merge {folder}` makes them one"),
+        true => format!("{folder}: {summary}; `tumble merge {folder}` combines them"),
         false => format!("{folder}: {summary}; --resume makes the others"),
     }
 }

@@ -1,28 +1,50 @@
 //! `tumble follow`: bodies on paths.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::{ArgAction, Args};
 use glam::Vec3;
 use tumble::paths::{Follow, FollowError, Followed};
 use tumble::{Engine, Error, Layout, SampleTimes, TrackSet};
+use tumble_formats::PATHS;
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
+use tumble_formats::path::PathFormat;
 use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples;
 
-use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
-use crate::arguments::gather::GatheredInputs;
+use crate::arguments::input::GatheredInputs;
+use crate::arguments::options::CommandLine;
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{SampleRequest, SamplingArguments};
-use crate::batch::destination::WrittenFile;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::target::ResultTarget;
+use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
+
+/// What the help says of files.
+const NOTES: &str = "\
+If a path has no times, --seconds gives its duration or --rate its speed. The result is float32 of shape
+(frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a
+motion file. Positions far from 0, such as those of maps, are float64. CPU and Vulkan give the same bits.
+
+Examples:
+  tumble follow road.csv --fps 60 -o poses.npy
+  tumble follow paths/*.csv -o poses/                        a file for each path
+  tumble follow paths -o poses --resume                      skips results that are done
+  tumble follow lap.csv --ends loop --speed constant -o lap.glb
+  tumble follow points.npy --rate 1.5 --method linear --direction ahead:0.5 -o walk.csv
+  tumble follow orbit.csv --direction at:0,1,0 --frame fixed -o camera.glb";
+
+/// What files of paths are, for the help.
+fn kinds() -> String {
+    let kind =
+        |format: &&PathFormat| format!("{} ({})", format.name.to_uppercase(), format.summary);
+    let all: Vec<String> = PATHS.iter().map(kind).collect();
+    all.join(" or ")
+}
 
 /// Move bodies along paths: the position and the orientation of each at every frame
 #[derive(Debug, Args)]
@@ -36,19 +58,7 @@ use crate::messages::words;
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })
 )]
-#[command(after_help = "\
-A path is CSV with the header `t,x,y,z` and, optionally, `ux,uy,uz` (the upward direction at a
-point; it may be blank), or NPY of shape (tracks, points, 3). Without times --seconds or --rate says
-how long it takes. The result is float32 (float64 of positions far from 0, such as those of maps) of
-shape (frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a motion file. CPU and Vulkan give the same bits.
-
-Examples:
-  tumble follow road.csv --fps 60 -o poses.npy
-  tumble follow paths/*.csv -o poses/                        a file for each path
-  tumble follow paths -o poses --resume                      goes on where it stopped
-  tumble follow lap.csv --ends loop --speed constant -o lap.glb
-  tumble follow points.npy --rate 1.5 --method linear --direction ahead:0.5 -o walk.csv
-  tumble follow orbit.csv --direction at:0,1,0 --frame fixed -o camera.glb")]
+#[command(after_help = format!("Paths are {}.\n{NOTES}", kinds()))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     command_line: CommandLine,
@@ -94,7 +104,6 @@ impl Arguments {
         samples: &SampleRequest,
         device: &mut OpenedDevice,
     ) -> Result<EvaluatedResult, Failure> {
-        let started = Instant::now();
         let [paths] = work.clips()[..] else {
             unreachable!("all paths of a file are one clip");
         };
@@ -106,19 +115,13 @@ impl Arguments {
         let frames = samples.of(set, name);
         let found = followed(device, name, set, &follow, &frames)?;
         let written = write(paths, &frames, samples, &found, target, name)?;
-        let message = format!(
-            "{name}: {} × {}, {}, on {} in {} → {target}",
+        let done = format!(
+            "{} × {}, {}",
             words::count(set.track_count(), "track"),
             words::count(found.rotations.sample_count(), "frame"),
             self.path.method(),
-            device.label,
-            words::duration(started.elapsed()),
         );
-        Ok(EvaluatedResult {
-            written,
-            device: device.label.clone(),
-            message,
-        })
+        Ok(work.result(written, &done, Some(&device.label)))
     }
 }
 

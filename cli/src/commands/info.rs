@@ -12,13 +12,10 @@ use tumble::{Channel, Interpolation, TrackSet};
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
 
-use crate::arguments::input;
-use crate::arguments::input::Inputs;
+use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::curve_warning;
 use crate::messages::exit::{Failure, for_each};
-use crate::messages::listing;
-use crate::messages::names;
-use crate::messages::words;
+use crate::messages::{listing, names, words};
 
 /// Steps that differ by less than this (relative) are even: decimal times are
 /// rarely even to the last bit.

@@ -11,7 +11,7 @@ use crate::messages::listing;
 /// List the methods of interpolation
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Print JSON, with formulas and sources
+    /// Print JSON: with formulas and sources
     #[arg(long)]
     json: bool,
 }

@@ -19,7 +19,7 @@ use crate::arguments::path::PathArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::batch::room;
 use crate::commands::follow::followed;
-use crate::commands::route::surface::Surface;
+use crate::commands::route::surface::{Surface, kinds};
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::names;
@@ -32,16 +32,24 @@ const FACETS: usize = 32;
 /// What is drawn beside the bodies on paths.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Scenery {
-    /// Draw the ground and objects on it: meshes (.obj, .ply, .glb, .gltf) or nets (.npy); bodies then
-    /// stand on their paths, instead of being centred on them
-    #[arg(long = "mesh", value_name = "FILES", value_delimiter = ',')]
+    /// The ground and objects on it.
+    #[arg(
+        long = "mesh",
+        value_name = "FILES",
+        value_delimiter = ',',
+        help = format!(
+            "Draw the ground and objects on it, each {}; bodies then stand on their paths, instead of \
+             being centred on them",
+            kinds()
+        )
+    )]
     pub(crate) meshes: Vec<PathBuf>,
     /// The length of a body on a path [default: a tenth of the path's size]
     #[arg(long, value_name = "LENGTH", value_parser = crate::arguments::path::positive)]
     pub(crate) body: Option<f64>,
     /// How many frames to draw as small axes along a path
-    #[arg(long, value_name = "N", default_value_t = 40)]
-    pub(crate) axes: usize,
+    #[arg(long, alias = "axes", value_name = "N", default_value_t = 40)]
+    pub(crate) drawn_frames: usize,
 }
 
 impl Scenery {

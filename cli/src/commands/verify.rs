@@ -7,31 +7,27 @@ use serde::Serialize;
 use tumble::verify::{Verdict, Verification};
 use tumble::{Method, TrackSet};
 
-use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
-use crate::arguments::input;
-use crate::arguments::input::Inputs;
+use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
     InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
 };
+use crate::arguments::options::CommandLine;
 use crate::arguments::time::{SampleRequest, SamplingArguments};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
-use crate::messages::listing;
-use crate::messages::names;
 use crate::messages::progress::Progress;
-use crate::messages::words;
+use crate::messages::{listing, names, words};
 
 /// Compare the device with the CPU, bit for bit, and both with f64
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every rotation of every frame is computed three times: on the device, by its f32
-twin on the CPU, and by a textbook implementation in f64. The bits of the first two
-must agree; the error against the third has a bound. So is what follows from the
-rotations: velocities, accelerations, every encoding. Exit code 8 when not. The device is the
-first Vulkan device where --device names none: the CPU would be compared with itself. Where there is
-none, the CPU is compared with f64 alone, and the exit code is 5; --device cpu asks for that, and it
-is 0.
+Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by
+a textbook implementation in f64. The bits of the first two must be equal, and the error against the
+third must be within a bound. Velocities, accelerations and every encoding are compared in the same
+way. The exit code is 8 if a comparison fails. By default the device is the first Vulkan device. If
+there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this
+comparison is enough, and the exit code is 0.
 
 Examples:
   tumble verify data/pendulum.dat
@@ -42,7 +38,7 @@ pub(crate) struct Arguments {
     command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
-    /// The methods to verify: one or several, or all
+    /// How to interpolate: the methods to verify, one or several, or all
     #[arg(
         short,
         long = "method",

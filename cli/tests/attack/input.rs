@@ -10,6 +10,7 @@ use tumble_formats::FORMATS;
 
 use super::{run, times};
 use crate::cases;
+use crate::commands;
 use crate::program::{Run, root, sample_folder};
 use crate::support::Random;
 
@@ -75,23 +76,43 @@ fn broken(folder: &Path) -> Vec<(&'static str, i32)> {
     all
 }
 
-/// The commands that take any inputs, with what they need.
-const COMMANDS: [&[&str]; 8] = [
+/// What commands that make no results need to take any inputs.
+const COMMANDS: [&[&str]; 4] = [
     &["info"],
-    &["eval", "--to", "npz", "-o", "out/"],
-    &["convert", "--to", "glb", "-o", "out/"],
-    &["smooth", "--to", "npz", "-o", "out/"],
-    &["reduce", "--to", "glb", "-o", "out/"],
     &["verify", "-m", "slerp", "--device", "cpu"],
     &["plot", "-o", "pictures"],
     &["render", "-o", "film.gif", "--fps", "2", "--size", "32x32"],
 ];
 
+/// The commands that take any inputs, with what they need: those of [`COMMANDS`], and all that make a result
+/// of each input.
+fn taking_inputs() -> Vec<Vec<String>> {
+    // One takes two inputs; the other writes one page for all of them.
+    const NOT_HERE: [&str; 2] = ["compare", "view"];
+    let owned = |line: &[&str]| line.iter().map(|word| (*word).to_owned()).collect();
+    let mut all: Vec<Vec<String>> = COMMANDS.iter().map(|line| owned(line)).collect();
+    let formats = ["npz", "glb"].into_iter().cycle();
+    for (name, format) in commands::writing_results().iter().zip(formats) {
+        all.push(owned(&[name, "--to", format, "-o", "out/"]));
+    }
+    for command in commands::commands() {
+        let name = command.get_name();
+        let is_known = all.iter().any(|line| line[0] == name) || NOT_HERE.contains(&name);
+        let takes_inputs = commands::has(&command, "files_from");
+        assert!(
+            is_known || !takes_inputs,
+            "`{name}` takes inputs: COMMANDS needs a line"
+        );
+    }
+    all
+}
+
 /// Every input has a line, whatever stands beside it, and the exit code is that of the worst.
 #[test]
 fn no_input_ends_without_a_line() {
     let mut random = Random(18);
-    for command in COMMANDS {
+    for command in taking_inputs() {
+        let command: Vec<&str> = command.iter().map(|word| &**word).collect();
         let folder = sample_folder();
         let all = broken(folder.path());
         let mut sets: Vec<Vec<(&str, i32)>> = all.iter().map(|&one| vec![one]).collect();
@@ -110,7 +131,7 @@ fn no_input_ends_without_a_line() {
                 let _ = fs::remove_dir_all(folder.path().join(made));
             }
             let names: Vec<&str> = set.iter().map(|one| one.0).collect();
-            let line = [command, &names[..], &["--overwrite"]].concat();
+            let line = [&command[..], &names[..], &["--overwrite"]].concat();
             let line = &line[..line.len() - usize::from(["info", "verify"].contains(&command[0]))];
             let run = attempt(folder.path(), line);
             let worst = match (
@@ -139,8 +160,9 @@ fn no_input_ends_without_a_line() {
 fn all_broken_animations_are_told() {
     let folder = sample_folder();
     broken(folder.path());
-    for command in COMMANDS {
-        let line = [command, &["two_broken.gltf"]].concat();
+    for command in taking_inputs() {
+        let command: Vec<&str> = command.iter().map(|word| &**word).collect();
+        let line = [&command[..], &["two_broken.gltf"]].concat();
         let run = attempt(folder.path(), &line);
         assert!(
             run.words.contains("/animations/0/"),
@@ -321,10 +343,24 @@ fn no_name_reaches_a_terminal_as_it_is() {
             "ways/",
         ]);
         lines.push(vec![
-            "route", "word.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+            "route",
+            "word.obj",
+            "--start-point",
+            "0,0,0",
+            "--end-point",
+            "1,0,0",
+            "-o",
+            "w.csv",
         ]);
         lines.push(vec![
-            "route", "word.ply", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+            "route",
+            "word.ply",
+            "--start-point",
+            "0,0,0",
+            "--end-point",
+            "1,0,0",
+            "-o",
+            "w.csv",
         ]);
         lines.push(vec!["eval", "--files-from", "list.txt", "-o", "o/"]);
         lines.push(vec!["check", "results"]);
@@ -432,7 +468,7 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 fn mutated_files_end_with_a_code() {
     let mut random = Random(38_200);
     let body = root().join("formats/tests/fixtures/body");
-    let folders = FORMATS.into_iter().map(|format| cases::folder(format.name));
+    let folders = FORMATS.iter().map(|format| cases::folder(format.name));
     let mut seeds = Vec::new();
     for folder in folders.chain([body]) {
         let files = fs::read_dir(folder).unwrap();
@@ -464,9 +500,9 @@ fn mutated_files_end_with_a_code() {
             ("obj", _) => &[
                 "route",
                 &name,
-                "--from",
+                "--start-point",
                 "0,0,0",
-                "--to",
+                "--end-point",
                 "1,1,0",
                 "--overwrite",
                 "-o",
@@ -560,9 +596,9 @@ fn nothing_small_takes_long() {
             &[
                 "route",
                 "nested.npy",
-                "--from",
+                "--start-point",
                 "0,0,0",
-                "--to",
+                "--end-point",
                 "1,1,1",
                 "-o",
                 "n.csv",
@@ -573,9 +609,9 @@ fn nothing_small_takes_long() {
             &[
                 "route",
                 "chain.gltf",
-                "--from",
+                "--start-point",
                 "0,0,0",
-                "--to",
+                "--end-point",
                 "1,1,1",
                 "-o",
                 "n.csv",
@@ -663,19 +699,54 @@ fn faults_of_inputs_are_no_bugs() {
         "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2), }"
     );
     let net = [&b"\x93NUMPY\x01\0\x76\0"[..], array.as_bytes(), &[0; 32]].concat();
-    fs::write(folder.path().join("net.npy"), net).unwrap();
+    fs::write(folder.path().join("net.npy"), &net).unwrap();
+    // One row of four points is no surface.
+    let mut row = net;
+    row.truncate(128);
+    let shape = row.windows(9).position(|part| part == b"(2, 2, 2)");
+    let shape = shape.expect("the shape is in the header");
+    row[shape..shape + 9].copy_from_slice(b"(1, 2, 3)");
+    row.extend([0; 24]);
+    fs::write(folder.path().join("row.npy"), row).unwrap();
     for (line, code) in [
         (
             &[
-                "route", "none.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+                "route",
+                "none.obj",
+                "--start-point",
+                "0,0,0",
+                "--end-point",
+                "1,0,0",
+                "-o",
+                "w.csv",
             ][..],
             "E610",
         ),
         (
             &[
-                "route", "net.npy", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+                "route",
+                "net.npy",
+                "--start-point",
+                "0,0,0",
+                "--end-point",
+                "1,0,0",
+                "-o",
+                "w.csv",
             ],
             "E309",
+        ),
+        (
+            &[
+                "route",
+                "row.npy",
+                "--start-point",
+                "0,0,0",
+                "--end-point",
+                "1,0,0",
+                "-o",
+                "w.csv",
+            ],
+            "E611",
         ),
         (
             &["route", "flat.obj", "--pairs", "pairs.txt", "-o", "ways/"],

@@ -12,7 +12,7 @@ use glam::Quat;
 use tumble_formats::FORMATS;
 use tumble_formats::budget::{BASE, FACTOR};
 use tumble_formats::bvh;
-use tumble_formats::format::{MotionOptions, ReadOptions};
+use tumble_formats::format::{FormatOption, MotionOptions, ReadOptions};
 use tumble_formats::gltf::meshes::triangles_of;
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::keyed::keyed;
@@ -319,22 +319,22 @@ fn every_reader_of_binary_files_asks_for_its_memory() {
     let _one = one_at_a_time();
     let mut report = String::new();
     for format in FORMATS {
-        let text = ["dat", "bvh", "csv", "tum", "euroc"].contains(&format.name);
-        // An array alone says nothing without a map, poses without a rate.
-        if ["npy", "kitti"].contains(&format.name) {
-            continue;
-        }
         let files = std::fs::read_dir(cases::folder(format.name)).unwrap();
         let mut asked = 0;
         for file in files {
             let path = file.unwrap().path();
-            let with = |memory| {
+            let with = |memory, is_explained| {
                 let limits = Limits {
                     memory,
                     ..Limits::default()
                 };
+                // An array alone says nothing without a map, poses without a rate.
+                let takes = |option| is_explained && format.takes(option);
                 let options = ReadOptions {
                     limits,
+                    source_rate: takes(FormatOption::SourceRate)
+                        .then(|| tumble::FrameRate::new(30, 1).unwrap()),
+                    map: takes(FormatOption::Map).then(|| "rotations=arr_0:xyzw:track".to_owned()),
                     ..ReadOptions::default()
                 };
                 let read = format.open(&path, &options);
@@ -346,13 +346,14 @@ fn every_reader_of_binary_files_asks_for_its_memory() {
                     }
                 })
             };
-            if with(None).is_err() {
+            let mut explained = [false, true].into_iter();
+            let Some(is_explained) = explained.find(|&it| with(None, it).is_ok()) else {
                 continue;
-            }
-            let refused = with(Some(100)).err();
+            };
+            let refused = with(Some(100), is_explained).err();
             assert_eq!(
                 refused.map(|fault| fault.code),
-                (!text).then_some(Code::Memory),
+                (!format.is_text).then_some(Code::Memory),
                 "{}",
                 path.display()
             );

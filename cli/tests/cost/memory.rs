@@ -166,6 +166,21 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
             evaluating >> 10,
             streaming >> 10
         );
+        // Of a part of a set, what its samples need.
+        let (count, of_part) = peak_of(|| {
+            let mut count = 0;
+            let request = engine.request(&set, method, &frames).layout(layout);
+            let request = request.tracks(7..9).samples(1000..1500);
+            let sink = |chunk: Chunk<'_>| {
+                count += chunk.rows.len();
+                Ok::<(), Error>(())
+            };
+            request.stream(1 << 8, sink).unwrap();
+            count
+        });
+        assert_eq!(count, 2 * 500);
+        println!("{memory:?}: streaming a part {} KiB", of_part >> 10);
+        assert!(of_part < 2 * MIB, "{of_part}");
         let segments = set.key_count() * 176;
         match memory {
             None => assert!(uploading > segments && streaming > 4 * limit),

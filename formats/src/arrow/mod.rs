@@ -28,13 +28,15 @@ use crate::table::plan::TablePlan;
 /// Arrow IPC files, and streams.
 pub static FORMAT: Format = Format {
     name: "arrow",
-    summary: "a table in columns as it lies in memory, a row for each key",
+    summary: "an Arrow table, a row for each key",
     extensions: &["arrows", "feather", "ipc"],
     probe: |start| start.starts_with(messages::MAGIC) || messages::is_stream(start),
+    numbers_in_line: None,
+    is_text: false,
+    numbers_repeated_names: true,
     read: open_arrow,
     read_bytes: read_arrow,
     write: Some(WriteResults {
-        is_text: false,
         order: ComponentOrder::Xyzw,
         layout: None,
         // The frame, the time and the track beside it.

@@ -90,7 +90,7 @@ impl Hierarchy {
         match parser.next()? {
             Some(word) if word.is(FIRST_WORD) => {}
             Some(word) => {
-                let message = format!("`{}` where a BVH file says {FIRST_WORD}", word.text);
+                let message = format!("`{}` found where {FIRST_WORD} is expected", word.text);
                 return Err(parser.refuse(&word, Code::BvhStart, message));
             }
             None => {
@@ -111,7 +111,7 @@ impl<R: BufRead> Parser<'_, R> {
     /// Reads what one keyword begins; whether it was another than `MOTION`.
     fn statement(&mut self) -> Result<bool, Diagnostic> {
         let Some(word) = self.next()? else {
-            let message = "the file ends without MOTION; is it cut?".to_owned();
+            let message = "the file ends without MOTION; is it truncated?".to_owned();
             return Err(self.lines.refuse_end(Code::BvhMotion, message));
         };
         // The joint that the word stands in; an End Site holds an OFFSET and nothing else.
@@ -141,7 +141,7 @@ impl<R: BufRead> Parser<'_, R> {
                     return Err(self.refuse(&word, Code::BvhSecond, message));
                 } else if ["ROOT", "JOINT", "END", "OFFSET", "CHANNELS", "MOTION"].contains(&other)
                 {
-                    "has no place here: a ROOT holds an OFFSET, CHANNELS and JOINTs, or an End Site"
+                    "is not expected here; a ROOT contains an OFFSET, CHANNELS and JOINTs, or an End Site"
                 } else {
                     "is not a keyword of BVH; remove it"
                 };
@@ -190,7 +190,7 @@ impl<R: BufRead> Parser<'_, R> {
                 return Err(self.refuse(&word, Code::BvhBraces, message));
             }
             None => {
-                let message = "the file ends where `{` is missing; is it cut?".to_owned();
+                let message = "the file ends where `{` is missing; is it truncated?".to_owned();
                 return Err(self.refuse(keyword, Code::BvhBraces, message));
             }
         }
@@ -241,7 +241,7 @@ impl<R: BufRead> Parser<'_, R> {
                     let lost = (site.as_dvec3() - exact).abs().max_element();
                     if exact.abs().max_element() >= SMALL && lost > 0.0 {
                         let message = format!(
-                            "an End Site is kept in f32, up to {lost:.2e} from where the file has it"
+                            "an End Site is kept in f32, up to {lost:.2e} from its position in the file"
                         );
                         self.lines
                             .warn(keyword.column, Code::EndSiteRounded, message);
@@ -270,7 +270,7 @@ impl<R: BufRead> Parser<'_, R> {
         }
         if count.text.parse() != Ok(named) {
             let message = format!(
-                "`{}` channels with {named} names after it; the number counts the names",
+                "`{}` channels with {named} names after it; it must be the number of names",
                 count.text
             );
             return Err(self.refuse(&count, Code::BvhChannelCount, message));

@@ -34,11 +34,15 @@ pub static FORMAT: Format = Format {
         let word = start.trim_ascii_start().get(..hierarchy::FIRST_WORD.len());
         word.is_some_and(|word| word.eq_ignore_ascii_case(hierarchy::FIRST_WORD.as_bytes()))
     },
+    numbers_in_line: None,
+    is_text: true,
+    numbers_repeated_names: false,
     read: open_bvh,
     read_bytes: |name, bytes, options| read_bvh(name, &bytes[..], options),
     write: None,
     write_motion: Some(write_motion),
     features: &[
+        Feature::SeveralTracks,
         Feature::TrackNames,
         Feature::Skeleton,
         Feature::Translations,

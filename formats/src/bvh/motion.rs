@@ -70,13 +70,13 @@ impl FrameKeys {
         }
         // Rows without numbers are blank lines.
         if (rows.count as u64) < frames && hierarchy.columns > 0 {
-            let message = format!("{} rows of {frames} frames; is the file cut?", rows.count);
+            let message = format!("{} rows of {frames} frames; is the file truncated?", rows.count);
             return Err(lines.refuse_end(Code::BvhCut, message));
         }
         if rows.count == 0 {
             let end = lines.refuse_end(
                 Code::BvhNoFrames,
-                "no frames; the skeleton rests".to_owned(),
+                "no frames; nothing moves".to_owned(),
             );
             lines.warnings.push(end);
         }
@@ -262,7 +262,7 @@ fn read_field<R: BufRead>(
         let mut values = tokens(value);
         let (Some((column, text)), None) = (values.next(), values.next()) else {
             let found: String = line.trim().chars().take(24).collect();
-            let message = format!("`{found}` where `{example}` belongs, with one number");
+            let message = format!("`{found}` where `{example}` is expected, with one number");
             return Err(lines.refuse(1, code, message));
         };
         return Ok(Field {
@@ -270,7 +270,7 @@ fn read_field<R: BufRead>(
             text: text.to_owned(),
         });
     }
-    let message = format!("`{example}` is missing; is the file cut?");
+    let message = format!("`{example}` is missing; is the file truncated?");
     Err(lines.refuse_end(code, message))
 }
 

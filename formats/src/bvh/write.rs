@@ -133,19 +133,8 @@ fn axes(sequence: EulerSequence) -> Result<[usize; 3], String> {
 
 /// The rate of the samples, each on the frame behind the one before.
 fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
-    let (times, tracks) = (sampled.times, sampled.clip.set.track_count());
-    let samples = times.len() * tracks;
-    let fits = |count: usize| count == 0 || count == samples;
-    let (translations, skeleton) = (sampled.translations, &sampled.clip.skeleton);
-    if sampled.rotations.len() != samples
-        || !fits(translations.len())
-        || !fits(sampled.scales.len())
-        || !(skeleton.is_empty() || skeleton.len() == tracks)
-    {
-        let message = "lists of samples whose lengths are not those of times and tracks";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
-    }
-    if samples == 0 {
+    let (times, translations) = (sampled.times, sampled.translations);
+    if sampled.checked_len()? == 0 {
         return Ok(Err(
             "no samples or no tracks; there is nothing to write".to_owned()
         ));

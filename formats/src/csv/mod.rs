@@ -25,10 +25,12 @@ pub static FORMAT: Format = Format {
     summary: "text, a row for each frame or key",
     extensions: &[],
     probe: |_| false,
+    numbers_in_line: None,
+    is_text: true,
+    numbers_repeated_names: true,
     read: read::open_csv,
     read_bytes: read::read_csv,
     write: Some(WriteResults {
-        is_text: true,
         order: ORDER,
         // A row holds one frame.
         layout: Some(Layout::FrameMajor),
@@ -50,6 +52,8 @@ pub static FORMAT: Format = Format {
     }),
     write_motion: Some(|clips, options, out| motion::write_motion(clips, options, out)),
     features: &[
+        Feature::SeveralTracks,
+        Feature::Quaternions,
         Feature::TrackNames,
         Feature::Translations,
         Feature::Scales,

@@ -42,15 +42,7 @@ pub(crate) fn write_motion(
     };
     components.extend(moves.iter().filter(|_| moved));
     components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
-    let all = sampled.times.len().saturating_mul(tracks);
-    let fits = |length: usize| length == all || length == 0;
-    if sampled.rotations.len() != all
-        || !fits(sampled.translations.len())
-        || !fits(sampled.scales.len())
-    {
-        let message = "a clip's samples are not as many as its times and tracks";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
-    }
+    sampled.checked_len()?;
     let mut writer = ::csv::Writer::from_writer(out);
     let mut row = vec!["frame".to_owned(), "time".to_owned()];
     for name in distinct_names(set) {

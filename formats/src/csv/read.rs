@@ -341,7 +341,7 @@ impl TextCell<'_> {
     fn out_of_range(&self, text: &[u8]) -> Diagnostic {
         let text = as_text(text);
         let message = format!(
-            "the time {text} is beyond 1e14 s; --time-unit ms, us or ns says that it is none of seconds"
+            "the time {text} is beyond 1e14 s; --time-unit ms, us or ns states another unit than seconds"
         );
         self.refuse(Code::Time, message)
     }

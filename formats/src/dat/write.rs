@@ -30,14 +30,11 @@ pub(super) fn write_motion(
         let message = format!("{tracks} tracks; a .dat file holds 1 to {MAX_BOXES}");
         return Err(refuse(Code::Boxes, message).into());
     }
-    if sampled.rotations.len() != sampled.times.len().saturating_mul(tracks) {
-        let message = "a clip's samples are not as many as its times and tracks";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
-    }
+    sampled.checked_len()?;
     let offset = sampled.clip.time_offset as f64;
     if let Some(pair) = sampled.times.windows(2).find(|pair| pair[1] <= pair[0]) {
         let message = format!(
-            "time {} is followed by {}; times increase strictly",
+            "time {} is followed by {}; times must increase strictly",
             pair[0], pair[1]
         );
         return Err(refuse(Code::TimeNotIncreasing, message).into());

@@ -42,11 +42,15 @@ pub static FORMAT: Format = Format {
     summary: "scenes of Maya, Blender, MotionBuilder, Mixamo, as binary or text",
     extensions: &[],
     probe: is_fbx,
+    numbers_in_line: None,
+    is_text: false,
+    numbers_repeated_names: false,
     read: open_fbx,
     read_bytes: |name, bytes, options| read_fbx(name, &bytes, options),
     write: None,
     write_motion: None,
     features: &[
+        Feature::SeveralTracks,
         Feature::TrackNames,
         Feature::ClipName,
         Feature::Skeleton,
@@ -189,7 +193,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
                 };
                 let reason = &*error.description;
                 let message = format!(
-                    "cannot be read as FBX: {reason}{info}; is it cut, or of another format?"
+                    "cannot be read as FBX: {reason}{info}; is it truncated, or of another format?"
                 );
                 (Code::FbxDamaged, message)
             }
@@ -249,10 +253,10 @@ fn warn_of_scene(scene: &SceneRoot, warnings: &mut Warnings) {
         .count();
     if helpers > 0 {
         warnings.warn(Code::FbxScaleNodes, || {
-            let nodes = count(helpers, "node").unwrap_or_default();
+            let nodes = count(helpers, "additional node").unwrap_or_default();
             (
                 None,
-                format!("{nodes} more, for scales that children do not inherit"),
+                format!("{nodes}, for scales that children do not inherit"),
             )
         });
     }
@@ -387,7 +391,7 @@ impl FbxReader<'_> {
             if !keys.is_whole {
                 warnings.warn(Code::FbxWild, || {
                     let message = format!(
-                        "the curves of `{}` change faster than keys follow them; they are near there, not on it",
+                        "the curves of `{}` change too fast; between some keys they are only approximated",
                         self.nodes.names[track]
                     );
                     (None, message)
@@ -443,7 +447,7 @@ impl FbxReader<'_> {
         }
         if takes.nodes.values().all(NodeTimes::is_empty) {
             warnings.warn(Code::FbxRests, || {
-                (inside(), "the stack moves no node; the skeleton rests")
+                (inside(), "the stack moves no node; nothing moves")
             });
         }
     }

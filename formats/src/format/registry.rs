@@ -1,46 +1,12 @@
-//! The table of file formats. Help, the choice by a file's name, directory walks, shell
-//! completions and errors walk it: a format is one file and one line in [`FORMATS`].
+//! What is asked of the table of file formats, [`FORMATS`]: which format has a name, and which of them a file
+//! is in.
 
 use std::path::Path;
 
+use crate::FORMATS;
 use crate::diagnostic::Diagnostic;
-#[cfg(feature = "fbx")]
-use crate::fbx;
-use crate::format::{Format, Loaded, ReadOptions};
-#[cfg(feature = "mcap")]
-use crate::mcap;
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::{START, Source};
-#[cfg(feature = "parquet")]
-use crate::{arrow, parquet};
-use crate::{bvh, csv, dat, euroc, gltf, kitti, npy, npz, tum};
-
-/// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
-/// their name; the first format is that of inputs which tell neither way, the first of
-/// [`Format::writable`] that of such outputs.
-pub static FORMATS: [&Format; COUNT] = [
-    &dat::FORMAT,
-    &gltf::FORMAT,
-    &bvh::FORMAT,
-    #[cfg(feature = "fbx")]
-    &fbx::FORMAT,
-    &npz::FORMAT,
-    &npy::FORMAT,
-    #[cfg(feature = "parquet")]
-    &parquet::FORMAT,
-    #[cfg(feature = "parquet")]
-    &arrow::FORMAT,
-    &csv::FORMAT,
-    &tum::FORMAT,
-    &euroc::FORMAT,
-    &kitti::FORMAT,
-    #[cfg(feature = "mcap")]
-    &mcap::FORMAT,
-];
-
-const COUNT: usize = 9
-    + 2 * cfg!(feature = "parquet") as usize
-    + cfg!(feature = "fbx") as usize
-    + cfg!(feature = "mcap") as usize;
 
 impl Format {
     /// The format with that name, in any case.
@@ -52,7 +18,7 @@ impl Format {
                 .chain(format.extensions.iter().copied());
             names.any(|known| known.eq_ignore_ascii_case(name))
         };
-        FORMATS.into_iter().find(has_name)
+        FORMATS.iter().copied().find(has_name)
     }
 
     /// The format that the extension of a file tells.
@@ -63,21 +29,32 @@ impl Format {
 
     /// The formats that results are written in, those that hold them as they come first.
     pub fn writable() -> impl Iterator<Item = &'static Self> {
-        let as_they_come = FORMATS.into_iter().filter(|format| format.write.is_some());
+        let as_they_come = FORMATS
+            .iter()
+            .copied()
+            .filter(|format| format.write.is_some());
         let whole = |format: &&Self| format.write.is_none() && format.write_motion.is_some();
-        as_they_come.chain(FORMATS.into_iter().filter(whole))
+        as_they_come.chain(FORMATS.iter().copied().filter(whole))
+    }
+
+    /// The names of the formats that take an option, for messages.
+    #[must_use]
+    pub fn names_taking(option: FormatOption) -> String {
+        let all = FORMATS.iter().filter(|format| format.takes(option));
+        let names: Vec<&str> = all.map(|format| format.name).collect();
+        names.join(", ")
     }
 
     /// The format of a file that begins with these bytes; by its name where they tell nothing, by how
     /// many numbers its lines have where that tells nothing either, and else the first of the table.
     #[must_use]
     pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
-        let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
+        let probed = FORMATS.iter().copied().find(|format| (format.probe)(start));
         // Trajectories are mostly called `.txt`, and few say what they are.
-        let by_numbers = || match table_width(start)? {
-            8 => Some(&tum::FORMAT),
-            12 => Some(&kitti::FORMAT),
-            _ => None,
+        let by_numbers = || {
+            let width = Some(table_width(start)?);
+            let mut all = FORMATS.iter().copied();
+            all.find(|format| format.numbers_in_line == width)
         };
         probed
             .or_else(|| Self::of(path))
@@ -150,7 +127,7 @@ mod tests {
 
     #[test]
     fn names_are_found_again() {
-        for format in FORMATS {
+        for &format in FORMATS {
             assert!(std::ptr::eq(Format::named(format.name).unwrap(), format));
             let shouted = format!("a.b.{}", format.name.to_uppercase());
             assert!(std::ptr::eq(

@@ -9,9 +9,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::motion::{ChannelInterpolation, SampledClip};
-use crate::names::distinct_names;
+use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::signs::{continue_signs, signs_jump};
-use crate::tum;
 
 /// Scales this close to 1 are 1: what rounding leaves of them.
 const UNSCALED: f32 = 1e-5;
@@ -69,10 +68,8 @@ fn warnings(
     options: &MotionOptions,
 ) -> Vec<Diagnostic> {
     let left_out = no_room(format, clips, options);
-    // BVH says itself what becomes of names, and in NPZ two tracks may have one.
-    let keeps_names =
-        ["bvh", "npz"].contains(&format.name) || !format.supports(Feature::TrackNames);
-    let changed = clips.iter().filter(|_| !keeps_names).find_map(|clip| {
+    let numbered = clips.iter().filter(|_| format.numbers_repeated_names);
+    let changed = numbered.into_iter().find_map(|clip| {
         let set = &clip.clip.set;
         let mut names = distinct_names(set).into_iter().enumerate();
         let (track, name) = names.find(|(track, name)| *name != set.track_name(*track))?;
@@ -120,8 +117,9 @@ fn loss(
     let (has_it, loss) = match feature {
         Feature::TrackNames => {
             // What a trajectory is called when it is read is no name that it had.
-            let named =
-                |name: Option<&str>| name.is_some_and(|name| !name.is_empty() && name != tum::BODY);
+            let named = |name: Option<&str>| {
+                name.is_some_and(|name| !name.is_empty() && name != TRAJECTORY_TRACK)
+            };
             let has_names = clip.set.tracks().any(|track| named(track.name));
             (has_names, "the names of the tracks")
         }
@@ -150,7 +148,9 @@ fn loss(
             "the order of the channels and the End Sites",
         ),
         Feature::BoxLength => (options.box_length.is_some(), "the length of the boxes"),
-        Feature::World
+        Feature::SeveralTracks
+        | Feature::Quaternions
+        | Feature::World
         | Feature::SeveralClips
         | Feature::TimesPerChannel
         | Feature::UnevenTimes

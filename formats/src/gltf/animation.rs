@@ -60,7 +60,7 @@ pub(super) fn read(
         reader.warn(
             Code::NothingMoved,
             &pointer,
-            || "the animation moves no node; it is kept in the file as it is",
+            || "the animation moves no node; it is copied unchanged",
         );
         return Ok(None);
     }
@@ -225,7 +225,7 @@ fn target(
     if target.node.is_some() && !is_known && TargetPath::named(&target.path).is_none() {
         reader.warn(Code::TargetPath, &format!("{pointer}/target/path"), || {
             format!(
-                "`{}` is not known; the channel is kept as it is",
+                "`{}` is not known; the channel is copied unchanged",
                 target.path
             )
         });
@@ -295,7 +295,7 @@ fn rest(
     if rest.is_sheared {
         let pointer = format!("/nodes/{node}/matrix");
         let message = format!(
-            "the matrix of `{}` shears or projects; poses in the world cannot be computed",
+            "the matrix of `{}` shears or projects; world poses cannot be computed",
             nodes.name(node)
         );
         reader.warn(Code::Shear, &pointer, || message.clone());

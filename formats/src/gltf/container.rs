@@ -175,7 +175,7 @@ fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, ContainerFault> {
         });
         let Some((kind, data)) = data else {
             return Err(broken(format!(
-                "the chunk at byte {offset} is cut; copy the file again"
+                "the chunk at byte {offset} is truncated; copy the file again"
             )));
         };
         match (chunks.is_empty(), kind == JSON) {

@@ -5,7 +5,6 @@ use serde_json::value::RawValue;
 use crate::diagnostic::Diagnostic;
 use crate::gltf::container::padding;
 use crate::gltf::edits::Edits;
-use crate::gltf::gather::GatheredBuffers;
 use crate::gltf::json::{Json, JsonMembers};
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::Buffer;
@@ -25,6 +24,23 @@ enum BufferHome<'a> {
     Gathered(GatheredBuffers),
     /// A buffer of its own, as a data URI.
     Uri,
+}
+
+/// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
+pub(super) struct GatheredBuffers {
+    /// What the first gathered buffer says of itself beside its length and URI.
+    pub(super) members: String,
+    pub(super) kept: Vec<String>,
+}
+
+impl GatheredBuffers {
+    /// The list of buffers, for a BIN chunk of so many bytes.
+    fn buffers(&self, length: u64) -> String {
+        let bin = format!("{{\"byteLength\":{length}{}}}", self.members);
+        let all = std::iter::once(&bin).chain(&self.kept);
+        let all: Vec<&str> = all.map(String::as_str).collect();
+        format!("[{}]", all.join(","))
+    }
 }
 
 impl<'a> BufferData<'a> {

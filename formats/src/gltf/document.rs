@@ -117,7 +117,14 @@ impl Document for GltfDocument {
     }
 
     fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
-        skins::carried(self, clip)
+        let mut json = Json::parse(&self.name, &self.container.text)?;
+        for list in skins::LISTS {
+            json.take_apart(list)?;
+        }
+        let warnings = Warnings::new(&self.name);
+        let folder = self.folder.as_deref();
+        let reader = GltfReader::new(&json, &self.container, folder, self.limits, warnings)?;
+        skins::carried(&reader, clip)
     }
 
     fn write(
@@ -163,8 +170,14 @@ impl Document for GltfDocument {
             let cuts = is_cut(read, sampled);
             if cuts && read.beside > 0 {
                 reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
-                    let count = read.beside;
-                    format!("{count} channels move other things than nodes, such as weights; they are not cut")
+                    let channels = match read.beside {
+                        1 => "1 channel of weights or another property is".to_owned(),
+                        count => format!("{count} channels of weights and other properties are"),
+                    };
+                    format!(
+                        "{channels} not cut: copied whole, at the times of before, in step with the keys \
+                         that are cut; the animation lasts as long as the longest channel"
+                    )
                 });
             }
             if !read.sampled.is_empty() || cuts {

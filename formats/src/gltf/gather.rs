@@ -7,30 +7,13 @@ use serde_json::value::RawValue;
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::container::{check_length, padding};
-use crate::gltf::data::BufferData;
+use crate::gltf::data::{BufferData, GatheredBuffers};
 use crate::gltf::edits::Edits;
 use crate::gltf::json::JsonMembers;
 use crate::gltf::reader::{GltfReader, MESHOPT};
 use crate::gltf::schema::{Buffer, Texture};
 use crate::gltf::uri;
 use crate::gltf::whole::Whole;
-
-/// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
-pub(super) struct GatheredBuffers {
-    /// What the first gathered buffer says of itself beside its length and URI.
-    members: String,
-    kept: Vec<String>,
-}
-
-impl GatheredBuffers {
-    /// The list of buffers, for a BIN chunk of so many bytes.
-    pub(super) fn buffers(&self, length: u64) -> String {
-        let bin = format!("{{\"byteLength\":{length}{}}}", self.members);
-        let all = std::iter::once(&bin).chain(&self.kept);
-        let all: Vec<&str> = all.map(String::as_str).collect();
-        format!("[{}]", all.join(","))
-    }
-}
 
 /// Gathers all buffers that can be; views of them are changed to where they are now.
 ///

@@ -123,7 +123,7 @@ impl<'a> Json<'a> {
         let first = found.next().map(|(_, value)| *value);
         match found.next() {
             Some(_) => {
-                let message = format!("`{name}` is there twice; remove one of them");
+                let message = format!("`{name}` occurs twice; remove one");
                 Err(self.refuse(&format!("/{name}"), Code::Property, message))
             }
             None => Ok(first),
@@ -181,7 +181,7 @@ impl<'a> Json<'a> {
         pointer: &str,
     ) -> Result<T, Diagnostic> {
         serde_json::from_str(raw.get()).map_err(|error| {
-            let message = format!("is not as glTF 2.0 has it: {}", without_position(&error));
+            let message = format!("does not follow glTF 2.0: {}", without_position(&error));
             self.refuse(pointer, Code::Property, message)
         })
     }

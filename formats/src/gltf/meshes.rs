@@ -11,7 +11,8 @@ use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Scene};
-use crate::gltf::{bytes_of, check_version};
+use crate::gltf::{FORMAT, check_version};
+use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
@@ -26,21 +27,28 @@ pub struct Triangles {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Reads the triangles of all meshes that nodes of the file's scene carry; of all nodes where it
-/// names no scene. `-` is standard input.
+/// The meshes of a scene.
+pub static SURFACE: SurfaceFormat = SurfaceFormat {
+    name: FORMAT.name,
+    summary: "glTF 2.0: the triangles of the scene, where its nodes rest",
+    extensions: FORMAT.extensions,
+    kind: SurfaceKind::Mesh,
+    read_bytes: |name, bytes, folder, limits| {
+        let found = triangles_of(name, bytes, folder, limits)?;
+        Ok(Surface::Mesh(Polygons {
+            positions: found.positions,
+            corners: found.triangles.into_flattened(),
+            ends: Vec::new(),
+            warnings: found.warnings,
+        }))
+    },
+};
+
+/// The triangles of all meshes that nodes of the file's scene carry; of all nodes where it names no scene. `name`
+/// is what messages call the file, and `folder` where the files are that it names.
 ///
 /// # Errors
 /// When the file or a mesh is broken, or its positions are compressed in a way that is not known.
-pub fn read_triangles(path: &Path, limits: Limits) -> Result<Triangles, Diagnostic> {
-    let (name, bytes, folder) = bytes_of(path, limits, false)?;
-    triangles_of(&name, bytes, folder, limits)
-}
-
-/// As [`read_triangles`], of the bytes of a file; `name` is what messages call it, and `folder` where the
-/// files are that it names.
-///
-/// # Errors
-/// As [`read_triangles`].
 pub fn triangles_of(
     name: &str,
     bytes: Vec<u8>,

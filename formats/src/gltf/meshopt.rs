@@ -35,7 +35,7 @@ pub(crate) enum Filter {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum MeshoptError {
     /// Triangles, indices, or what is unknown.
-    #[error("the meshopt mode is `{0}`; animations are stored in the mode ATTRIBUTES alone")]
+    #[error("the meshopt mode is `{0}`; animations must use the mode ATTRIBUTES")]
     Mode(String),
     /// Normals, colours, or what is unknown.
     #[error(

@@ -157,7 +157,7 @@ impl<'a> GltfReader<'a> {
         let (said, found) = (buffer.byte_length, bytes.len() as u64);
         if found < said {
             let message =
-                format!("the buffer says {said} bytes, and there are {found}; is it cut?");
+                format!("the buffer says {said} bytes, and there are {found}; is it truncated?");
             return Err(self.json.refuse(&pointer, Code::TooShort, message));
         }
         if found - said > spare {
@@ -226,7 +226,7 @@ impl<'a> GltfReader<'a> {
             }
             if self.required.contains(name) {
                 let message =
-                    format!("the data is to be read by the extension {name}, which is not known");
+                    format!("the data needs the extension {name}, which is not known");
                 return Err(self.json.refuse(&pointer, Code::Extension, message));
             }
         }
@@ -254,7 +254,7 @@ impl<'a> GltfReader<'a> {
             && !view.extensions.0.iter().any(is_compressed)
         {
             self.warn(Code::ByteStride, &format!("{pointer}/byteStride"), || {
-                format!("a stride of {stride} bytes is for vertices alone; it is honoured")
+                format!("a stride of {stride} bytes is allowed only for vertices; it is used anyway")
             });
         }
     }

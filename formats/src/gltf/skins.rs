@@ -6,14 +6,11 @@ use glam::DMat4;
 
 use crate::carried_mesh::{Bone, CarriedMesh};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::gltf::document::GltfDocument;
-use crate::gltf::json::Json;
 use crate::gltf::meshes::{Triangles, add, local_matrix, parents_first, shown};
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Skin};
 use crate::motion::Motion;
-use crate::warnings::Warnings;
 
 /// Bytes of a vertex with its bones and weights, as numbers on the way.
 const VERTEX: usize = 160;
@@ -21,28 +18,26 @@ const VERTEX: usize = 160;
 /// More bones than this have no number.
 const MAX_BONES: usize = u16::MAX as usize + 1;
 
-/// The meshes of the file's scene that tracks of a clip carry; nothing where there are none.
+/// The lists of a file that [`carried`] reads beside its nodes.
+pub(super) const LISTS: [&str; 3] = ["meshes", "scenes", "skins"];
+
+/// The meshes of the file's scene that tracks of a clip carry; nothing where there are none. The file's
+/// [`LISTS`] are taken apart.
 ///
 /// # Errors
 /// When a mesh or a skin is broken or compressed in a way that is not known, or a joint of a skin is no track
 /// of the clip.
 pub(super) fn carried(
-    gltf: &GltfDocument,
+    reader: &GltfReader<'_>,
     clip: &Motion,
 ) -> Result<Option<CarriedMesh>, Diagnostic> {
-    let mut json = Json::parse(&gltf.name, &gltf.container.text)?;
-    for list in ["meshes", "scenes", "skins"] {
-        json.take_apart(list)?;
-    }
-    let warnings = Warnings::new(&gltf.name);
-    let folder = gltf.folder.as_deref();
-    let reader = GltfReader::new(&json, &gltf.container, folder, gltf.limits, warnings)?;
-    let nodes = Nodes::read(&json)?;
+    let json = reader.json;
+    let nodes = Nodes::read(json)?;
     let order = parents_first(&nodes);
-    let is_shown = shown(&json, &nodes, &order)?;
+    let is_shown = shown(json, &nodes, &order)?;
     let tracks = (0..clip.set.track_count()).map(|track| (clip.set.track_name(track), track));
     let mut making = CarriedMeshBuilder {
-        reader: &reader,
+        reader,
         nodes: &nodes,
         tracks: tracks.collect(),
         mesh: CarriedMesh::default(),
@@ -57,15 +52,15 @@ pub(super) fn carried(
     Ok((!found.triangles.is_empty()).then_some(found))
 }
 
-struct CarriedMeshBuilder<'a> {
-    reader: &'a GltfReader<'a>,
+struct CarriedMeshBuilder<'a, 'file> {
+    reader: &'a GltfReader<'file>,
     nodes: &'a Nodes,
     /// By their names, which are those of their nodes.
     tracks: HashMap<String, usize>,
     mesh: CarriedMesh,
 }
 
-impl CarriedMeshBuilder<'_> {
+impl CarriedMeshBuilder<'_, '_> {
     fn add_node(
         &mut self,
         index: usize,

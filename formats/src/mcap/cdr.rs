@@ -40,7 +40,7 @@ impl<'a> Cdr<'a> {
             (0, 7) => (true, 4),
             _ => {
                 return Err(format!(
-                    "begins with {zero:#04x} {kind:#04x}, and plain CDR is read"
+                    "begins with {zero:#04x} {kind:#04x}; only plain CDR is supported"
                 ));
             }
         };

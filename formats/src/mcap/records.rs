@@ -105,7 +105,7 @@ impl<'a> Records<'a> {
             return Err(Diagnostic::new(name, Code::Empty, "the file is empty"));
         }
         if !bytes.starts_with(MAGIC) {
-            let message = "the file does not begin as MCAP does; is it a bag of ROS 1, or SQLite? convert it first";
+            let message = "the file does not begin like an MCAP file; is it a bag of ROS 1, or SQLite? convert it first";
             return Err(Diagnostic::new(name, Code::McapDamaged, message));
         }
         Ok(Self {

@@ -81,7 +81,7 @@ impl Archive {
                 CompressionMethod::Deflated => true,
                 other => {
                     let message = format!(
-                        "the member is packed by {other}; stored and deflated ones are read"
+                        "the member is packed by {other}; only stored and deflated members are supported"
                     );
                     return Err(refuse(Code::Archive, message));
                 }

@@ -14,7 +14,7 @@ pub(crate) mod header;
 mod linear;
 mod mapped;
 mod plan;
-mod rotation_vector;
+pub mod rotation_vector;
 mod smpl;
 mod tumble_layout;
 mod world_bodies;
@@ -36,15 +36,20 @@ use crate::warnings::Warnings;
 /// `NumPy`'s archives of arrays.
 pub static FORMAT: Format = Format {
     name: "npz",
-    summary: "NumPy's archives: AMASS and SMPL motion, bodies, our own arrays",
+    summary: "a NumPy archive: motion of AMASS and SMPL, or arrays of Tumble",
     extensions: &[],
     // A local file header, or the end of an archive without files.
     probe: |start| start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06"),
+    numbers_in_line: None,
+    is_text: false,
+    numbers_repeated_names: false,
     read: open_npz,
     read_bytes: read_npz,
     write: None,
     write_motion: Some(write::write_npz),
     features: &[
+        Feature::SeveralTracks,
+        Feature::Quaternions,
         Feature::TrackNames,
         Feature::ClipName,
         Feature::Skeleton,
@@ -99,8 +104,8 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     };
     let mut plan = plan.ok_or_else(|| {
         let message = format!(
-            "no arrays whose names are known (poses, rotations, body_rotations); --map \
-             rotations=ARRAY:wxyz,time=ARRAY tells what they are; there are {}",
+            "no array has a known name (poses, rotations, body_rotations); say what they \
+             are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",
             archive.listing()
         );
         Diagnostic::new(file, Code::UnknownArrays, message)

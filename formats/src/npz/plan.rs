@@ -166,7 +166,7 @@ impl KeyArray {
                 }
             };
             let message = format!(
-                "the array has shape {shape}; {expected} is read, --map tells of other arrays"
+                "the array has shape {shape}; {expected} is expected; for other arrays use --map"
             );
             return Err(archive.refuse(member, Code::Shape, message));
         };
@@ -265,7 +265,7 @@ impl ArchivePlan {
             let is_track = parent >= 0.0 && parent < self.tracks as f64 && parent.fract() == 0.0;
             if !is_track && parent >= 0.0 || parent.is_nan() {
                 let message = format!(
-                    "track {track} has the parent {parent}, but there are {} tracks; roots have -1",
+                    "track {track} has the parent {parent}, but there are {} tracks; the parent of a root is -1",
                     self.tracks
                 );
                 return Err(refuse(message));
@@ -274,7 +274,7 @@ impl ArchivePlan {
         }
         match circle(&self.parents) {
             Some(track) => Err(refuse(format!(
-                "track {track} is its own ancestor; roots have -1"
+                "track {track} is its own ancestor; the parent of a root is -1"
             ))),
             None => Ok(()),
         }

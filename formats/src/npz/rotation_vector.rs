@@ -76,6 +76,19 @@ pub(crate) fn log(rotation: Quat, before: Option<DVec3>) -> DVec3 {
     }
 }
 
+/// The rotation vector that is not longer than π; 0 where f32 knows no axis.
+#[must_use]
+pub fn shortest(rotation: Quat) -> DVec3 {
+    log(
+        if rotation.w < 0.0 {
+            -rotation
+        } else {
+            rotation
+        },
+        None,
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -34,10 +34,12 @@ pub static FORMAT: Format = Format {
     summary: "a table in columns, a row for each key",
     extensions: &["pq"],
     probe: |start| start.starts_with(MAGIC),
+    numbers_in_line: None,
+    is_text: false,
+    numbers_repeated_names: true,
     read: open_parquet,
     read_bytes: read_parquet,
     write: Some(WriteResults {
-        is_text: false,
         order: ComponentOrder::Xyzw,
         layout: None,
         // Rotations that stand still are compressed to next to nothing.
@@ -94,7 +96,7 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     };
     let [a, b, c, d, magic @ ..] = *tail;
     if magic != *MAGIC {
-        return refuse("the file does not end with PAR1; it is cut, copy it again".to_owned());
+        return refuse("the file does not end with PAR1; it is truncated, copy it again".to_owned());
     }
     let (length, limit) = (
         u32::from_le_bytes([a, b, c, d]),

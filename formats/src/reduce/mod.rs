@@ -16,7 +16,7 @@ use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError};
 
 use crate::format::Quantization;
-use crate::motion::{ChannelInterpolation, Motion};
+use crate::motion::{ChannelInterpolation, Motion, carry_key_data};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::{HierarchyError, WorldPose, parents_first, world};
 
@@ -393,9 +393,7 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
         short
             .set
             .push(clip.set.track_name(index), track.times, &keys)?;
-        if !track.tangents.is_empty() {
-            short.set.set_tangents(index, track.tangents)?;
-        }
+        carry_key_data(&mut short.set, index, &track, 0..keys.len())?;
         if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
             let (times, keys, tangents) = (vectors.times, vectors.keys, vectors.tangents);
             short.set.set_translations(index, times, keys, tangents)?;

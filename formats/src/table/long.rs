@@ -21,10 +21,7 @@ pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
     result: &ResultShape<'a>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> io::Result<Box<dyn ResultWriter + 'a>> {
-    let is_quaternion = matches!(
-        result.encoding,
-        Encoding::F32 | Encoding::F16 | Encoding::Snorm16
-    );
+    let is_quaternion = result.encoding.is_quaternion();
     let mut components = result.encoding.components().to_vec();
     let is_w_first = is_quaternion && result.order == Some(ComponentOrder::Wxyz);
     if is_w_first {
@@ -270,16 +267,7 @@ fn write_clip(
     sink: &mut impl RowSink,
 ) -> io::Result<()> {
     let tracks = sampled.clip.set.track_count();
-    let all = sampled.times.len().saturating_mul(tracks);
-    let fits = |length: usize| length == all || length == 0;
-    if sampled.rotations.len() != all
-        || !fits(sampled.translations.len())
-        || !fits(sampled.scales.len())
-    {
-        return Err(invalid(
-            "a clip's samples are not as many as its times and tracks",
-        ));
-    }
+    sampled.checked_len()?;
     for (index, q) in sampled.rotations.iter().enumerate() {
         let (frame, track) = (index / tracks, index % tracks);
         let time = sampled.times[frame] + sampled.clip.time_offset as f64;

@@ -396,7 +396,7 @@ fn time_column(
     let message = match (frames, options.source_rate) {
         (Some(frames), Some(_)) => return Ok((names.request(frames, ColumnNeed::Whole), true)),
         (Some(frames), None) => format!(
-            "times are frames, in the column `{}`; --source-fps says how many a second has",
+            "times are frames, in the column `{}`; give their rate with --source-fps",
             names.file_columns[frames]
         ),
         (None, _) => format!(
@@ -423,7 +423,7 @@ fn wide_rows(names: &mut ColumnNames<'_>) -> Result<RowLayout, Diagnostic> {
     if prefixes.is_empty() {
         let message = format!(
             "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
-             --map hand=LIST[3:7] takes a part of a list, hand=rx..rz:rotvec neighbouring columns",
+             --map hand=LIST[3:7] selects a part of a list, hand=rx..rz:rotvec a range of columns",
             names.list()
         );
         return Err(names.refuse(Code::NoRotations, message));

@@ -13,7 +13,7 @@ use arrow_array::{
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use half::f16;
-use tumble::{Encoding, TrackSet};
+use tumble::{ComponentType, Encoding, TrackSet};
 
 use crate::names::distinct_names;
 
@@ -60,10 +60,10 @@ pub(crate) enum ComponentColumn {
 
 impl ComponentColumn {
     pub(crate) fn of(encoding: Encoding) -> Self {
-        match encoding {
-            Encoding::F16 => Self::F16(Vec::new()),
-            Encoding::Snorm16 => Self::I16(Vec::new()),
-            _ => Self::F32(Vec::new()),
+        match encoding.component_type() {
+            ComponentType::F16 => Self::F16(Vec::new()),
+            ComponentType::Snorm16 => Self::I16(Vec::new()),
+            ComponentType::F32 => Self::F32(Vec::new()),
         }
     }
 

@@ -289,7 +289,7 @@ impl<R: BufRead> Lines<R> {
             }
             Some(other) => {
                 let point = other as u32;
-                let message = format!("the character U+{point:04X} does not belong; remove it");
+                let message = format!("the character U+{point:04X} is not allowed; remove it");
                 (Code::Character, message)
             }
             None => {

@@ -98,7 +98,7 @@ class MotionLibrary:
     ) -> None:
         clips = list(clips)
         if not clips:
-            raise InputError("clips: there is none")
+            raise InputError("clips: give at least one")
         parents, offsets = _skeleton_of(clips[0] if skeleton is None else skeleton)
         for index, clip in enumerate(clips):
             if len(clip) != len(parents):

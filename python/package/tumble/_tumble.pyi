@@ -1,5 +1,5 @@
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
@@ -35,6 +35,7 @@ __all__ = [
     "clip_of_state",
     "compare",
     "devices",
+    "encodings",
     "evaluate",
     "file_of_state",
     "inputs_of",
@@ -68,10 +69,44 @@ _Arrays: TypeAlias = _Array | Sequence[_Array]
 _Keys: TypeAlias = _Arrays | _Rotation | Sequence[_Rotation]
 _Rate: TypeAlias = float | str | Fraction | np.integer[Any] | np.floating[Any]
 _Path: TypeAlias = str | os.PathLike[str]
-_Order: TypeAlias = Literal["xyzw", "wxyz"]
-_Layout: TypeAlias = Literal["track", "frame"]
+
+# Names of options: written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all stubs::`
+_Align: TypeAlias = Literal["none", "position", "yaw", "se3", "sim3"]
 _Axes: TypeAlias = Literal["body", "parent", "world"]
+_Curve: TypeAlias = Literal["linear", "bessel-overhauser", "cubic"]
+_Encoding: TypeAlias = Literal[
+    "f32",
+    "f16",
+    "snorm16",
+    "axis-angle",
+    "matrix",
+    "matrix-3x4",
+    "euler",
+]
+_Frame: TypeAlias = Literal["minimal", "fixed", "frenet"]
+_Layout: TypeAlias = Literal["track", "frame"]
+_Major: TypeAlias = Literal["row", "column"]
+_NamedEnds: TypeAlias = Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"]
+_Order: TypeAlias = Literal["xyzw", "wxyz"]
+_SmoothingEnds: TypeAlias = Literal["keep", "parabolic", "loop"]
+_Speed: TypeAlias = Literal["as-keyed", "constant"]
+_TimeUnit: TypeAlias = Literal["s", "ms", "us", "ns"]
+_Twist: TypeAlias = Literal["spread", "free"]
+_UpAxis: TypeAlias = Literal["y", "z"]
+_Values: TypeAlias = Literal["rotations", "local", "model", "skinning"]
+_VectorMethod: TypeAlias = Literal[
+    "step",
+    "linear",
+    "catmull-rom",
+    "bessel-overhauser",
+    "gltf-cubic",
+    "c2",
+    "b-spline",
+]
+_Way: TypeAlias = Literal["shortest", "as-authored"]
 _Wrap: TypeAlias = Literal["hold", "loop", "mirror", "extrapolate"]
+# End of names.
+
 _Single: TypeAlias = NDArray[np.float32]
 _Double: TypeAlias = NDArray[np.float64]
 # Double where positions count from an origin.
@@ -95,25 +130,8 @@ _Method: TypeAlias = Literal[
     "squad",
     "step",
 ]
-_Way: TypeAlias = Literal["shortest", "as-authored"]
-_Ends: TypeAlias = (
-    Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"] | ArrayLike
-)
-_Speed: TypeAlias = Literal["as-keyed", "constant"]
-_VectorMethod: TypeAlias = Literal[
-    "step",
-    "linear",
-    "catmull-rom",
-    "bessel-overhauser",
-    "gltf-cubic",
-    "c2",
-    "b-spline",
-]
-_SmoothingEnds: TypeAlias = Literal["keep", "parabolic", "loop"]
+_Ends: TypeAlias = _NamedEnds | ArrayLike
 _Up: TypeAlias = tuple[float, float, float] | Sequence[float] | NDArray[Any]
-_Values: TypeAlias = Literal["model", "skinning", "local", "rotations"]
-_Align: TypeAlias = Literal["none", "position", "yaw", "se3", "sim3"]
-_Curve: TypeAlias = Literal["linear", "bessel-overhauser", "cubic"]
 
 @final
 class Clip:
@@ -606,6 +624,81 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> _Single: ...
+    def rotation_vectors(
+        self,
+        clip: Clip,
+        *,
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> _Single: ...
+    @overload
+    def encoded(
+        self,
+        clip: Clip,
+        encoding: _Encoding,
+        *,
+        major: _Major = "row",
+        sequence: str = "XYZ",
+        degrees: bool = True,
+        out: NDArray[Any] | None = None,
+        layout: _Layout = "track",
+        device_array: Literal[False] = False,
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> NDArray[Any]: ...
+    @overload
+    def encoded(
+        self,
+        clip: Clip,
+        encoding: _Encoding,
+        *,
+        major: _Major = "row",
+        sequence: str = "XYZ",
+        degrees: bool = True,
+        out: None = None,
+        layout: _Layout = "track",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
     def poses(
         self,
         clip: Clip,
@@ -730,9 +823,9 @@ class Engine:
         ends: _Ends = "parabolic",
         ahead: float | None = None,
         look_at: int | ArrayLike | None = None,
-        frame: Literal["minimal", "fixed", "frenet"] = "minimal",
+        frame: _Frame = "minimal",
         up: _Up = (0.0, 1.0, 0.0),
-        twist: Literal["spread", "free"] = "spread",
+        twist: _Twist = "spread",
         speed: Literal["keys", "constant"] | tuple[float, float] = "keys",
         forward: str = "z",
         upward: str = "y",
@@ -964,7 +1057,7 @@ def load(
     source_fps: _Rate | None = None,
     source_times: _Path | None = None,
     map: str | None = None,
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    time_unit: _TimeUnit | None = None,
     duplicates: Literal["first", "last", "both"] | None = None,
     raw_times: bool = False,
     bridge_gaps: bool = False,
@@ -972,7 +1065,7 @@ def load(
     offsets: ArrayLike | None = None,
     body_model: _Path | None = None,
     scale: float | Literal["metres"] | None = None,
-    up: Literal["y", "z"] | None = None,
+    up: _UpAxis | None = None,
 ) -> File: ...
 def save(
     file: _Path,
@@ -1035,6 +1128,7 @@ class Motions:
         angular_velocities: _Single | None,
     ) -> None: ...
 
+def encodings() -> dict[str, str]: ...
 def methods() -> dict[str, str]: ...
 def load_drivers() -> None: ...
 def page(clips: Clip | File | Sequence[Clip], options: Sequence[str]) -> str: ...
@@ -1081,6 +1175,38 @@ class Worker:
         record: bool,
     ) -> tuple[int, str]: ...
 
+@final
+class Record:
+    def __new__(
+        cls, shard: int, of: int, plan: str, inputs: int, lines: Sequence[str]
+    ) -> Record: ...
+    @staticmethod
+    def parse(text: str) -> Record | None: ...
+    @staticmethod
+    def name_of(shard: int) -> str: ...
+    @property
+    def is_whole(self) -> bool: ...
+    @property
+    def plan(self) -> str: ...
+    @plan.setter
+    def plan(self, plan: str) -> None: ...
+    def results(self) -> list[tuple[str, str, int]]: ...
+    def refuse(self, input: str, message: str) -> None: ...
+    def is_made_from(self, inputs: Mapping[str, str], options: str) -> bool: ...
+    def join(
+        self,
+        name: str,
+        *,
+        sha256: str,
+        bytes: int,
+        library: str,
+        inputs_sha256: str,
+        into: str,
+    ) -> None: ...
+    def text(self) -> str: ...
+
+def manifest_results(text: str) -> list[tuple[str, str, int]]: ...
+def manifest_by_input(text: str) -> dict[str, list[str]]: ...
 def inputs_of(line: Sequence[str]) -> list[str]: ...
 def kernels_sha256() -> str: ...
 def merge(folder: str) -> tuple[int, str]: ...

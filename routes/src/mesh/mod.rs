@@ -4,7 +4,6 @@ mod cut;
 mod joints;
 pub(crate) mod links;
 
-pub mod read;
 pub(crate) mod surface;
 pub(crate) mod tree;
 mod weld;

@@ -1,6 +1,8 @@
 //! Meshes whose shortest routes are known.
 
 use glam::{DVec3, dvec3};
+use tumble_formats::surface::Polygons;
+use tumble_routes::error::MeshError;
 use tumble_routes::mesh::Mesh;
 
 pub(crate) fn of(positions: &[DVec3], polygons: &[&[u32]]) -> Mesh {
@@ -85,4 +87,9 @@ pub(crate) fn deltahedron(corners: &[DVec3]) -> Mesh {
         }
     }
     Mesh::new(corners, &triangles).unwrap()
+}
+
+/// The mesh of a file, with positions within a distance of each other welded.
+pub(crate) fn welded(polygons: &Polygons, distance: f64) -> Result<Mesh, MeshError> {
+    Mesh::welded(&polygons.positions, polygons.iter(), distance)
 }

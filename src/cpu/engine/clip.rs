@@ -18,9 +18,9 @@ use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::{Lanes, canonical};
 use crate::threads::{self, stop};
 use crate::time::error::SampleTimesError;
+use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::RunSource;
-use crate::time::track_copy::TrackCopy;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Tracks whose rows are evaluated before they are transposed into frames: their rotations at one

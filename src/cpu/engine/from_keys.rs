@@ -5,18 +5,16 @@
 use glam::Quat;
 use rayon::prelude::*;
 
-use crate::cpu::engine::batches::tasks;
 use crate::cpu::engine::sparse_samples::{Group, intervals_of_frames};
-use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::engine::{CpuEngine, TASK, tasks};
 use crate::cpu::streaming::RowOutput;
 use crate::from_keys::evaluate::KeyEvaluator;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
-use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::error::SetError;
-use crate::prepare::request::SetRequest;
+use crate::prepare::preparation::{Batch, BatchSize, PART_INTERVALS, SetRequest, batches};
 use crate::threads::stop;
+use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::Ticks;
-use crate::time::track_copy::TrackCopy;
 
 /// Keys of one task.
 const TASK_KEYS: usize = 16 * 1024;

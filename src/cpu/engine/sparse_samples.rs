@@ -7,15 +7,12 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::cpu::streaming::RowOutput;
-use crate::prepare::batch::PART_INTERVALS;
 use crate::prepare::error::SetError;
-use crate::prepare::preparation::Preparation;
-use crate::prepare::request::SetRequest;
+use crate::prepare::preparation::{PART_INTERVALS, Preparation, SetRequest};
 use crate::threads::stop;
-use crate::time::frame_clock::FrameClock;
+use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::times::interval_at;
-use crate::time::track_copy::TrackCopy;
 
 /// Samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
 const TASK_SAMPLES: usize = 512;

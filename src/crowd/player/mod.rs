@@ -2,6 +2,8 @@
 
 #[cfg(feature = "vulkan")]
 mod application_device;
+mod visible;
+mod weights;
 
 use std::sync::Arc;
 
@@ -13,12 +15,12 @@ use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, CrowdScene};
 use crate::crowd_error::{CrowdError, MAX_INSTANCES, MAX_LAYERS};
 use crate::engine::Engine;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::gpu::crowd::{CrowdReader, CrowdTables, DeviceCrowd};
-use crate::memory::zeroed;
+use crate::memory::{reserved, zeroed};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
-use crate::threads::OutOfThreadsError;
+use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
@@ -40,10 +42,23 @@ pub struct Crowd {
     /// The push constants that all dispatches share.
     arguments: CrowdDispatch,
     pub(crate) device: Option<Arc<DeviceCrowd>>,
-    /// A submission that was not taken yet. On the CPU it has its values already.
-    submitted: Option<(CrowdOutput, Option<Vec<[f32; 4]>>)>,
+    /// What was submitted and not taken yet.
+    submitted: Option<Submitted>,
     /// What evaluates on the device for the host, for the output that was asked for last.
     reader: Option<CrowdReader>,
+    /// Memory for the CPU: the entries of the instances that are evaluated, where these are not all.
+    gathered: Vec<CrowdEntry>,
+    /// Memory for a bit for each instance.
+    seen: Vec<u64>,
+}
+
+/// A submission that was not taken yet.
+struct Submitted {
+    output: CrowdOutput,
+    /// Vectors of four numbers of its result.
+    len: usize,
+    /// The result, where it is there already: on the CPU, and of no instances.
+    values: Option<Vec<[f32; 4]>>,
 }
 
 impl Engine {
@@ -85,6 +100,8 @@ impl Engine {
             device: None,
             submitted: None,
             reader: None,
+            gathered: Vec::new(),
+            seen: Vec::new(),
             cells,
         };
         crowd.device = crowd.uploaded()?;
@@ -141,7 +158,7 @@ impl Crowd {
     }
 
     /// Sets what a layer of an instance plays from now on: 16 bytes that reach the device with the next
-    /// evaluation.
+    /// evaluation. A fade of the layer ends with it.
     ///
     /// # Errors
     /// When there is no such instance, layer, clip or mask, or a number is out of range; then
@@ -153,6 +170,7 @@ impl Crowd {
         plays: CrowdLayer,
     ) -> Result<(), CrowdError> {
         let (index, entry) = self.packed(instance, layer, plays)?;
+        self.instances.fades.remove(index);
         self.instances.set(index, entry);
         Ok(())
     }
@@ -210,7 +228,7 @@ impl Crowd {
         Ok(tick(entry, &self.library.tables.clips, self.clock()))
     }
 
-    fn entry_index(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
+    pub(crate) fn entry_index(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
         for (subject, index, count) in [
             ("instance", instance, self.instance_count()),
             ("layer", layer, self.layer_count()),
@@ -226,14 +244,15 @@ impl Crowd {
         Ok(instance * self.layer_count() + layer)
     }
 
-    /// Vectors of four numbers of a result, `[instance][joint]`.
+    /// Vectors of four numbers of a result, `[instance][joint]`, of the instances that are
+    /// [visible](Crowd::set_visible).
     #[must_use]
     pub fn output_len(&self, output: impl Into<CrowdOutput>) -> usize {
-        self.instance_count() * self.library.joint_count() * output.into().vector_count()
+        self.visible_count() * self.library.joint_count() * output.into().vector_count()
     }
 
-    /// Evaluates all instances at the clock's time, `[instance][joint]`: a rotation, or the three rows
-    /// of a matrix. Waits until it is done.
+    /// Evaluates all instances, or those that are [visible](Crowd::set_visible), at the clock's time,
+    /// `[instance][joint]`: a rotation, or the three rows of a matrix. Waits until it is done.
     ///
     /// # Errors
     /// When `output` is not exactly as long as the result, skinning matrices are asked for and the
@@ -243,13 +262,13 @@ impl Crowd {
         values: CrowdValues,
         output: &mut [[f32; 4]],
     ) -> Result<(), CrowdError> {
-        self.check_len(output.len(), values.into())?;
+        check_len(output.len(), self.output_len(values))?;
         if self.device.is_some() {
             self.submit(values)?;
             return self.wait_into(output);
         }
         self.check_idle(values.into())?;
-        Ok(self.on_cpu(values, output)?)
+        self.on_cpu(values, output)
     }
 
     /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four halves.
@@ -261,7 +280,7 @@ impl Crowd {
         values: CrowdValues,
         output: &mut [[u16; 4]],
     ) -> Result<(), CrowdError> {
-        self.check_len(output.len(), values.into())?;
+        check_len(output.len(), self.output_len(values))?;
         self.submit(CrowdOutput::half(values))?;
         self.wait_half_into(output)
     }
@@ -275,31 +294,47 @@ impl Crowd {
     pub fn submit(&mut self, output: impl Into<CrowdOutput>) -> Result<(), CrowdError> {
         let output = output.into();
         self.check_idle(output)?;
-        let Some(device) = &self.device else {
-            let mut found = zeroed(self.output_len(output), "a crowd's poses")?;
-            self.on_cpu(output.values, &mut found)?;
-            self.submitted = Some((output, Some(found)));
-            return Ok(());
-        };
-        let kept = self.reader.take();
-        let kept = kept.filter(|reader| reader.target.output() == output);
-        let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
-        let reader = self.reader.insert(reader);
-        let clock = self.instances.clock;
-        if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
-            // What was recorded may never have reached the device.
-            self.instances.forget();
-            self.reader = None;
-            return Err(error.into());
+        let len = self.output_len(output);
+        let mut values = None;
+        match &self.device {
+            Some(device) if len > 0 => {
+                let (instances, all) = (self.visible_count() as u32, self.instance_count() as u32);
+                let kept = self.reader.take();
+                let kept = kept.filter(|reader| reader.fits(output, instances));
+                let room = instances.next_power_of_two().min(all);
+                let reader = kept.map_or_else(|| CrowdReader::new(device, output, room), Ok)?;
+                let reader = self.reader.insert(reader);
+                let layers = self.arguments.layers as usize;
+                if let Err(error) = reader.submit(&self.instances.take_frame(layers)) {
+                    // What was recorded may never have reached the device.
+                    self.instances.forget();
+                    self.reader = None;
+                    return Err(error.into());
+                }
+            }
+            _ => {
+                let found = values.insert(zeroed(len, "a crowd's poses")?);
+                self.on_cpu(output.values, found)?;
+            }
         }
-        self.submitted = Some((output, None));
+        self.submitted = Some(Submitted {
+            output,
+            len,
+            values,
+        });
         Ok(())
     }
 
     /// What was submitted and not taken yet.
     #[must_use]
     pub fn submitted(&self) -> Option<CrowdOutput> {
-        self.submitted.as_ref().map(|(output, _)| *output)
+        self.submitted.as_ref().map(|submitted| submitted.output)
+    }
+
+    /// Vectors of four numbers of the result that was submitted and not taken yet.
+    #[must_use]
+    pub fn submitted_len(&self) -> Option<usize> {
+        self.submitted.as_ref().map(|submitted| submitted.len)
     }
 
     /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
@@ -308,9 +343,9 @@ impl Crowd {
     /// When nothing was submitted, or the device fails.
     pub fn poll(&self) -> Result<bool, CrowdError> {
         match (&self.submitted, &self.reader) {
-            (Some((_, Some(_))), _) => Ok(true),
-            (Some((_, None)), Some(reader)) => Ok(reader.results.is_done()?),
-            _ => Err(CrowdError::NothingSubmitted),
+            (None, _) => Err(CrowdError::NothingSubmitted),
+            (Some(Submitted { values: None, .. }), Some(reader)) => Ok(reader.results.is_done()?),
+            _ => Ok(true),
         }
     }
 
@@ -338,13 +373,15 @@ impl Crowd {
         output: &mut [T],
         stored: impl Fn([f32; 4]) -> T,
     ) -> Result<(), CrowdError> {
-        let submitted = self.submitted().ok_or(CrowdError::NothingSubmitted)?;
-        if submitted.is_half != is_half {
-            let is_half = submitted.is_half;
+        let submitted = self.submitted.as_ref();
+        let submitted = submitted.ok_or(CrowdError::NothingSubmitted)?;
+        if submitted.output.is_half != is_half {
+            let is_half = submitted.output.is_half;
             return Err(CrowdError::Precision { is_half });
         }
-        self.check_len(output.len(), submitted)?;
-        if let Some((_, Some(found))) = self.submitted.take() {
+        check_len(output.len(), submitted.len)?;
+        let submitted = self.submitted.take();
+        if let Some(found) = submitted.and_then(|submitted| submitted.values) {
             for (stored_value, value) in output.iter_mut().zip(found) {
                 *stored_value = stored(value);
             }
@@ -359,14 +396,6 @@ impl Crowd {
             self.reader = None;
         }
         Ok(read?)
-    }
-
-    fn check_len(&self, length: usize, output: CrowdOutput) -> Result<(), CrowdError> {
-        let needed = self.output_len(output);
-        match length == needed {
-            true => Ok(()),
-            false => Err(CrowdError::OutputLength { length, needed }),
-        }
     }
 
     pub(crate) fn check(&self, output: CrowdOutput) -> Result<(), CrowdError> {
@@ -385,18 +414,26 @@ impl Crowd {
         }
     }
 
-    fn on_cpu(
-        &self,
-        values: CrowdValues,
-        output: &mut [[f32; 4]],
-    ) -> Result<(), OutOfThreadsError> {
+    fn on_cpu(&mut self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), CrowdError> {
         let arguments = &self.arguments;
+        let all = &self.instances.entries;
+        let mut entries = &all[..];
+        if let Some(list) = &self.instances.visible {
+            let layers = arguments.layers as usize;
+            self.gathered.clear();
+            let count = list.len() * layers;
+            if self.gathered.capacity() < count {
+                self.gathered = reserved(count, "a crowd's poses")?;
+            }
+            self.gathered.extend(gather(all, list, layers));
+            entries = &self.gathered;
+        }
         let scene = CrowdScene {
             library: &self.library,
             values,
             clock: self.clock(),
             context: Layers {
-                entries: &self.instances.entries,
+                entries,
                 channels: &self.library.tables.channels,
                 cells: &self.cells,
                 positions: &[],
@@ -408,7 +445,7 @@ impl Crowd {
             },
         };
         match &*self.engine.backend {
-            Backend::Cpu(engine) => on_cpu::evaluate(scene, engine, output),
+            Backend::Cpu(engine) => Ok(on_cpu::evaluate(scene, engine, output)?),
             Backend::Vulkan(_) => Ok(()), // its crowds are on the device
         }
     }
@@ -464,6 +501,13 @@ impl Crowd {
             true => Ok(ticks as i64),
             false => Err(CrowdError::Seconds { seconds }),
         }
+    }
+}
+
+fn check_len(length: usize, needed: usize) -> Result<(), CrowdError> {
+    match length == needed {
+        true => Ok(()),
+        false => Err(CrowdError::OutputLength { length, needed }),
     }
 }
 

@@ -6,16 +6,16 @@ use std::sync::Arc;
 use glam::Quat;
 
 use crate::curve::options::Speed;
-use crate::curve::segment::segment_size;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::Backend;
 use crate::evaluate::uploaded::Uploaded;
 use crate::gpu::error::EvaluateError;
 use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
-use crate::prepare::batch::Batch;
 use crate::prepare::clip_data::PrepareRequest;
+use crate::prepare::preparation::Batch;
+use crate::prepare::prepared::segment_size;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
@@ -79,6 +79,23 @@ impl SetPieces<'_> {
         self.interpolation.wrap().are_held() && self.interpolation.speed == Speed::AsKeyed
     }
 
+    /// Bytes that the segments of a window take, about.
+    pub(crate) fn bytes(&self, window: &Window) -> usize {
+        let keys = self.keys(window);
+        keys.saturating_mul(key_bytes(self.interpolation))
+    }
+
+    /// Keys of the intervals that are prepared for a piece.
+    fn keys(&self, piece: &Window) -> usize {
+        match self.batch(piece) {
+            Batch::Tracks(tracks) => self.set.keys_of(tracks),
+            batch => batch
+                .intervals(self.set)
+                .map(|(_, intervals)| intervals.len() + 1)
+                .sum(),
+        }
+    }
+
     /// What is prepared for a piece.
     fn batch(&self, piece: &Window) -> Batch {
         let tracks = piece.tracks.clone();
@@ -115,13 +132,7 @@ impl SetPieces<'_> {
     /// A piece in two, if its segments take too much and it can be cut.
     fn halves(&self, piece: &Window) -> Option<[Window; 2]> {
         let limit = (self.limit / key_bytes(self.interpolation)).max(MIN_KEYS);
-        let keys = match self.batch(piece) {
-            Batch::Tracks(tracks) => self.set.keys_of(tracks),
-            batch => batch
-                .intervals(self.set)
-                .map(|(_, intervals)| intervals.len() + 1)
-                .sum(),
-        };
+        let keys = self.keys(piece);
         let (tracks, samples) = (&piece.tracks, &piece.samples);
         if keys <= limit {
             return None;
@@ -137,6 +148,25 @@ impl SetPieces<'_> {
         (tracks.len() > 1).then(|| [part(tracks.start..middle), part(middle..tracks.end)])
     }
 
+    /// Prepares what a window needs, all at once.
+    pub(crate) fn prepared(&self, window: &Window) -> Result<PreparedWindow, EvaluateError> {
+        let (timeline, first_sample) = self.timeline.part(&window.tracks, &window.samples);
+        let to_prepare = PrepareRequest {
+            batch: self.batch(window),
+            only_for: Some(&timeline),
+            ..PrepareRequest::all(self.set)
+        };
+        let (backend, interpolation) = (self.backend, *self.interpolation);
+        let clip = Uploaded::new(backend, self.set, interpolation, to_prepare, None)?;
+        let timeline = clip.data.folded(&timeline)?.into_owned();
+        Ok(PreparedWindow {
+            clip,
+            timeline,
+            first_track: window.tracks.start,
+            skipped_samples: window.samples.start - first_sample,
+        })
+    }
+
     /// Evaluates one piece into its part of the window.
     fn evaluate(
         &self,
@@ -145,49 +175,23 @@ impl SetPieces<'_> {
         scratch: &mut Vec<Quat>,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        let first_track = piece.tracks.start;
-        let of_set = |error: EvaluateError| error.of_tracks_from(first_track);
-        let (timeline, first_sample) = self.timeline.part(&piece.tracks, &piece.samples);
-        let to_prepare = PrepareRequest {
-            batch: self.batch(piece),
-            only_for: Some(&timeline),
-            ..PrepareRequest::all(self.set)
-        };
-        let clip = Uploaded::new(
-            self.backend,
-            self.set,
-            *self.interpolation,
-            to_prepare,
-            None,
-        )?;
-        let folded = clip.data.folded(&timeline)?;
-        let samples = Window::of(
-            0..piece.tracks.len(),
-            first_sample..first_sample + piece.samples.len(),
-            piece.layout,
-        );
+        let prepared = self.prepared(piece)?;
         let each = self.encoding.bytes();
         let is_together = match piece.layout {
             Layout::TrackMajor => piece.samples == window.samples || piece.tracks.len() == 1,
             Layout::FrameMajor => piece.tracks == window.tracks || piece.samples.len() == 1,
         };
         if is_together {
-            let start = window.offset(first_track, piece.samples.start) * each;
+            let start = window.offset(piece.tracks.start, piece.samples.start) * each;
             let output = &mut output[start..start + piece.len() * each];
-            let evaluated = clip.evaluate_into(&folded, &samples, self.encoding, output);
-            return evaluated.map_err(of_set);
+            return prepared.evaluate_into(piece, self.encoding, output);
         }
-        for part in samples.cut(SCATTERED) {
-            let part = Window::of(part.tracks, part.samples, part.layout);
+        for part in piece.cut(SCATTERED) {
             let bytes = part.len() * each;
             scratch.resize(bytes.div_ceil(size_of::<Quat>()), Quat::IDENTITY);
             let values: &mut [u8] = &mut bytemuck::cast_slice_mut(scratch)[..bytes];
-            let evaluated = clip.evaluate_into(&folded, &part, self.encoding, values);
-            evaluated.map_err(of_set)?;
-            let of_window = |track: usize, sample: usize| {
-                let sample = sample - first_sample + piece.samples.start;
-                window.offset(first_track + track, sample) * each
-            };
+            prepared.evaluate_into(&part, self.encoding, values)?;
+            let of_window = |track, sample| window.offset(track, sample) * each;
             let (row, starts): (usize, Vec<usize>) = match part.layout {
                 Layout::TrackMajor => {
                     let starts = part.tracks.clone();
@@ -205,5 +209,47 @@ impl SetPieces<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Some samples of some tracks of a set, prepared.
+pub(crate) struct PreparedWindow {
+    clip: Uploaded,
+    /// Of the tracks that are prepared.
+    timeline: Timeline,
+    /// The first of these tracks.
+    first_track: usize,
+    /// Samples of the set's timeline before the first of `timeline`.
+    skipped_samples: usize,
+}
+
+impl PreparedWindow {
+    /// Evaluates a part of the window, of tracks and samples of the set, into `output`, which is exactly as long.
+    pub(crate) fn evaluate_into(
+        &self,
+        part: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        self.with(part, |clip, timeline, window| {
+            clip.evaluate_into(timeline, window, encoding, output)
+        })
+    }
+
+    /// Works on what is prepared, with the samples and a part of the window as they are there.
+    pub(crate) fn with<T>(
+        &self,
+        part: &Window,
+        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
+        let (tracks, samples) = (&part.tracks, &part.samples);
+        let (first_track, skipped) = (self.first_track, self.skipped_samples);
+        let window = Window::of(
+            tracks.start - first_track..tracks.end - first_track,
+            samples.start - skipped..samples.end - skipped,
+            part.layout,
+        );
+        let done = work(&self.clip, &self.timeline, &window);
+        done.map_err(|error| error.of_tracks_from(first_track))
     }
 }

@@ -4,9 +4,7 @@ use bytemuck::Zeroable;
 
 use crate::curve::options::Quantity;
 use crate::fit::block::LANES;
-use crate::fit::exact::curve::{CurvePiece, IntervalCurve};
-use crate::fit::exact::fit::{FitBlock, Tier};
-use crate::fit::exact::shape::Shape;
+use crate::fit::exact::fit::{CurvePiece, FitBlock, IntervalCurve, Shape, Tier};
 use crate::shader::PolynomialSegment;
 use crate::threads::stop;
 

@@ -4,13 +4,11 @@ use crate::curve::formula::Product;
 use crate::fit::block::{at, load, put, rounded, store};
 use crate::fit::exact::fit::{FitBlock, FitRow, Tier};
 use crate::fit::exact::handles::redo;
-use crate::fit::exact::shape::Sampling;
-use crate::fit::nodes::{NodeSamples, Nodes};
+use crate::fit::exact::sampling::Sampling;
 use crate::math::quaternion::{
     self, Real as _, cross3, dot3, exp_by, product, product_with_vector, scaled, square,
 };
 use crate::math::ranges::{LONG_WAVES, SHORT_WAVES};
-use crate::shader::PolynomialSegment;
 use crate::simd::doubles::Doubles;
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
@@ -22,26 +20,18 @@ pub(crate) struct Expansion<const PER_CURVE_BASIS: bool>;
 
 impl<const PER_CURVE_BASIS: bool> Sampling for Expansion<PER_CURVE_BASIS> {
     #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        nodes: &Nodes<PAIRS>,
-        segments: &mut [PolynomialSegment],
-    ) {
+    fn sample<L: Lanes>(block: &mut FitBlock) {
         match block.tier {
-            Tier::SmallAngle | Tier::Full => {
-                fit::<L, PAIRS, PER_CURVE_BASIS, true>(block, nodes, segments);
-            }
-            Tier::Piece => fit::<L, PAIRS, PER_CURVE_BASIS, false>(block, nodes, segments),
+            Tier::SmallAngle | Tier::Full => sample::<L, PER_CURVE_BASIS, true>(block),
+            Tier::Piece => sample::<L, PER_CURVE_BASIS, false>(block),
         }
     }
 }
 
 #[inline(always)]
-fn fit<L: Lanes, const PAIRS: usize, const PER_CURVE_BASIS: bool, const WHOLE: bool>(
-    block: &mut FitBlock,
-    nodes: &Nodes<PAIRS>,
-    segments: &mut [PolynomialSegment],
-) {
+fn sample<L: Lanes, const PER_CURVE_BASIS: bool, const WHOLE: bool>(block: &mut FitBlock) {
+    let (_, after_middle) = block.tier.offsets().split_at(1);
+    let after = &after_middle[after_middle.len() / 2..];
     for lane in (0..block.padded_count()).step_by(L::COUNT) {
         let first = Factor::<L>::new::<PER_CURVE_BASIS, WHOLE>(block, lane, 0);
         let second = Factor::<L>::new::<PER_CURVE_BASIS, WHOLE>(block, lane, 1);
@@ -49,8 +39,18 @@ fn fit<L: Lanes, const PAIRS: usize, const PER_CURVE_BASIS: bool, const WHOLE: b
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
         let base = load(from(&block.numbers, 0), lane);
-        let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
-        block.interpolate(lane, nodes, &samples, segments);
+        let cubics = Expanded::new(base, [first, second, third]);
+        block.set_middle(lane, cubics.curve.middle);
+        for (k, &node) in after.iter().enumerate() {
+            let before = cubics.differences::<WHOLE>(L::all(-node as f32));
+            let after = cubics.differences::<WHOLE>(L::all(node as f32));
+            let (mut even, mut odd) = (before, before);
+            for c in 0..4 {
+                even[c] = after[c] + before[c];
+                odd[c] = after[c] - before[c];
+            }
+            block.set_pair(lane, k, even, odd);
+        }
     }
 }
 
@@ -236,22 +236,6 @@ impl<L: Lanes> Expanded<L> {
             squares: [first.square, second.square, third.square],
             powers: [first.powers, second.powers, third.powers],
         }
-    }
-
-    /// Samples the cubics at every node.
-    #[inline(always)]
-    fn sample<const PAIRS: usize, const SHORT: bool>(
-        &self,
-        nodes: &Nodes<PAIRS>,
-    ) -> NodeSamples<L, PAIRS> {
-        let mut samples = NodeSamples::all(L::all(0.0));
-        samples.middle = self.curve.middle;
-        for k in 0..PAIRS {
-            let (before, after) = (L::all(-nodes.at[k]), L::all(nodes.at[k]));
-            let before = self.differences::<SHORT>(before);
-            samples.set_differences(k, before, self.differences::<SHORT>(after));
-        }
-        samples
     }
 
     /// The differences of the rotations at `s` from those at the middle.

@@ -1,22 +1,216 @@
-//! Fits curves by the polynomials that the kernels evaluate, in vector lanes.
+//! Curves in f64 by their formulas, and their fit by the polynomials that the kernels evaluate, in vector
+//! lanes.
 //!
-//! A curve is sampled at Chebyshev nodes, and each component of the rotation becomes the polynomial
+//! A [`Shape`] is a formula as a value, so that the preparation need not know which it is;
+//! [`shape`](crate::fit::exact::shape) has those that several methods share. An [`IntervalCurve`] is one curve
+//! of a shape, or the piece of it that one polynomial fits. In a [`FitBlock`] wait up to [`LANES`] curves of
+//! one shape: each is sampled at Chebyshev nodes, and each component of the rotation becomes the polynomial
 //! through the samples ([`nodes`](crate::fit::nodes)).
 
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
-use crate::curve::formula::FormulaNumbers;
+use crate::curve::formula::{FormulaNumbers, RotationVector, quantity_value};
 use crate::curve::options::Quantity;
 use crate::fit::block::{Intervals, LANES};
-use crate::fit::exact::curve::{CurvePiece, IntervalCurve};
-use crate::fit::exact::shape::{self, Shape};
 use crate::fit::motion::arc_length::ArcLengths;
-use crate::fit::motion::derivatives::Motion;
-use crate::fit::nodes::{NodeSamples, Nodes, interpolate};
+use crate::fit::nodes::{FULL_NODES, NodeSamples, Nodes, SMALL_ANGLE_NODES, interpolate};
+use crate::math::dual::Dual;
+use crate::math::quaternion::{Quaternion, Vector, dot, length};
 use crate::shader::PolynomialSegment;
+use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, canonical};
+
+/// A formula, and how its curves are sampled.
+#[derive(Debug)]
+pub(crate) struct Shape {
+    /// The count of numbers that differ from curve to curve.
+    pub(crate) per_curve: usize,
+    /// The numbers after them, which all curves share.
+    pub(crate) shared: FormulaNumbers,
+    /// Whether the formula is entire, a product of exponentials: its Chebyshev coefficients then
+    /// decrease faster and faster, and the fit of a curve of small angle needs no check.
+    pub(crate) entire: bool,
+    /// Whether its values are unit quaternions.
+    pub(crate) is_unit: bool,
+    pub(crate) rotation: fn(&FormulaNumbers, f64) -> Quaternion,
+    pub(crate) moving: fn(&FormulaNumbers, Dual) -> [Dual; 4],
+    /// The squared extent up to which degree 6 fits its curves; see [`SMALL_ANGLE`].
+    pub(crate) small_angle: f64,
+    /// Samples the curves of a block and fits polynomials to them.
+    pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
+    /// The same, of velocities and accelerations.
+    pub(crate) fit_rates: fn(&mut FitBlock, &mut [PolynomialSegment]),
+    /// The same, of any quantity of curves at constant speed.
+    pub(crate) fit_at_constant_speed: fn(&mut FitBlock, &mut [PolynomialSegment]),
+}
+
+impl Shape {
+    /// All numbers of a curve: those that differ from curve to curve, then the shared ones.
+    pub(crate) fn curve_numbers(&self, number_at: impl Fn(usize) -> f64) -> FormulaNumbers {
+        let mut numbers = self.shared;
+        for (i, number) in numbers[..self.per_curve].iter_mut().enumerate() {
+            *number = number_at(i);
+        }
+        numbers
+    }
+
+    /// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be cut without a try.
+    pub(crate) fn tier(&self, squared_extent: f64) -> Tier {
+        if squared_extent <= self.small_angle {
+            Tier::SmallAngle
+        } else if squared_extent <= LARGEST_UNCUT {
+            Tier::Full
+        } else {
+            // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.
+            Tier::Piece
+        }
+    }
+}
+
+/// The curve of one key interval, or a piece of it.
+#[derive(Debug, Clone)]
+pub(crate) struct IntervalCurve {
+    pub(crate) shape: &'static Shape,
+    pub(crate) numbers: FormulaNumbers,
+    pub(crate) piece: CurvePiece,
+    pub(crate) quantity: Quantity,
+    /// The change of the parameter per second.
+    pub(crate) rate: f64,
+    /// The curve's arc lengths if it is traversed at constant speed.
+    pub(crate) arc_lengths: Option<Arc<ArcLengths>>,
+}
+
+/// The part of an interval that one polynomial fits, from where until where, as fractions of the interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CurvePiece {
+    from: f64,
+    to: f64,
+    /// How often the interval was halved.
+    cuts: u8,
+}
+
+/// A curve that no polynomial fits even after so many cuts turns by dozens of radians within one
+/// interval; the host evaluates it in f64 for every device.
+const MAX_CUTS: u8 = 4;
+
+impl CurvePiece {
+    pub(crate) const WHOLE: Self = Self {
+        from: 0.0,
+        to: 1.0,
+        cuts: 0,
+    };
+
+    /// The time at which it begins in an interval that starts at `start` and takes `duration`, seconds.
+    pub(crate) fn begins(self, start: f64, duration: f64) -> f64 {
+        start + duration * self.from
+    }
+
+    /// Both halves of a piece of that interval; `None` if it is not cut further. They meet at a time
+    /// that an f64 has: far from 0 that is not quite the middle, and may be one of the ends.
+    pub(crate) fn halves(self, start: f64, duration: f64) -> Option<[Self; 2]> {
+        let cuts = self.cuts + 1;
+        let mut middle = 0.5 * (self.from + self.to);
+        let rounded = ((start + duration * middle) - start) / duration;
+        if (rounded - middle).abs() > INDISTINCT * (self.to - self.from) {
+            middle = rounded;
+        }
+        let is_between = self.from < middle && middle < self.to;
+        (cuts <= MAX_CUTS && is_between).then_some([
+            Self {
+                to: middle,
+                cuts,
+                ..self
+            },
+            Self {
+                from: middle,
+                cuts,
+                ..self
+            },
+        ])
+    }
+
+    /// Its start and its width as fractions of the interval.
+    pub(crate) fn extent(self) -> (f64, f64) {
+        (self.from, self.to - self.from)
+    }
+}
+
+/// A part of an interval's duration within which polynomials in f32 have the same coefficients.
+pub(crate) const INDISTINCT: f64 = 1.0 / (1u64 << 28) as f64;
+
+impl IntervalCurve {
+    /// A whole curve, traversed as the key times say.
+    pub(crate) fn new(
+        shape: &'static Shape,
+        numbers: FormulaNumbers,
+        quantity: Quantity,
+        rate: f64,
+    ) -> Self {
+        Self {
+            shape,
+            numbers,
+            piece: CurvePiece::WHOLE,
+            quantity,
+            rate,
+            arc_lengths: None,
+        }
+    }
+
+    /// The whole curve in a lane of a block.
+    pub(crate) fn of_interval(
+        intervals: &Intervals,
+        lane: usize,
+        shape: &'static Shape,
+        quantity: Quantity,
+    ) -> Self {
+        let numbers = shape.curve_numbers(|i| intervals.numbers[i][lane]);
+        Self::new(shape, numbers, quantity, intervals.rate(lane))
+    }
+
+    /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its piece.
+    pub(crate) fn value(&self, t: f64) -> Quaternion {
+        let (start, width) = self.piece.extent();
+        self.value_at(start + width * t)
+    }
+
+    /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its interval.
+    pub(crate) fn value_at(&self, t: f64) -> Quaternion {
+        if self.quantity != Quantity::Rotation || self.arc_lengths.is_some() {
+            let parameter = match &self.arc_lengths {
+                Some(arc_lengths) => arc_lengths.parameter(&|u| self.moving(u), t),
+                None => Dual::parameter(t),
+            };
+            let rotation = self.moving(parameter);
+            return quantity_value(self.quantity, rotation, self.rate);
+        }
+        let rotation = (self.shape.rotation)(&self.numbers, t);
+        if dot(rotation, rotation) > 0.5 || !self.shape.is_unit {
+            return rotation;
+        }
+        // A normalised polynomial may pass through 0, where it is not a rotation: the rotation just
+        // after that is taken.
+        (self.shape.rotation)(&self.numbers, t + 1e-9)
+    }
+
+    /// Sets the speed of a curve of constant angular velocity, in radians per second.
+    pub(crate) fn set_speed(&mut self, speed: f64) {
+        let (_, half) = self.numbers.split_at_mut(RotationVector::LINEAR);
+        let half: &mut Vector = half.first_chunk_mut().expect("a rotation vector");
+        let current = 2.0 * length(*half);
+        if current > 0.0 {
+            for number in half {
+                *number *= speed / current;
+            }
+        }
+    }
+
+    /// The rotation and its derivatives, as dual numbers.
+    pub(crate) fn moving(&self, parameter: Dual) -> [Dual; 4] {
+        (self.shape.moving)(&self.numbers, parameter)
+    }
+}
 
 /// How a curve is fitted, by how far it turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,8 +224,21 @@ pub(crate) enum Tier {
     Piece,
 }
 
+impl Tier {
+    /// The nodes at which its curves are sampled, as [`Nodes::offsets`] has them.
+    #[inline(always)]
+    pub(crate) fn offsets(self) -> &'static [f64] {
+        static SMALL_ANGLE_OFFSETS: [f64; 7] = SMALL_ANGLE_NODES.offsets();
+        static FULL_OFFSETS: [f64; 11] = FULL_NODES.offsets();
+        match self {
+            Self::SmallAngle => &SMALL_ANGLE_OFFSETS,
+            Self::Full | Self::Piece => &FULL_OFFSETS,
+        }
+    }
+}
+
 /// The squared extent (the sum of the three half-rotation vectors' squares) up to which degree 6
-/// fits a curve within 2e-8.
+/// fits a curve of most shapes within 2e-8.
 pub(crate) const SMALL_ANGLE: f64 = 0.002;
 
 /// The squared extent above which curves are cut without trying to fit them whole: hardly any
@@ -48,18 +255,6 @@ const SHORT_REACH: f64 = 0.785;
 
 pub(crate) type FitRow = [f64; LANES];
 pub(crate) type FitRowF32 = [f32; LANES];
-
-/// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be cut without a try.
-pub(crate) fn tier(squared_extent: f64) -> Tier {
-    if squared_extent <= SMALL_ANGLE {
-        Tier::SmallAngle
-    } else if squared_extent <= LARGEST_UNCUT {
-        Tier::Full
-    } else {
-        // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.
-        Tier::Piece
-    }
-}
 
 /// Up to [`LANES`] curves that wait to be fitted, all of one shape and tier.
 pub(crate) struct FitBlock {
@@ -80,6 +275,11 @@ pub(crate) struct FitBlock {
     pub(crate) count: usize,
     /// The segments that they become.
     pub(crate) segment_indices: [usize; LANES],
+    /// The samples at the nodes, each vector's lanes in its order: a row for each component of the middle, then
+    /// of the sums and of the differences of each pair of nodes.
+    samples: Vec<FitRowF32>,
+    /// The units in which velocities and accelerations are sampled.
+    pub(crate) scales: FitRowF32,
     /// Estimates of twice the truncation error, the largest of each curve's components.
     tails: FitRowF32,
     /// The squares of the farthest angles from the middle.
@@ -100,6 +300,8 @@ impl FitBlock {
             quantity,
             count: 0,
             segment_indices: [0; LANES],
+            samples: vec![[0.0; LANES]; 4 * tier.offsets().len()],
+            scales: [1.0; LANES],
             tails: [0.0; LANES],
             reaches: lane,
         }
@@ -183,7 +385,7 @@ impl FitBlock {
             _ if self.count == 0 => {}
             Quantity::Rotation if self.arc_lengths.is_empty() => (self.shape.fit)(self, segments),
             _ if self.arc_lengths.is_empty() => (self.shape.fit_rates)(self, segments),
-            _ => shape::fit::<Motion>(self, segments),
+            _ => (self.shape.fit_at_constant_speed)(self, segments),
         }
         segments.pop();
     }
@@ -200,8 +402,9 @@ impl FitBlock {
     }
 
     /// Multiplies the polynomial of each lane by its scale.
-    pub(crate) fn scale(&self, scales: &FitRowF32, segments: &mut [PolynomialSegment]) {
-        for (&index, &scale) in self.segment_indices[..self.count].iter().zip(scales) {
+    pub(crate) fn scale(&self, segments: &mut [PolynomialSegment]) {
+        let indices = self.segment_indices[..self.count].iter();
+        for (&index, &scale) in indices.zip(&self.scales) {
             for power in &mut segments[index].coefficients {
                 *power = canonical(power.map(|c| c * scale));
             }
@@ -219,19 +422,69 @@ impl FitBlock {
         is_near && middle.iter().all(|c| c.is_finite())
     }
 
-    /// Interpolates the samples of the curves from `lane` on, and keeps the estimates of their
-    /// truncation errors.
+    /// Sets the samples of the curves from `lane` on at the middle.
     #[inline(always)]
-    pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
-        &mut self,
-        lane: usize,
-        nodes: &Nodes<PAIRS>,
-        samples: &NodeSamples<L, PAIRS>,
-        segments: &mut [PolynomialSegment],
-    ) {
-        let lanes = lane..lane + L::COUNT;
-        let indices = &self.segment_indices[lanes.clone()];
-        let tails = interpolate(self.is_entire(), nodes, samples, indices, segments);
-        tails.store(&mut self.tails[lanes]);
+    pub(crate) fn set_middle<L: Lanes>(&mut self, lane: usize, middle: [L; 4]) {
+        for (row, number) in self.samples[..4].iter_mut().zip(middle) {
+            number.store_unordered(&mut row[lane..]);
+        }
+    }
+
+    /// Sets the samples of the curves from `lane` on at the `k`th pair of nodes: the sum and the difference of
+    /// the differences from the middle, as [`NodeSamples`] has them.
+    #[inline(always)]
+    pub(crate) fn set_pair<L: Lanes>(&mut self, lane: usize, k: usize, even: [L; 4], odd: [L; 4]) {
+        let rows = &mut self.samples[4 + 8 * k..12 + 8 * k];
+        for c in 0..4 {
+            even[c].store_unordered(&mut rows[c][lane..]);
+            odd[c].store_unordered(&mut rows[4 + c][lane..]);
+        }
+    }
+
+    /// The samples of the curves from `lane` on.
+    #[inline(always)]
+    fn samples<L: Lanes, const PAIRS: usize>(&self, lane: usize) -> NodeSamples<L, PAIRS> {
+        let mut samples = NodeSamples::all(L::all(0.0));
+        let rows = &self.samples[..4 + 8 * PAIRS];
+        for c in 0..4 {
+            samples.middle[c] = L::load_unordered(&rows[c][lane..]);
+            for k in 0..PAIRS {
+                samples.even[k][c] = L::load_unordered(&rows[4 + 8 * k + c][lane..]);
+                samples.odd[k][c] = L::load_unordered(&rows[8 + 8 * k + c][lane..]);
+            }
+        }
+        samples
+    }
+
+    /// Interpolates the samples, and keeps the estimates of the truncation errors.
+    pub(crate) fn interpolate(&mut self, segments: &mut [PolynomialSegment]) {
+        in_lanes(&mut Interpolation(self, segments));
+    }
+}
+
+/// The second half of a fit: one function for the samples of all formulas.
+struct Interpolation<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
+
+impl InLanes for Interpolation<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        match self.0.tier {
+            Tier::SmallAngle => self.run_with::<L, _>(&SMALL_ANGLE_NODES),
+            Tier::Full | Tier::Piece => self.run_with::<L, _>(&FULL_NODES),
+        }
+    }
+}
+
+impl Interpolation<'_> {
+    #[inline(always)]
+    fn run_with<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
+        let Self(block, segments) = self;
+        for lane in (0..block.padded_count()).step_by(L::COUNT) {
+            let lanes = lane..lane + L::COUNT;
+            let samples = block.samples::<L, PAIRS>(lane);
+            let indices = &block.segment_indices[lanes.clone()];
+            let tails = interpolate(block.is_entire(), nodes, &samples, indices, segments);
+            tails.store(&mut block.tails[lanes]);
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! The exact way, in f64, for every method, angle and quantity: the handles of keys, the curves by
 //! their formulas, and the polynomials fitted to them.
 
-pub(crate) mod curve;
 pub(crate) mod cut;
 pub(crate) mod expansion;
 pub(crate) mod fit;
 pub(crate) mod handles;
+pub(crate) mod sampling;
 pub(crate) mod shape;

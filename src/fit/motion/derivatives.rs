@@ -3,63 +3,27 @@
 
 use std::marker::PhantomData;
 
-use crate::curve::formula::{Formula, NUMBERS};
-use crate::curve::options::{Axes, Quantity};
+use crate::curve::formula::{Formula, NUMBERS, quantity_value};
 use crate::fit::block::{LANES, load, put};
 use crate::fit::exact::fit::FitBlock;
-use crate::fit::exact::shape::Sampling;
-use crate::fit::nodes::{NodeSamples, Nodes};
+use crate::fit::exact::sampling::Sampling;
 use crate::math::canonical::power_of_two;
 use crate::math::dual::Dual;
-use crate::math::quaternion::{FullRange as _, Real, rotated, step};
-use crate::shader::{POWERS, PolynomialSegment};
+use crate::math::quaternion::{FullRange as _, Real as _};
+use crate::shader::POWERS;
 use crate::simd::doubles::Doubles as _;
 use crate::simd::lanes::{Lanes, MAX_LANES};
-
-/// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
-/// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
-#[inline(always)]
-pub(crate) fn value<R: Real>(quantity: Quantity, rotation: [Dual<R>; 4], rate: R) -> [R; 4] {
-    let at = rotation.map(|dual| dual.value);
-    let (derivative, scale, axes) = match quantity {
-        Quantity::Rotation => return at,
-        Quantity::Velocity(axes) => (rotation.map(|dual| dual.first), rate, axes),
-        Quantity::Acceleration(axes) => (rotation.map(|dual| dual.second), rate * rate, axes),
-    };
-    // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
-    let [x, y, z, _] = step(at, derivative);
-    // No closure: those are not always inlined.
-    let twice = R::all(2.0) * scale;
-    let body = [clamped(twice * x), clamped(twice * y), clamped(twice * z)];
-    let [x, y, z] = match axes {
-        Axes::Body => body,
-        // This holds for accelerations too: ω × ω = 0.
-        Axes::Parent => rotated(at, body),
-    };
-    [x, y, z, R::all(0.0)]
-}
-
-/// Between keys at almost the same time velocities would overflow f32. NaN stays NaN.
-#[inline(always)]
-pub(crate) fn clamped<R: Real>(x: R) -> R {
-    let largest = 0.25 * f64::from(f32::MAX);
-    let [low, high] = [-largest, largest].map(R::all);
-    let raised = low.up_to(x, x, x.up_to(low, low, x));
-    high.up_to(raised, high, raised)
-}
 
 /// Samples velocities or accelerations of a formula, curves beside each other.
 pub(crate) struct MotionOf<F>(PhantomData<F>);
 
 impl<F: Formula> Sampling for MotionOf<F> {
+    const IS_SCALED: bool = true;
+
     #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        nodes: &Nodes<PAIRS>,
-        segments: &mut [PolynomialSegment],
-    ) {
+    fn sample<L: Lanes>(block: &mut FitBlock) {
         let zero = L::Doubles::all(0.0);
-        let mut scales = [1.0; LANES];
+        let offsets = block.tier.offsets();
         for lane in (0..block.padded_count()).step_by(L::COUNT) {
             let mut numbers = [zero; NUMBERS];
             for (number, &shared) in numbers.iter_mut().zip(&block.shape.shared) {
@@ -73,10 +37,10 @@ impl<F: Formula> Sampling for MotionOf<F> {
             let rate = L::Doubles::load(&block.rates[lane..]);
             let mut found = [[zero; 4]; POWERS];
             let mut largest = zero;
-            for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-                let t = at + L::Doubles::all(nodes.offset(i)) * width;
+            for (found, &offset) in found.iter_mut().zip(offsets) {
+                let t = at + L::Doubles::all(offset) * width;
                 let rotation = F::rotation(&numbers, Dual::parameter(t));
-                *found = value(block.quantity, rotation, rate);
+                *found = quantity_value(block.quantity, rotation, rate);
                 for &c in &*found {
                     largest = c.larger(-c).larger(largest);
                 }
@@ -85,24 +49,11 @@ impl<F: Formula> Sampling for MotionOf<F> {
             let mut units = [1.0; MAX_LANES];
             unit.store(&mut units);
             let lanes = lane..(lane + L::COUNT).min(LANES);
-            for (scale, unit) in scales[lanes].iter_mut().zip(units) {
+            for (scale, unit) in block.scales[lanes].iter_mut().zip(units) {
                 *scale = unit as f32;
             }
-            let middle = found[0];
-            let mut samples = NodeSamples::all(L::all(0.0));
-            for c in 0..4 {
-                samples.middle[c] = L::rounded(middle[c] / unit);
-                for k in 0..PAIRS {
-                    let (before, after) = (found[1 + k][c], found[1 + PAIRS + k][c]);
-                    let forward = (after - middle[c]) / unit;
-                    let backward = (before - middle[c]) / unit;
-                    samples.even[k][c] = L::rounded(forward + backward);
-                    samples.odd[k][c] = L::rounded(forward - backward);
-                }
-            }
-            block.interpolate(lane, nodes, &samples, segments);
+            set_in_units::<L>(block, lane, &found, unit);
         }
-        block.scale(&scales, segments);
     }
 }
 
@@ -110,53 +61,67 @@ impl<F: Formula> Sampling for MotionOf<F> {
 pub(crate) struct Motion;
 
 impl Sampling for Motion {
+    const IS_SCALED: bool = true;
+
     #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(
-        block: &mut FitBlock,
-        nodes: &Nodes<PAIRS>,
-        segments: &mut [PolynomialSegment],
-    ) {
-        let mut scales = [1.0; LANES];
+    fn sample<L: Lanes>(block: &mut FitBlock) {
+        let count = block.tier.offsets().len();
         for lane in (0..block.padded_count()).step_by(L::COUNT) {
-            let mut found = [[[0.0; MAX_LANES]; 4]; POWERS];
+            let mut sampled = [[[0.0; MAX_LANES]; 4]; POWERS];
             let mut units = [1.0; MAX_LANES];
             for curve_lane in lane..block.count.min(lane + L::COUNT) {
-                let unit = sample(block, curve_lane, nodes, curve_lane - lane, &mut found);
-                (units[curve_lane - lane], scales[curve_lane]) = (unit, unit as f32);
+                let unit = sample(block, curve_lane, curve_lane - lane, &mut sampled);
+                (units[curve_lane - lane], block.scales[curve_lane]) = (unit, unit as f32);
             }
-            let unit = L::Doubles::load(&units);
-            let middle = load(&found[0], 0);
-            let mut samples = NodeSamples::all(L::all(0.0));
-            for c in 0..4 {
-                samples.middle[c] = L::rounded(middle[c] / unit);
-                for k in 0..PAIRS {
-                    let [before, after] = [1 + k, 1 + PAIRS + k].map(|i| &found[i][c]);
-                    let forward = (L::Doubles::load(after) - middle[c]) / unit;
-                    let backward = (L::Doubles::load(before) - middle[c]) / unit;
-                    samples.even[k][c] = L::rounded(forward + backward);
-                    samples.odd[k][c] = L::rounded(forward - backward);
-                }
+            let mut found = [[L::Doubles::all(0.0); 4]; POWERS];
+            for (found, sampled) in found[..count].iter_mut().zip(&sampled) {
+                *found = load(sampled, 0);
             }
-            block.interpolate(lane, nodes, &samples, segments);
+            set_in_units::<L>(block, lane, &found, L::Doubles::load(&units));
         }
-        block.scale(&scales, segments);
+    }
+}
+
+/// Sets the samples of the curves from `lane` on, divided by their units, from the values found at all nodes.
+#[inline(always)]
+fn set_in_units<L: Lanes>(
+    block: &mut FitBlock,
+    lane: usize,
+    found: &[[L::Doubles; 4]; POWERS],
+    unit: L::Doubles,
+) {
+    let pairs = block.tier.offsets().len() / 2;
+    let middle = found[0];
+    let (mut even, mut odd) = ([L::all(0.0); 4], [L::all(0.0); 4]);
+    for c in 0..4 {
+        even[c] = L::rounded(middle[c] / unit);
+    }
+    block.set_middle(lane, even);
+    for k in 0..pairs {
+        let (before, after) = (found[1 + k], found[1 + pairs + k]);
+        for c in 0..4 {
+            let forward = (after[c] - middle[c]) / unit;
+            let backward = (before[c] - middle[c]) / unit;
+            even[c] = L::rounded(forward + backward);
+            odd[c] = L::rounded(forward - backward);
+        }
+        block.set_pair(lane, k, even, odd);
     }
 }
 
 /// Samples the curve in a lane into the `j`th lane of the vectors found, and returns a unit near
 /// its largest value. It is a power of two, so that dividing by it rounds nothing.
-fn sample<const PAIRS: usize>(
+fn sample(
     block: &FitBlock,
     lane: usize,
-    nodes: &Nodes<PAIRS>,
     j: usize,
-    found: &mut [[[f64; MAX_LANES]; 4]],
+    found: &mut [[[f64; MAX_LANES]; 4]; POWERS],
 ) -> f64 {
     let curve = block.curve(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);
     let mut largest = 0.0f64;
-    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-        let value = curve.value_at(at + nodes.offset(i) * width);
+    for (found, &offset) in found.iter_mut().zip(block.tier.offsets()) {
+        let value = curve.value_at(at + offset * width);
         largest = value
             .iter()
             .fold(largest, |largest, c| largest.max(c.abs()));
@@ -171,10 +136,12 @@ mod tests {
 
     use super::*;
     use crate::curve::formula::{Product, RotationVector};
-    use crate::fit::exact::curve::{CurvePiece, IntervalCurve};
-    use crate::fit::exact::fit::Tier;
-    use crate::fit::exact::shape::{Shape, fit};
+    use crate::curve::options::{Axes, Quantity};
+    use crate::fit::exact::fit::{CurvePiece, IntervalCurve, Shape, Tier};
+    use crate::fit::exact::sampling::fit;
+    use crate::fit::exact::shape::{BERNSTEIN, PRODUCT, ROTATION_VECTOR};
     use crate::math::quaternion::{Quaternion, exp};
+    use crate::shader::PolynomialSegment;
 
     type Fit = fn(&mut FitBlock, &mut [PolynomialSegment]);
 
@@ -206,9 +173,9 @@ mod tests {
             .into_iter()
             .flat_map(|axes| [Quantity::Velocity(axes), Quantity::Acceleration(axes)]);
         let shapes: [(&'static Shape, Fit); 3] = [
-            (Shape::BERNSTEIN, fit::<MotionOf<Product>>),
-            (Shape::PRODUCT, fit::<MotionOf<Product>>),
-            (Shape::ROTATION_VECTOR, fit::<MotionOf<RotationVector>>),
+            (&BERNSTEIN, fit::<MotionOf<Product>>),
+            (&PRODUCT, fit::<MotionOf<Product>>),
+            (&ROTATION_VECTOR, fit::<MotionOf<RotationVector>>),
         ];
         for quantity in quantities {
             for (shape, in_lanes) in shapes {

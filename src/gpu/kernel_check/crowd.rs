@@ -1,15 +1,16 @@
 //! Trials of the kernels over a crowd.
 
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdLink,
-    CrowdPosition, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, Kernel, ON_KEY,
-    ROTATION, RUNS_BACKWARDS, SCALE, SPEED_MAGNITUDE, START_BIAS, TRANSLATION,
+    CHANNELS, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry,
+    CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL,
+    Kernel, ON_KEY, ROTATION, RUNS_BACKWARDS, SCALE, SPEED_MAGNITUDE, START_BIAS, TRANSLATION,
 };
+use crate::twin::crowd_entries::{change, gather, scatter};
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{Rows, affine_product, row_product, to_any_half, transform};
 use crate::twin::crowd_times::{position_at, tick_of};
 
-use bytemuck::Zeroable as _;
+use bytemuck::{NoUninit, Zeroable as _};
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
@@ -32,6 +33,8 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
         Kernel::CrowdWalkAll => vec![walk_all(random)],
         Kernel::CrowdSkin => vec![skin(random)],
         Kernel::CrowdHalf => vec![half(random)],
+        Kernel::CrowdGather => vec![gathered(random)],
+        Kernel::CrowdScatter => vec![scattered(random)],
         Kernel::CrowdPlainRotations => vec![joints(random, 1, true, false)],
         Kernel::CrowdPlainLocals => vec![joints(random, 1, true, true)],
         Kernel::CrowdRotations => vec![joints(random, 3, false, false)],
@@ -250,8 +253,8 @@ fn rows(random: &mut Random) -> Rows {
     [random.vector(), random.vector(), random.vector()]
 }
 
-/// Expects what lies in the matrices, of which the kernel changes some.
-fn over(mut trial: Trial, before: &[Rows], after: &[Rows]) -> Trial {
+/// Expects what lies there before, of which the kernel changes some.
+fn over<T: NoUninit>(mut trial: Trial, before: &[T], after: &[T]) -> Trial {
     trial.before = bytemuck::pod_collect_to_vec(&bytes(before));
     trial.expected = bytemuck::pod_collect_to_vec(&bytes(after));
     trial
@@ -352,4 +355,61 @@ fn half(random: &mut Random) -> Trial {
         trial.expect(i, &value.map(to_any_half));
     }
     trial
+}
+
+/// Entries of any words.
+fn any_entries(random: &mut Random, count: u32) -> Vec<CrowdEntry> {
+    let any = |random: &mut Random| CrowdEntry {
+        clip_and_weight: random.word(),
+        speed_and_modes: random.word(),
+        start: random.word(),
+        anchor: random.word(),
+    };
+    (0..count).map(|_| any(random)).collect()
+}
+
+fn gathered(random: &mut Random) -> Trial {
+    const LAYERS: u32 = 3;
+    const ALL: u32 = 60;
+    const VISIBLE: u32 = 45;
+    let entries = any_entries(random, ALL * LAYERS);
+    let visible: Vec<u32> = (0..BEFORE + VISIBLE).map(|_| random.below(ALL)).collect();
+    let count = VISIBLE * LAYERS;
+    let dispatch = CrowdDispatch {
+        count,
+        first_instance: BEFORE,
+        layers: LAYERS,
+        ..CrowdDispatch::zeroed()
+    };
+    let inputs = [bytes(&entries), bytes(&visible)];
+    let mut trial = Trial::new(inputs, &dispatch, groups(count as usize, false));
+    let expected = gather(&entries, &visible[BEFORE as usize..], LAYERS as usize);
+    for (index, entry) in expected.enumerate() {
+        trial.expect(index, &entry);
+    }
+    trial
+}
+
+fn scattered(random: &mut Random) -> Trial {
+    const ENTRIES: u32 = 300;
+    let before = any_entries(random, ENTRIES);
+    let entries = any_entries(random, ENTRIES).into_iter().zip(0..);
+    let changes: Vec<CrowdChange> = entries
+        .filter(|_| random.once_in(3))
+        .map(|(entry, index)| change(index, &entry))
+        .collect();
+    let mut after = before.clone();
+    changes
+        .iter()
+        .for_each(|change| scatter(change, &mut after));
+    // The last one is not counted.
+    let count = changes.len() - 1;
+    let last = changes[count].index as usize;
+    after[last] = before[last];
+    let dispatch = CrowdDispatch {
+        count: count as u32,
+        ..CrowdDispatch::zeroed()
+    };
+    let trial = Trial::new([bytes(&changes)], &dispatch, groups(count, true));
+    over(trial, &before, &after)
 }

@@ -115,7 +115,9 @@ fn trials(kernel: Kernel) -> Vec<Trial> {
         | Kernel::CrowdWalk
         | Kernel::CrowdWalkAll
         | Kernel::CrowdSkin
-        | Kernel::CrowdHalf => crowd::trials(kernel),
+        | Kernel::CrowdHalf
+        | Kernel::CrowdGather
+        | Kernel::CrowdScatter => crowd::trials(kernel),
         _ => segments::trials(kernel),
     }
 }

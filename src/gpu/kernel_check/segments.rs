@@ -3,16 +3,15 @@
 use crate::cpu::evaluate::one;
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::math::canonical::canonical;
-use crate::output::encoding::{Encoding, MatrixOrder};
-use crate::output::euler::EulerSequence;
+use crate::output::encoding::Encoding;
 use crate::shader::{
     ArcSegment, BLOCK_SAMPLES, Block, Dispatch, Form, Grid, IS_CONSTANT, ITEM_SAMPLES, Item,
     Kernel, LINE, List, ListedSample, MAY_BE_TINY, PolynomialSegment, SAMPLES_EACH, Store,
     WORKGROUP,
 };
 use crate::time::runs::Affine;
+use crate::twin::Evaluate;
 use crate::twin::arc_between::arc_between;
-use crate::twin::evaluate::Evaluate;
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
@@ -55,24 +54,6 @@ impl Segment for PolynomialSegment {
     }
 }
 
-/// Every encoding that a store makes.
-fn encodings(store: Store) -> Vec<Encoding> {
-    let orders = [MatrixOrder::RowMajor, MatrixOrder::ColumnMajor];
-    match store {
-        Store::AxisAngle => vec![Encoding::AxisAngle],
-        Store::Euler => EulerSequence::all()
-            .into_iter()
-            .map(Encoding::Euler)
-            .collect(),
-        Store::F16 => vec![Encoding::F16],
-        Store::F32 => vec![Encoding::F32],
-        Store::Matrix3x3 => orders.map(Encoding::Matrix3x3).into(),
-        Store::Matrix3x4 => orders.map(Encoding::Matrix3x4).into(),
-        Store::Snorm16 => vec![Encoding::Snorm16],
-        Store::Vector => vec![Encoding::Vector],
-    }
-}
-
 pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
     let Some((form, list, store)) = kernel.compiled().segments else {
         return Vec::new();
@@ -85,11 +66,11 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
 
 fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
     let random = &mut Random::canonical();
-    let encodings = encodings(store);
+    let encodings = Encoding::of_store(store);
     // Two shapes of a dispatch, and every encoding at least once.
     (0..encodings.len().max(2))
         .map(|i| {
-            let scene = SegmentInputs::<S>::new(random, store, encodings[i % encodings.len()]);
+            let scene = SegmentInputs::<S>::new(random, encodings[i % encodings.len()]);
             let first = i % 2 == 0;
             match list {
                 List::Frames => scene.runs(random, false, first),
@@ -116,9 +97,9 @@ struct SegmentInputs<S> {
 }
 
 impl<S: Segment> SegmentInputs<S> {
-    fn new(random: &mut Random, store: Store, encoding: Encoding) -> Self {
+    fn new(random: &mut Random, encoding: Encoding) -> Self {
         // Other stores take rotations alone.
-        let takes_any = matches!(store, Store::F32 | Store::Vector);
+        let takes_any = encoding.row().takes_vectors;
         let segment = |random: &mut Random| match takes_any && random.once_in(3) {
             true => S::any(random),
             false => S::between(random.pair()),

@@ -14,11 +14,10 @@ use crate::shader::{IS_CONSTANT, List, ListedSample};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::error::SampleTimesError;
-use crate::time::frame_clock::FrameClock;
+use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
-use crate::time::track_copy::TrackCopy;
 
 /// A window whose samples are listed one by one.
 pub(crate) struct SampleList<'a> {

@@ -3,9 +3,8 @@
 
 use glam::{DVec3, Quat};
 
-use crate::tracks::check::{check_finite, check_length};
 use crate::tracks::error::TrackError;
-use crate::tracks::set::TrackSet;
+use crate::tracks::set::{TrackSet, check_finite, check_length};
 
 /// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 for none, mostly
 /// within -1 and 1.

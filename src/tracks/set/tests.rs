@@ -79,3 +79,39 @@ fn a_set_knows_which_keys_the_one_before_turns() {
     let set = TrackSet::with_shared_times(&[0.0, 1.0], &apart).unwrap();
     assert!(set.arcs_are_short());
 }
+
+#[test]
+fn times_are_refused_wherever_they_do_not_increase() {
+    let good: Vec<f64> = (0..9).map(f64::from).collect();
+    assert!(check_times(0, &good, 9).is_ok());
+    assert_eq!(
+        check_times(1, &good, 8).unwrap_err().to_string(),
+        "track 1 has 8 keys but 9 times; give one time for each key"
+    );
+    assert_eq!(check_times(1, &[], 0), Err(TrackError::Empty { track: 1 }));
+    assert!(check_times(0, &[-LATEST, LATEST], 2).is_ok());
+    for index in 0..9 {
+        for bad in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            2.0 * LATEST,
+            -2.0 * LATEST,
+        ] {
+            let mut times = good.clone();
+            times[index] = bad;
+            let error = check_times(0, &times, 9).unwrap_err();
+            let is_named = match error {
+                TrackError::TimeNotFinite { key, .. } => !bad.is_finite() && key == index,
+                _ => bad.is_finite(),
+            };
+            assert!(is_named, "{bad} at {index}: {error}");
+        }
+        if index > 0 {
+            let mut times = good.clone();
+            times[index] = times[index - 1];
+            let error = check_times(0, &times, 9).unwrap_err();
+            assert!(matches!(error, TrackError::TimeNotIncreasing { key, .. } if key == index));
+        }
+    }
+}

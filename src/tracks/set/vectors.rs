@@ -6,9 +6,8 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 
 use crate::names::names;
-use crate::tracks::check::{check_finite, check_length, check_times};
 use crate::tracks::error::TrackError;
-use crate::tracks::set::TrackSet;
+use crate::tracks::set::{TrackSet, check_finite, check_length, check_times};
 
 /// Keys of a translation or of a scale.
 #[derive(Debug, Clone, PartialEq)]

@@ -112,7 +112,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     let mut failed = Vec::new();
     for shard in 1..=recorded.shards {
         let (bytes, refused, start) = read(folder, &recorded, shard).ok_or_else(|| {
-            let message = format!("{shown}: shard {shard} went away while it was merged");
+            let message = format!("{shown}: shard {shard} was removed while it was merged");
             Failure::new(DIFFERENCE, message)
         })?;
         failed.extend(refused);

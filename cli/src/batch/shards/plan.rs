@@ -10,12 +10,12 @@ use tumble_formats::beneath::{open_beneath, parent_beneath};
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
-use crate::arguments::gather::FoundInput;
-use crate::batch::destination;
+use crate::arguments::input::FoundInput;
 use crate::batch::digest::Digest;
 use crate::batch::entry::kernels_sha256;
 use crate::batch::result_names::{self, ResultName};
 use crate::batch::shards::record::{self, FOLDER};
+use crate::batch::target;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::names;
 
@@ -145,7 +145,7 @@ impl ShardPlan {
         resume: bool,
         overwrite: bool,
     ) -> Result<(), Failure> {
-        destination::create_folder(folder)?;
+        target::create_folder(folder)?;
         let found = RecordedPlan::read(folder)?;
         if found.as_ref() == Some(&self.recorded) {
             return Ok(());
@@ -231,7 +231,7 @@ impl RecordedPlan {
     /// Writes the record completely; it may replace the same one of another process.
     fn write(&self, folder: &Path) -> Result<(), Failure> {
         let path = Self::path(folder);
-        destination::create_folder(&folder.join(FOLDER))?;
+        target::create_folder(&folder.join(FOLDER))?;
         let text = serde_json::to_string(self).expect("strings and numbers") + "\n";
         let output = Output::create(&path, true, &[]);
         let mut output = output.map_err(|error| Failure::output(&error))?;

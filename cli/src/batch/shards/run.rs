@@ -3,17 +3,16 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_marked};
 
-use crate::batch::destination::WrittenFile;
 use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder};
 use crate::batch::output_plan::ResultFolder;
 use crate::batch::result_names::ResultName;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
-use crate::batch::target::ResultTarget;
+use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::Failure;
 use crate::messages::words;
-use tumble_formats::format::Format;
 
 /// The most files that wait to be renamed: a process may have about a thousand open.
 const MAX_WAITING: usize = 128;

@@ -31,7 +31,7 @@ use crate::messages::exit::{DEVICE, Failure};
 use crate::messages::listing;
 use crate::messages::words;
 
-/// Measure speed on this machine, as ratios taken in one run
+/// Measure the speed of this machine, compared with a simple loop over glam
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// What to measure

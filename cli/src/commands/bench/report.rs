@@ -86,7 +86,7 @@ impl BenchReport {
 
     pub(crate) fn text(&self) -> String {
         let mut text = format!(
-            "tumble {}, {} threads, {}; medians of {}, measured in turns\n",
+            "tumble {}, {} threads, {}; medians of {}, measured alternately\n",
             self.version,
             self.threads,
             self.vector_widths.join(", "),

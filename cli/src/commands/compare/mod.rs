@@ -22,22 +22,19 @@ use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
-use crate::messages::listing;
-use crate::messages::names;
-use crate::messages::words;
+use crate::messages::{listing, names, words};
 
 /// Compare two motions or two results: the largest and the mean difference, and where it is
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Motions are sampled as their files say (`eval --method authored`), at every key of both and halfway
+Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway
 between neighbouring keys, or at the frames of --fps; tracks are matched by name, or by index
-where the names differ. Two NPY files are compared number by number, and by angles
-where they hold rotations. Exit code 8 where a difference is over --tolerance or --distance, or
-where one of two motions that have one of these lacks a track of the other.
-
-With --ape, --rpe or --align the second is an estimate of the path of the first: it is interpolated by lines
-and arcs at the times of the first's poses, laid over it by --align, and compared as evo compares
-trajectories. --tolerance and --distance are then of the absolute errors.
+if the names differ. Two NPY files are compared number by number, and by angles if they contain
+rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these
+options it is also 8 if a track is missing in one of the motions.
+With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. It is
+interpolated by lines and arcs at the times of the first input's poses, aligned by --align, and
+compared as by the program evo. --tolerance and --distance are then limits of the absolute errors.
 
 Examples:
   tumble compare walk.bvh walk.glb
@@ -49,7 +46,7 @@ pub(crate) struct Arguments {
     /// Two keyframe files, or two results of `tumble eval`
     #[command(flatten)]
     inputs: Inputs,
-    /// Compare at this many frames per second [default: at the keys, and halfway between them]
+    /// Frames per second: compare at these frames [default: at the keys, and halfway between them]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
     /// Where to start, seconds [default: the first time that both have]
@@ -61,14 +58,14 @@ pub(crate) struct Arguments {
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
-    /// The largest angle that passes: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
+    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
     /// no rotations the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
-    /// The largest distance of two translations that passes
+    /// The largest distance: between two translations that pass
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
-    /// Align the second path to the first by least squares; the value says what may change
+    /// Align the second trajectory to the first by least squares, by these transformations
     #[arg(long, value_name = "FREEDOM", value_parser = alignment(), help_heading = TRAJECTORIES)]
     align: Option<Align>,
     /// Absolute errors: pose by pose
@@ -77,7 +74,7 @@ pub(crate) struct Arguments {
     /// Relative errors: over steps of this many seconds, or units of length along the second path
     #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
-    /// Leave out poses between two of the second that are more than this many seconds apart
+    /// The longest gap, seconds: poses between two of the second that are further apart are left out
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, help_heading = TRAJECTORIES)]
     max_gap: Option<f64>,
     /// Print JSON

@@ -1,30 +1,31 @@
 //! The options of `tumble eval`.
 
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use clap::Args;
 use clap::builder::TypedValueParser;
 use tumble::{Encoding, Layout};
 use tumble_formats::format::Format;
 use tumble_formats::quaternion::ComponentOrder;
 
-use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
-use crate::arguments::options::{AppliesTo, OPTIONS, ResultKind, ResultRequest};
+use crate::arguments::options::{AppliesTo, CommandLine, OPTIONS, ResultKind, ResultRequest};
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{AtKeysArguments, SampleRequest, SamplingArguments};
-use crate::commands::eval::shard_selection::ShardSelection;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is float32 of shape (tracks, frames, 4) in NPY, x y z w (unless --output, --layout or
---order change that), or CSV with a row for each frame, whose header names the columns, w x y z
-without --order. An option that has no effect on a result is refused. CPU and Vulkan give the same
-bits.
+In NPY the result is float32 of shape (tracks, frames, 4), with components x y z w. --output, --layout
+and --order change this. In CSV it has a row for each frame and a header that names the columns; the
+default order is w x y z. An option that has no effect on a result is refused. CPU and Vulkan give the
+same bits.
 
 Examples:
   tumble eval data/pendulum.dat -o out.npy
@@ -32,9 +33,9 @@ Examples:
   tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
   tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
-  tumble eval walks -o results --resume        a directory's tree; skips what is done
+  tumble eval walks -o results --resume        a directory tree; skips results that are done
   find . -name '*.dat' | tumble eval --files-from - -o results
-  tumble eval walk.glb --fps 60 -o walk60.glb  baked; everything else stays as it is
+  tumble eval walk.glb --fps 60 -o walk60.glb  meshes and all else are kept
   tumble eval clips -o out --to bvh --resume   formats may be mixed
   seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
@@ -46,8 +47,8 @@ pub(crate) struct Arguments {
     pub(crate) inputs: Inputs,
     #[command(flatten)]
     pub(crate) results: ResultArguments,
-    /// How to interpolate (`tumble methods`); stepped channels, which keep each key until the next
-    /// one, stay stepped
+    /// How to interpolate: `authored`, or a method (`tumble methods`); stepped channels, which keep each
+    /// key until the next one, stay stepped
     #[arg(
         short,
         long,
@@ -83,11 +84,11 @@ pub(crate) struct Arguments {
     /// Also print how each input is evaluated (its route); all routes give the same bits
     #[arg(long)]
     pub(super) explain_route: bool,
-    /// Evaluate one part of several into a directory that other processes fill too, then `tumble
-    /// merge` it: I/N, such as 3/64, or one shard by its number
+    /// Evaluate only the I-th of N parts of the inputs, such as 3/64, or one shard by its number; other
+    /// processes evaluate the other parts into the same directory, and `tumble merge` combines them
     #[arg(long, value_name = "I/N")]
     pub(super) shard: Option<ShardSelection>,
-    /// The size of a shard's inputs, at most; shards also have at most 256 inputs, and depend on nothing else
+    /// The largest total size of the inputs in a shard; a shard has at most 256 inputs
     #[arg(
         long,
         value_name = "SIZE",
@@ -96,7 +97,7 @@ pub(crate) struct Arguments {
         value_parser = words::parse_bytes
     )]
     pub(super) shard_bytes: u64,
-    /// Print JSON about the results on standard output
+    /// Print JSON: about the results
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -197,5 +198,69 @@ impl Arguments {
             AppliesTo::Results(refusal) => refusal(&result),
             AppliesTo::All | AppliesTo::Inputs(_) => None,
         })
+    }
+}
+
+/// Which shards of a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ShardSelection {
+    /// That one.
+    One(usize),
+    /// The shards of one process of several, both from 1.
+    Of(usize, usize),
+}
+
+impl FromStr for ShardSelection {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let number = |text: &str| text.parse().ok().filter(|&number: &usize| number > 0);
+        let part = match text.split_once('/') {
+            None => number(text).map(Self::One),
+            Some((index, all)) => (number(index).zip(number(all)))
+                .filter(|(index, all)| index <= all)
+                .map(|(index, all)| Self::Of(index, all)),
+        };
+        part.ok_or_else(|| "give I/N, from 1/N to N/N, or the number of a shard, from 1".to_owned())
+    }
+}
+
+impl ShardSelection {
+    /// The numbers of its shards, from 1. Parts differ by one shard at most.
+    pub(super) fn shards(self, all: usize) -> Result<RangeInclusive<usize>, Failure> {
+        let share = |part: usize, of: usize| (all as u128 * part as u128 / of as u128) as usize;
+        match self {
+            Self::One(one) if one > all => {
+                let all = words::count(all, "shard");
+                let message = format!("--shard {one}: there are {all}");
+                Err(Failure::usage(message))
+            }
+            Self::One(one) => Ok(one..=one),
+            Self::Of(index, of) => Ok(share(index - 1, of) + 1..=share(index, of)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_every_shard_once() {
+        for (all, of) in [(0, 3), (1, 64), (79, 64), (79, 2), (3, 3)] {
+            let parts =
+                (1..=of).flat_map(|index| ShardSelection::Of(index, of).shards(all).unwrap());
+            assert!(parts.eq(1..=all), "{all} in {of}");
+        }
+        assert!(ShardSelection::One(4).shards(3).is_err());
+    }
+
+    #[test]
+    fn parts_are_counted_from_one() {
+        assert_eq!("3/64".parse(), Ok(ShardSelection::Of(3, 64)));
+        assert_eq!("17".parse(), Ok(ShardSelection::One(17)));
+        for text in ["0", "0/4", "5/4", "1/0", "-1/4", "1/", "/", "", "1.5"] {
+            assert!(text.parse::<ShardSelection>().is_err(), "{text}");
+        }
     }
 }

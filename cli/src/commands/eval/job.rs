@@ -1,26 +1,33 @@
-//! What `tumble eval` does to one input: its clips are evaluated and written into one file.
-
-mod motion;
-mod rotations;
+//! What `tumble eval` does to one input: its clips are evaluated and written into one file, as motion files
+//! with their skeletons, as rotations that are streamed as they come, or as whole poses.
 
 use std::borrow::Cow;
 
+use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
-use tumble::{Engine, Error, Interpolation, Layout, Method, SampleTimes};
-use tumble_formats::motion::Motion;
+use tumble::method::SLERP;
+use tumble::{
+    Engine, Error, FrameRate, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline,
+};
+use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
+use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::origin::origin_of;
+use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::{HierarchyError, world};
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::curve_warning;
 use crate::arguments::options::ResultKind;
+use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
-use crate::arguments::time::SampleRequest;
-use crate::batch::destination::WrittenFile;
-use crate::batch::pipeline::{ClipWork, EvaluatedResult, OpenInput, Pipeline};
-use crate::batch::target::ResultTarget;
+use crate::arguments::time::{ClipFrames, SampleRequest};
+use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
+use crate::batch::room;
+use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::commands::eval::arguments::Arguments;
-use crate::messages::exit::Failure;
+use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
 /// The report of one result with `--json`.
@@ -70,10 +77,10 @@ pub(super) fn evaluate_all(
             arguments,
             device,
             samples,
-            input: &work.input,
+            work: &work,
             in_gaps: 0,
         };
-        let made = job.evaluate(&work);
+        let made = job.evaluate();
         reports.extend(pipeline.keep(&work, made));
     }
     reports
@@ -84,17 +91,15 @@ struct EvaluationJob<'a> {
     arguments: &'a Arguments,
     device: &'a mut OpenedDevice,
     samples: &'a SampleRequest,
-    input: &'a OpenInput,
+    work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
 }
 
 impl EvaluationJob<'_> {
     /// Evaluates the clips of a file, and writes it.
-    fn evaluate(
-        &mut self,
-        work: &ClipWork,
-    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+    fn evaluate(&mut self) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let work = self.work;
         let (name, clips, target) = (&*work.name, &*work.clips(), &work.target);
         for clip in clips {
             self.check_interpolation(name, clip)?;
@@ -118,7 +123,7 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Motion {
             let some = self.arguments.command_line.has("tracks");
             let some = some.then_some("some tracks make");
-            document_to_rewrite(name, &self.input.loaded, target, some);
+            document_to_rewrite(name, &self.work.input.loaded, target, some);
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
@@ -236,9 +241,9 @@ impl EvaluationJob<'_> {
             ("method", self.arguments.method.to_string()),
             ("input", name.to_owned()),
         ];
-        let sha256 = self.input.file.sha256().map(str::to_owned);
+        let sha256 = self.work.input.file.sha256().map(str::to_owned);
         // The hash is of the bytes that were read, or none.
-        self.input.file.check_unchanged()?;
+        self.work.input.file.check_unchanged()?;
         notes.extend(sha256.map(|hash| ("input_sha256", hash)));
         Ok(notes)
     }
@@ -254,35 +259,31 @@ impl EvaluationJob<'_> {
         (self.arguments.method.0, with)
     }
 
+    /// The result of this work, and the report about it.
     fn evaluated(
         &self,
-        name: &str,
         (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
         method: &str,
         written: WrittenFile,
-        target: &ResultTarget,
         order: Option<ComponentOrder>,
     ) -> (EvaluatedResult, EvaluationReport) {
-        let elapsed = self.input.started.elapsed();
-        let message = format!(
-            "{name}: {} × {}{}, {method}, on {} in {} → {target}",
+        let (work, device) = (self.work, &self.device.label);
+        let in_gaps = match self.in_gaps {
+            0 => String::new(),
+            count => format!(
+                " ({count} in gaps {})",
+                self.arguments.at_keys.done_in_gaps()
+            ),
+        };
+        let done = format!(
+            "{} × {}{in_gaps}, {method}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
-            match self.in_gaps {
-                0 => String::new(),
-                count => format!(
-                    " ({} in gaps {})",
-                    count,
-                    self.arguments.at_keys.done_in_gaps()
-                ),
-            },
-            self.device.label,
-            words::duration(elapsed),
         );
         let report = EvaluationReport {
-            input: name.to_owned(),
-            output: target.path().display().to_string(),
-            format: target.format().name,
+            input: work.name.clone(),
+            output: work.target.path().display().to_string(),
+            format: work.target.format().name,
             tracks,
             frames,
             first_time: span.map(|span| span.0),
@@ -295,14 +296,420 @@ impl EvaluationJob<'_> {
             output_kind: self.arguments.output.name(),
             order: order.map(ComponentOrder::name),
             method: method.to_owned(),
-            device: self.device.label.clone(),
-            seconds: elapsed.as_secs_f64(),
+            device: device.clone(),
+            seconds: work.input.started.elapsed().as_secs_f64(),
         };
-        let evaluated = EvaluatedResult {
-            written,
-            device: self.device.label.clone(),
-            message,
-        };
-        (evaluated, report)
+        (work.result(written, &done, Some(device)), report)
     }
+}
+
+impl EvaluationJob<'_> {
+    /// Whether the result is the input's file with other keys.
+    fn is_baked(&self, target: &ResultTarget) -> bool {
+        // Some tracks alone are another file.
+        self.arguments.output.is_rotations()
+            && !self.arguments.command_line.has("tracks")
+            && self.keeps(target)
+    }
+
+    /// Whether the input's own file can be written again.
+    fn keeps(&self, target: &ResultTarget) -> bool {
+        let document = self.work.input.loaded.document.as_ref();
+        !self.work.input.loaded.is_adjusted
+            && document.is_some_and(|document| document.writes(target.format()))
+    }
+
+    /// Whether the result is a motion file: of a format that holds nothing else, or of a clip that
+    /// is more than rotations.
+    fn is_motion(&self, clips: &[&Motion], target: &ResultTarget) -> bool {
+        self.arguments.output.is_rotations() && target.format().takes_motion(clips)
+    }
+
+    /// Clips as a file of their own.
+    fn motion(
+        &mut self,
+        name: &str,
+        clips: &[&Motion],
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let times: Vec<ClipFrames> = clips
+            .iter()
+            .map(|clip| self.samples.of_clip(clip, name))
+            .collect::<Result<_, _>>()?;
+        self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
+        let rate = match self.samples {
+            SampleRequest::Rate { rate, .. } => Some(*rate),
+            SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
+        };
+        self.written(name, clips, &times, rate, target, None)
+    }
+
+    /// The input's own file, everything kept but the keys of some of its animations.
+    fn bake(
+        &mut self,
+        name: &str,
+        clips: &[&Motion],
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let (
+            Some(document),
+            &SampleRequest::Rate {
+                rate,
+                start: None,
+                end: None,
+                from_zero: false,
+            },
+        ) = (self.work.input.loaded.document.clone(), self.samples)
+        else {
+            return Err(Failure::usage(format!(
+                "{name}: the animations of a file that is kept keep their lengths; leave out \
+                 --times, --at, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
+                 write another format"
+            )));
+        };
+        let at = |clip: &&Motion| {
+            let times = document.times(clip.index, rate);
+            times.map(|times| SampleTimes::at(times).into())
+        };
+        let times: Result<Vec<ClipFrames>, _> = clips.iter().map(at).collect();
+        let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+        self.written(name, clips, &times, Some(rate), target, Some(&*document))
+    }
+
+    fn options(&self, target: &ResultTarget) -> MotionOptions {
+        MotionOptions {
+            sequence: self.arguments.output.sequence(),
+            linear: self.arguments.linear.clone(),
+            order: self.arguments.order(),
+            box_length: self.work.input.loaded.box_length,
+            ..target.motion_options()
+        }
+    }
+
+    /// Samples clips and writes them: into the input's file, if it is given, else into a new one.
+    fn written(
+        &mut self,
+        name: &str,
+        clips: &[&Motion],
+        frames: &[ClipFrames],
+        rate: Option<FrameRate>,
+        target: &ResultTarget,
+        document: Option<&dyn Document>,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let mut all: Vec<Samples> = Vec::new();
+        for (clip, samples) in clips.iter().zip(frames) {
+            let frames = &samples.frames;
+            let boxes = target.format().takes(FormatOption::BoxLength);
+            self.check_scale(name, clip, boxes)?;
+            // Rotations, translations, scales, and the same as written.
+            room::in_memory(name, &clip.set, frames, 6)?;
+            self.explain(name, clip, frames, Layout::FrameMajor)?;
+            let mut found = self.sample(name, clip, frames)?;
+            if let Some(held) = &samples.held {
+                let said = held.resolve(clip.set.track_count(), clip.set.time_span());
+                let said = said.map_err(|error| Failure::evaluating(name, &error.into()))?;
+                found.times = said.times(0).collect();
+            }
+            all.push(found);
+        }
+        let method = self.arguments.method.to_string();
+        let notes = self.notes(name)?;
+        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
+            .map(|(clip, samples)| samples.of(clip, rate, &notes))
+            .collect();
+        let indices = clips.iter().map(|clip| clip.index);
+        let written = target.write_clips(&sampled, indices, document, &self.options(target))?;
+        let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
+        let samples = all.iter().map(|samples| samples.times.len()).sum();
+        let times = || all.iter().flat_map(|samples| &samples.times).copied();
+        let span = times().reduce(f64::min).zip(times().reduce(f64::max));
+        let format = target.format();
+        let writer = format
+            .takes(FormatOption::Order)
+            .then_some(format.write.as_ref())
+            .flatten();
+        let order = writer.map(|write| self.arguments.order().unwrap_or(write.order));
+        let size = (tracks.unwrap_or(0), samples, span);
+        Ok(self.evaluated(size, &method, written, order))
+    }
+
+    /// Refuses to scale a clip that goes nowhere. `boxes`: the result has the length of boxes.
+    pub(super) fn check_scale(
+        &self,
+        name: &str,
+        clip: &Motion,
+        boxes: bool,
+    ) -> Result<(), Failure> {
+        let is_placed = clip.has_vectors()
+            || clip
+                .skeleton
+                .iter()
+                .any(|joint| joint.rest.translation != Vec3::ZERO)
+            || boxes && self.work.input.loaded.box_length.is_some();
+        if self.arguments.command_line.has("scale") && !is_placed {
+            return Err(Failure::usage(format!(
+                "{name}: --scale has no effect on a clip without translations; leave it out"
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl EvaluationJob<'_> {
+    /// The rotations of one clip, or values derived from them.
+    fn rotations(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let (arguments, set) = (self.arguments, &clip.set);
+        let samples = self.samples.of_clip(clip, name)?;
+        self.in_gaps = samples.in_gaps;
+        if samples.held.is_some() && arguments.output.quantity() != Quantity::Rotation {
+            return Err(Failure::usage(format!(
+                "{name}: a rotation that is held has no velocity; leave times in gaps out (--in-gaps leave-out)"
+            )));
+        }
+        let frames = &samples.frames;
+        let timeline = samples
+            .written_times()
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let encoding = arguments.output.encoding(arguments.encoding);
+        target.has_room(name, set.track_count(), timeline.len(), encoding)?;
+        let requested = arguments.layout;
+        let mut notes = self.notes(name)?;
+        if let SampleRequest::Rate { rate, .. } = self.samples {
+            notes.push(("rate", rate.to_string()));
+        }
+        let format = target.results()?;
+        let order = arguments.order().unwrap_or(format.order);
+        let order = encoding.is_quaternion().then_some(order);
+        notes.extend(order.map(|order| ("order", order.name().to_owned())));
+        let result = ResultShape {
+            name,
+            set,
+            timeline: &timeline,
+            layout: format.layout.unwrap_or(requested),
+            order,
+            encoding,
+            notes: &notes,
+        };
+        self.explain(name, clip, frames, result.layout)?;
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let size = (set.track_count(), timeline.len());
+        let extent = (size.0, size.1, span(&timeline));
+        let Some(method) = methods.method_of(clip) else {
+            // Tracks of different samplers are evaluated apart, and put together in memory.
+            room::in_memory(name, set, frames, 2)?;
+            let found = self
+                .device
+                .choose(size.0 * size.1)
+                .and_then(|()| {
+                    let layout = result.layout;
+                    let work = |engine: &Engine| match arguments.output.quantity() {
+                        Quantity::Rotation => methods.rotations(engine, clip, frames, layout),
+                        // Velocities are rows of four numbers too.
+                        _ => {
+                            let rates = methods.rates(engine, clip, frames, layout)?;
+                            Ok(rates.into_iter().map(Quat::from_vec4).collect())
+                        }
+                    };
+                    self.device.work(work)
+                })
+                .map_err(|error| Failure::evaluating(name, &error))?;
+            let written = target.write_whole(&result, &found)?;
+            let method = "each channel's own method";
+            return Ok(self.evaluated(extent, method, written, order));
+        };
+        let interpolation = with(method);
+        let written = target.write_rotations(&result, |sink| {
+            self.device
+                .stream(set, interpolation, frames, result.layout, sink)
+        })?;
+        Ok(self.evaluated(extent, method.name, written, order))
+    }
+
+    /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each of
+    /// which hangs at the end of the one before it. All tracks are evaluated, since the position of a
+    /// joint depends on its ancestors; the selected ones are written.
+    fn poses(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        kind: PoseKind,
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let set = &clip.set;
+        let samples = self.samples.of_clip(clip, name)?;
+        self.in_gaps = samples.in_gaps;
+        let frames = &samples.frames;
+        let timeline = samples
+            .written_times()
+            .resolve(set.track_count(), set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        // The rotations, and twice what becomes of them.
+        room::in_memory(name, set, frames, 8)?;
+        self.check_scale(name, clip, true)?;
+        self.explain(name, clip, frames, Layout::FrameMajor)?;
+        let (mut numbers, mut origins) = if clip.skeleton.is_empty() && !clip.has_vectors() {
+            (self.chain(name, clip, frames, kind)?, Vec::new())
+        } else {
+            if self.arguments.output.has_parents() {
+                let message = "has a skeleton or positions already; leave out --parents";
+                return Err(Failure::usage(format!("{name}: {message}")));
+            }
+            let samples = self.sample(name, clip, frames)?;
+            numbers_of(clip, &samples, kind)
+                .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?
+        };
+        let mut components = match kind {
+            PoseKind::World => WORLD.to_vec(),
+            PoseKind::Transform => TRANSFORM.to_vec(),
+        };
+        let width = components.len();
+        let order = self.arguments.order().unwrap_or_default();
+        if let Some(index) = components.iter().position(|name| *name == "x")
+            && order == ComponentOrder::Wxyz
+        {
+            components[index..index + 4].rotate_right(1);
+            let poses = numbers.chunks_exact_mut(width);
+            poses.for_each(|pose| pose[index..index + 4].rotate_right(1));
+        }
+        let selected = self.arguments.inputs.tracks.of(clip, name)?;
+        if let Some(tracks) = &selected {
+            let frames = numbers.chunks_exact(width * set.track_count());
+            let pose = |frame: &[f32], track: usize| frame[track * width..][..width].to_vec();
+            let of_tracks =
+                frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
+            numbers = of_tracks.collect();
+            if !origins.is_empty() {
+                origins = tracks.iter().map(|&track| origins[track]).collect();
+            }
+        }
+        let selection = selected.map(|tracks| set.select(tracks)).transpose();
+        let subset = selection.map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let set = subset.as_ref().unwrap_or(set);
+        let size = (set.track_count(), timeline.len(), span(&timeline));
+        let poses = Poses {
+            set,
+            timeline: &timeline,
+            components: &components,
+            numbers: &numbers,
+            origins: &origins,
+        };
+        let write = target.results()?.poses;
+        let written = target.prepare(|out| write(&poses, out))?;
+        let method = self.arguments.method.to_string();
+        Ok(self.evaluated(size, &method, written, Some(order)))
+    }
+
+    /// The poses of boxes that hang at the ends of others.
+    fn chain(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &SampleTimes,
+        kind: PoseKind,
+    ) -> Result<Vec<f32>, Failure> {
+        let set = &clip.set;
+        let (tracks, length) = (
+            set.track_count(),
+            self.work.input.loaded.box_length.unwrap_or(1.0),
+        );
+        let (skeleton, offsets) = self
+            .arguments
+            .output
+            .skeleton(tracks, length)
+            .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let interpolation = with(methods.method_of(clip).unwrap_or(SLERP));
+        let samples = frames.resolve(tracks, set.time_span());
+        let evaluated = samples.map_err(Error::from).and_then(|timeline| {
+            self.device.choose(tracks * timeline.len())?;
+            self.device.work(|engine| {
+                let local = engine
+                    .request(set, interpolation, frames)
+                    .layout(Layout::FrameMajor)
+                    .evaluate()?;
+                match kind {
+                    PoseKind::World => {
+                        let world = engine.world(&local, &skeleton)?;
+                        let numbers = world.as_slice().chunks_exact(2).flat_map(|pose| {
+                            let ([x, y, z, w], [px, py, pz, _]) = (pose[0], pose[1]);
+                            [px, py, pz, x, y, z, w]
+                        });
+                        Ok(numbers.collect::<Vec<f32>>())
+                    }
+                    PoseKind::Transform => {
+                        let hung = offsets.iter().cycle();
+                        let numbers = local.as_quats().iter().zip(hung).flat_map(|(q, at)| {
+                            [at.x, at.y, at.z, q.x, q.y, q.z, q.w, 1.0, 1.0, 1.0]
+                        });
+                        Ok(numbers.collect())
+                    }
+                }
+            })
+        });
+        evaluated.map_err(|error| Failure::evaluating(name, &error))
+    }
+}
+
+/// The first and the last time of a result.
+fn span(timeline: &Timeline) -> Option<(f64, f64)> {
+    let last = timeline.len().checked_sub(1)?;
+    Some((timeline.time(0, 0)?, timeline.time(0, last)?))
+}
+
+/// The numbers of the poses of a clip with a skeleton, or with translations or scales, and the origin of
+/// each track.
+fn numbers_of(
+    clip: &Motion,
+    samples: &Samples,
+    kind: PoseKind,
+) -> Result<(Vec<f32>, Vec<DVec3>), HierarchyError> {
+    Ok(match kind {
+        PoseKind::World => {
+            let poses = world(clip, samples)?;
+            let tracks = clip.set.track_count();
+            let of_track = |track: usize| poses.iter().skip(track).step_by(tracks);
+            let mut origins = Vec::new();
+            if !clip.origins.is_empty() {
+                let origin = |track| origin_of(of_track(track).map(|pose| pose.position));
+                origins = (0..tracks).map(origin).collect();
+            }
+            let numbers = poses.iter().enumerate().flat_map(|(index, pose)| {
+                let origin = origins.get(index % tracks).copied().unwrap_or_default();
+                let [px, py, pz] = (pose.position - origin).as_vec3().to_array();
+                let [x, y, z, w] = pose.rotation.to_array();
+                [px, py, pz, x, y, z, w]
+            });
+            (numbers.collect(), origins)
+        }
+        PoseKind::Transform => {
+            let at = |list: &[Vec3], index: usize| list.get(index).copied();
+            let numbers = samples
+                .rotations
+                .iter()
+                .enumerate()
+                .flat_map(|(index, rotation)| {
+                    let [tx, ty, tz] = at(&samples.translations, index)
+                        .unwrap_or(Vec3::ZERO)
+                        .to_array();
+                    let [sx, sy, sz] = at(&samples.scales, index).unwrap_or(Vec3::ONE).to_array();
+                    let [x, y, z, w] = rotation.to_array();
+                    [tx, ty, tz, x, y, z, w, sx, sy, sz]
+                });
+            (numbers.collect(), clip.origins.clone())
+        }
+    })
 }

@@ -2,10 +2,10 @@
 
 mod arguments;
 pub(crate) mod job;
-mod shard_selection;
 pub(crate) mod shards;
 
 use crate::batch::target::ResultTarget;
+
 pub(crate) use crate::commands::eval::arguments::Arguments;
 use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::Failure;

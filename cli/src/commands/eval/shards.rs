@@ -3,19 +3,17 @@
 use std::path::Path;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::gather::FoundInput;
+use crate::arguments::input::FoundInput;
 use crate::arguments::time::SampleRequest;
 use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineJob};
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
-use crate::commands::eval::arguments::Arguments;
+use crate::commands::eval::arguments::{Arguments, ShardSelection};
 use crate::commands::eval::job::{EvaluationReport, evaluate_all};
-use crate::commands::eval::shard_selection::ShardSelection;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
-use crate::messages::listing;
-use crate::messages::words;
+use crate::messages::{listing, words};
 
 /// Runs the shards of a part.
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tumble_formats::generate::{Generate, KeySpacing};
 
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::generate::landscape::{Landscape, SIZE};
 use crate::messages::exit::Failure;
 use crate::messages::words;
@@ -20,10 +20,10 @@ Examples:
   tumble generate --boxes 4096 --keys 260 --seconds 200 --random -o - | tumble info -
   tumble generate --hill -o hill.obj --rocks rocks.obj")]
 pub(crate) struct Arguments {
-    /// Where to write (`-`: standard output)
+    /// Where to write: a file (`-`: standard output)
     #[arg(short, long = "out", value_name = "FILE")]
     out: PathBuf,
-    /// Replace an existing file
+    /// Replace existing files
     #[arg(long)]
     overwrite: bool,
     /// Number of boxes: tracks
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Keys of each box
     #[arg(long, default_value = "26", value_parser = clap::value_parser!(u32).range(1..))]
     keys: u32,
-    /// Time of the last key; the first is at 0
+    /// The duration, seconds: the time of the last key; the first is at 0
     #[arg(long, default_value = "20", value_parser = positive, allow_hyphen_values = true)]
     seconds: f64,
     /// Keys at even times (default)
@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     /// Keys at random times
     #[arg(long)]
     random: bool,
-    /// Seed of the random numbers
+    /// The seed of random numbers: the same seed gives the same file on every machine
     #[arg(long, default_value = "1")]
     seed: u64,
     /// Length of a box

@@ -7,7 +7,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::picture;
 use crate::commands::plot::figure::{Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis};
 use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};

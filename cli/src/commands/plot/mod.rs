@@ -23,23 +23,22 @@ use crate::arguments::interpolation::{
 };
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
-use crate::batch::destination::{self, Destination};
+use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::PlotSubject;
 use crate::commands::plot::subjects::{PlotQuantity, Subjects, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
-use crate::messages::names;
 use crate::messages::progress::Progress;
-use crate::messages::words;
+use crate::messages::{names, words};
 
-/// Draw components, speeds, errors and spheres of rotations, or bodies on paths, as SVG or PNG
+/// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A set of N boxes has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so on,
-counted from 1. Keys are drawn as dots, or as upright lines where a curve has no value
-at a key. Of files of paths speed, turning rate and roll are drawn, by each --frame.
+counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a key. For
+files of paths, the speed, the angular speed of the direction and the roll are drawn for each --frame.
 
 Examples:
   tumble plot data/pendulum.dat -o pendulum.svg
@@ -52,7 +51,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
-    /// Where to draw: FILE.svg, FILE.png, or a directory for several pictures
+    /// Where to write: FILE.svg, FILE.png, or a directory for several pictures
     #[arg(short, long = "out", value_name = "OUT")]
     out: PathBuf,
     /// Replace existing files
@@ -81,15 +80,15 @@ pub(crate) struct Arguments {
         conflicts_with = "tracks"
     )]
     boxes: Vec<usize>,
-    /// sphere: which axis of a box is followed; -y points along it
+    /// sphere: the axis of the box to draw; -y points along the box
     #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
     axis: AxisArgument,
-    /// Every figure of a report, and a page that shows them, in a directory
+    /// Write all plots, and an HTML page that shows them, into a directory
     #[arg(long, conflicts_with_all = ["show", "dimensions", "boxes", "tracks", "axis"])]
     report: bool,
     /// svg or png [default: by the name of the output, else svg]
-    #[arg(long, value_enum)]
-    format: Option<PictureFormat>,
+    #[arg(long, alias = "format", value_enum, value_name = "FORMAT")]
+    picture_format: Option<PictureFormat>,
     #[command(flatten)]
     sampling: SamplingArguments,
     #[command(flatten, next_help_heading = PATHS)]
@@ -303,7 +302,7 @@ impl Arguments {
 
     fn format(&self) -> PictureFormat {
         let named = PictureFormat::of(&self.out);
-        self.format.or(named).unwrap_or(PictureFormat::Svg)
+        self.picture_format.or(named).unwrap_or(PictureFormat::Svg)
     }
 
     /// Checks the output before any work; makes the directory.
@@ -318,7 +317,7 @@ impl Arguments {
                     "{shown}: end the picture in .svg or .png, or give a directory"
                 )));
             }
-            destination::create_folder(out)?;
+            target::create_folder(out)?;
             return Ok(PlotOutput::Folder(out.clone()));
         }
         if self.report {

@@ -9,16 +9,15 @@ use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
 
 use crate::arguments::time::SampleRequest;
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::info::Steps;
 use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::{NAMES, PlotSubject};
 use crate::commands::plot::subjects::PANELS;
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
 use crate::messages::exit::{Failure, for_each};
-use crate::messages::names;
 use crate::messages::progress::Progress;
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// The dimensions that the original program's report shows, counted from 1.
 const DIMENSIONS: [usize; 2] = [2, 16];

@@ -17,13 +17,14 @@ use crate::commands::prove::steps::ProofRequest;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 use crate::messages::listing;
 
-/// Show that a device gives the promised bits: every kernel, recorded and random results; and measure speed
+/// Test that a device gives the same bits as the CPU, for every kernel and for recorded and random inputs, and measure its speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every kernel runs beside its twin on the CPU, recorded results of every method, output and crowd are
-evaluated in every way in which the engine may use the device, then random sets and crowds until the
-time is over, and a renderer's device is made to evaluate on. Every bit is compared. Figures are by
-the device's clock. `docs/proofs.md` has devices that this was run on, and what the JSON means.
+Every kernel is compared with the same function on the CPU. Recorded results of every method, output
+and crowd are computed in every configuration in which the engine may use the device. Random tracks
+and crowds are compared with the CPU until the time limit. The same is done on a Vulkan device that is
+created as a renderer would. Every bit is compared. Times are measured by the device's clock.
+`docs/proofs.md` lists devices that were tested, and explains the JSON.
 
 Exit codes:
   0  proved: everything ran, and no bit differs
@@ -32,35 +33,36 @@ Exit codes:
 
 Examples:
   tumble prove                                   the first Vulkan device, at most 8 minutes
-  tumble prove --device 1 --seconds 60 -o proof.json
+  tumble prove --device 1 --time-limit 60 -o proof.json
   tumble prove --validate                        again under the Khronos validation layer
   tumble prove --compare here.json there.json")]
 pub(crate) struct Arguments {
-    /// The device: its index, part of its name or uuid:UUID (`tumble devices`); by default the first
-    /// Vulkan device
+    /// The device: its index, part of its name or uuid:UUID (`tumble devices`) [default: the first Vulkan
+    /// device]
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
-    /// The time limit; what a proof needs runs first
+    /// The time limit, seconds; what a proof needs runs first
     #[arg(
         long,
+        alias = "seconds",
         value_name = "SECONDS",
         default_value_t = 480,
         value_parser = clap::value_parser!(u64).range(1..=86_400)
     )]
-    seconds: u64,
+    time_limit: u64,
     /// Run only what a proof needs: no additional random rounds, and no repetition in every configuration
     #[arg(long)]
     quick: bool,
-    /// The seed of the random sets and crowds: the same seed gives the same ones on every machine
+    /// The seed of random numbers: the same seed gives the same sets and crowds on every machine
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
     /// Run everything again under the Khronos validation layer; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Write the proof to a file, as JSON
+    /// Where to write: the proof, as JSON
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace an existing file
+    /// Replace existing files
     #[arg(long, requires = "out")]
     overwrite: bool,
     /// Print JSON
@@ -71,7 +73,7 @@ pub(crate) struct Arguments {
         long,
         num_args = 2,
         value_names = ["FILE", "FILE"],
-        conflicts_with_all = ["device", "seconds", "quick", "seed", "validate", "out", "overwrite"]
+        conflicts_with_all = ["device", "time_limit", "quick", "seed", "validate", "out", "overwrite"]
     )]
     compare: Vec<PathBuf>,
     /// Compile every kernel, and say how long each took
@@ -100,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let proof = steps::prove(&ProofRequest {
         device,
-        seconds: arguments.seconds,
+        seconds: arguments.time_limit,
         quick: arguments.quick,
         seed: arguments.seed,
         validate: arguments.validate,

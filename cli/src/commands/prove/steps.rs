@@ -229,7 +229,7 @@ impl ProofRun<'_> {
         let elapsed = self.started.elapsed().as_secs();
         if self.is_past(1.0) {
             let allowed = self.request.seconds;
-            let reason = format!("{name}: the {allowed} s were over (--seconds)");
+            let reason = format!("{name}: the {allowed} s were over (--time-limit)");
             self.proof.failures.push(reason);
             return;
         }
@@ -330,7 +330,7 @@ impl ProofRun<'_> {
         match kernels.missing.is_empty() || !self.is_past(1.0) {
             true => Ok(()),
             false => Err(StepError(format!(
-                "the {} s were over after {} of {} (--seconds)",
+                "the {} s were over after {} of {} (--time-limit)",
                 self.request.seconds, self.proof.kernels.ran, self.proof.kernels.count
             ))),
         }

@@ -181,7 +181,7 @@ fn bits(proof: &Proof, text: &mut String) {
                 },
                 match renderer.copy_queue_family {
                     Some(family) => format!("copied on queue family {family}"),
-                    None => "no queue that only copies".to_owned(),
+                    None => "no transfer queue".to_owned(),
                 }
             );
         }

@@ -17,26 +17,25 @@ use tumble_formats::motion::{ChannelInterpolation, Motion, SampledClip};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, quantize_all, reduce};
 use tumble_formats::{Feature, Format, Loaded};
 
-use crate::arguments::command_line::CommandLine;
 use crate::arguments::input::Inputs;
+use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
+use crate::arguments::results::{
+    ResultArguments, check_holds_keys, check_sequence, document_to_rewrite, makes_new,
+};
 use crate::arguments::tolerance::{degrees, not_negative};
-use crate::batch::destination::{Destination, WrittenFile};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::target::ResultTarget;
+use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::listing;
-use crate::messages::names;
-use crate::messages::words;
+use crate::messages::{listing, names, words};
 
-/// Remove keys from motion: keep few whose curves stay near all samples
+/// Remove keys from motion; the curves of the remaining keys stay within a tolerance of all samples
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The keys of the input are the samples (or the frames of --fps). At each of them every joint stays
-within the angle of --tolerance and the distance of --distance: in the world where the input has a
-skeleton, else each track by itself. This is checked by evaluating the remaining keys. glTF stores
+within the angle of --tolerance and the distance of --distance. If the input has a skeleton, both are
+measured in world space, else for each track. The program evaluates the remaining keys to check this. glTF stores
 separate key times for each channel; other formats store all joints at the same times, which takes
 more keys. A GLB or glTF that is written as one keeps everything else in the file.
 
@@ -55,8 +54,7 @@ pub(crate) struct Arguments {
     /// The largest angle: 0.1deg or 0.002rad, degrees without a unit
     #[arg(long, value_name = "ANGLE", default_value = "0.1deg", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: f64,
-    /// The largest distance, in the input's unit of length [default: what the angle amounts to at the
-    /// end of the longest chain of joints]
+    /// The largest distance: in the input's unit of length [default: the arc of the angle at the end of the longest chain of joints]
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Points at this distance from each joint, along its axes, stay within --distance too, as a
@@ -74,16 +72,16 @@ pub(crate) struct Arguments {
     /// --quantize, all samples become keys with as few bits as the bounds allow, where that is smaller
     #[arg(long)]
     meshopt: bool,
-    /// Sample at this rate first [default: the keys are the samples]
+    /// Frames per second: sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
-    /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
+    /// The sequence of axes: of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw the errors of the joints over time, as .svg or .png; needs a single input
+    /// Also draw, as .svg or .png: the errors of the joints over time; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Print JSON about the results on standard output
+    /// Print JSON: about the results
     #[arg(long)]
     json: bool,
 }
@@ -148,6 +146,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     let format = plan.targets.first().map(ResultTarget::format);
+    check_holds_keys(&plan)?;
     check_sequence(arguments.sequence, format)?;
     let is_bessel = matches!(arguments.curve, ReducedCurve::BesselOverhauser);
     if is_bessel && format.is_some_and(|format| format.takes(FormatOption::AtKeys)) {
@@ -189,7 +188,7 @@ impl Arguments {
         }
         if self.quantize && matches!(self.curve, ReducedCurve::GltfCubic) {
             return Err(Failure::usage(
-                "--quantize is for keys that arcs join: tangents are longer than 16 bits take; leave out --curve cubic",
+                "--quantize cannot store the tangents of cubics; leave out --curve cubic",
             ));
         }
         Ok(())
@@ -399,14 +398,10 @@ impl Arguments {
         let otherwise = match keys_per_channel {
             // A file that is kept keeps the bytes of its old keys too.
             true if self.meshopt => Some("compression makes"),
-            true => self.inputs.tracks.is_set().then_some("some tracks make"),
+            true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),
         };
         let document = document_to_rewrite(name, loaded, target, otherwise);
-        if !format.writes_clips() {
-            let message = format!("{target}: {} holds results, not keys", format.name);
-            return Err(Failure::usage(message));
-        }
         let indices = clips.iter().map(|clip| clip.index);
         target.write_clips(&sampled, indices, document, &options)
     }

@@ -2,7 +2,7 @@
 
 use tumble_formats::reduce::Reduced;
 
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::plot::draw;
 use crate::commands::plot::figure::{
     Figure, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,

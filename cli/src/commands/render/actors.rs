@@ -100,7 +100,7 @@ pub(super) fn travellers(
             rotations: bodies.rotations,
             positions: bodies.positions,
             body,
-            trails: trails(&trail, scenery.axes, length, ink),
+            trails: trails(&trail, scenery.drawn_frames, length, ink),
             reach: corners.collect(),
         });
     }

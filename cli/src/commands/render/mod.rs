@@ -17,8 +17,8 @@ use crate::arguments::interpolation::{InterpolationArguments, MethodSelection, c
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
 use crate::arguments::tracks::selected;
-use crate::batch::destination::{self, Destination};
 use crate::batch::room;
+use crate::batch::target::{self, Destination};
 use crate::commands::picture;
 use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
@@ -26,9 +26,8 @@ use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
 use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
 use crate::messages::exit::Failure;
-use crate::messages::names;
 use crate::messages::progress::Progress;
-use crate::messages::{signals, words};
+use crate::messages::{names, signals, words};
 
 /// Chains side by side in one picture.
 const MAX_METHODS: usize = 4;
@@ -36,11 +35,12 @@ const MAX_METHODS: usize = 4;
 /// What browsers show a frame of a GIF for at least, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 
-/// Draw the boxes of a chain, or bodies on paths, as pictures or a film, without a display
+/// Draw the boxes of a chain, or bodies on paths, as images or an animation, without a display
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Of files of paths, and of motion files whose joints all are roots that move (as `tumble follow`
-writes them), the path is drawn, its frames as small axes (x red, y green, z blue), and a box on it.
+If the input is a file of paths, or a motion file in which all joints are roots that move (as written
+by `tumble follow`), the path is drawn, with its frames as small axes (x red, y green, z blue) and a
+box on it.
 
 Examples:
   tumble render data/pendulum.dat -o pendulum.gif
@@ -53,14 +53,14 @@ pub(crate) struct Arguments {
     /// A keyframe file, or one of paths (`-`: standard input)
     #[command(flatten)]
     inputs: Inputs,
-    /// Where to draw: FILE.gif, FILE.apng, FILE.png (the first frame), or a directory for a
+    /// Where to write: FILE.gif, FILE.apng, FILE.png (the first frame), or a directory for a
     /// picture of each frame
     #[arg(short, long = "out", value_name = "OUT")]
     out: PathBuf,
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
-    /// How to interpolate; several methods stand side by side
+    /// How to interpolate: one method or several, which stand side by side
     #[arg(
         short,
         long = "method",
@@ -302,7 +302,7 @@ impl Arguments {
             );
         }
         if kind == RenderOutput::Folder {
-            destination::create_folder(&self.out)?;
+            target::create_folder(&self.out)?;
             let digits = (times.len() - 1).to_string().len().max(5);
             let destination = |frame: usize| {
                 let file = self.out.join(format!("{frame:0digits$}.png"));

@@ -7,37 +7,40 @@ use glam::DVec3;
 use tumble_routes::net::NetBy;
 use tumble_routes::route::By;
 
+use crate::commands::route::surface::kinds;
 use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
 use crate::messages::names;
 
-/// Find routes over a mesh or a surface: shortest ones, or approximations
-#[derive(Debug, Args)]
-#[command(after_help = "\
-The surface is a mesh (.obj, .ply, .glb, .gltf) or a net of Bézier control points (.npy of
-shape m, n, 3). A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
+/// What the help says of files.
+const NOTES: &str = "\
+A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
 of the surface there, for `tumble follow`. A list of pairs has six numbers a line, separated by
 commas or blanks. Walkers are CSV with the columns name, radius, speed, start, x, y, z, to_x,
 to_y, to_z; a row whose column track names a CSV of t,x,y,z moves on that instead.
 
 Examples:
-  tumble route hill.obj --from 0,0,0 --to 9,5,0 -o way.csv
+  tumble route hill.obj --start-point 0,0,0 --end-point 9,5,0 -o way.csv
   tumble route hill.obj --pairs pairs.txt --by edges -o ways/
-  tumble route hill.obj --from 0,0,0 --to 9,5,0 --avoid rocks.obj --clearance 0.3 \\
+  tumble route hill.obj --start-point 0,0,0 --end-point 9,5,0 --avoid rocks.obj --clearance 0.3 \\
     --finest 0.05 --max-slope 40 -o way.csv --plot way.svg
   tumble route plaza.glb --walkers people.csv -o ways/
-  tumble route hood.npy --by facets:40 --from 0,0,0 --to 1,0,1 -o way.csv")]
+  tumble route hood.npy --by facets:40 --start-point 0,0,0 --end-point 1,0,1 -o way.csv";
+
+/// Find routes over a mesh or a surface: shortest ones, or approximations
+#[derive(Debug, Args)]
+#[command(after_help = format!("The surface is {}.\n{NOTES}", kinds()))]
 pub(crate) struct Arguments {
     /// A mesh, or a net of control points
     pub(crate) surface: PathBuf,
     /// The start of the route
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "to")]
-    from: Option<DVec3>,
+    #[arg(long, alias = "from", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "end_point")]
+    start_point: Option<DVec3>,
     /// The end of the route
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "from")]
-    to: Option<DVec3>,
+    #[arg(long, alias = "to", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "start_point")]
+    end_point: Option<DVec3>,
     /// A file of pairs: from x y z, to x y z on each line
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "walkers"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["start_point", "walkers"])]
     pairs: Option<PathBuf>,
     /// Meshes: exact, plane, greedy or edges; nets: line or facets:N
     #[arg(long, value_name = "METHOD", value_parser = parse_method)]
@@ -58,22 +61,22 @@ pub(crate) struct Arguments {
     /// The steepest slope that is walked, in degrees
     #[arg(long, value_name = "DEG", value_parser = slope, allow_hyphen_values = true)]
     pub(crate) max_slope: Option<f64>,
-    /// The direction upwards, for slopes and pictures
+    /// The upward direction: for slopes and pictures
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = direction, allow_hyphen_values = true)]
     pub(crate) up: DVec3,
     /// A file of walkers, who wait for each other on their routes
-    #[arg(long, value_name = "FILE", conflicts_with = "from")]
+    #[arg(long, value_name = "FILE", conflicts_with = "start_point")]
     walkers: Option<PathBuf>,
     /// Where to write: a CSV (`-`: standard output), or a directory for pairs and walkers
     #[arg(short, long = "out", value_name = "OUT")]
     pub(crate) out: PathBuf,
-    /// Also draw the mesh from above with the routes, as .svg or .png
+    /// Also draw, as .svg or .png: the mesh from above with the routes
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Print lengths and errors as JSON
+    /// Print JSON: lengths and errors
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -92,12 +95,12 @@ impl Arguments {
             let message = "--json and -o - both write to standard output; give a file";
             return Err(Failure::usage(message));
         }
-        match (self.from, self.to, &self.pairs, &self.walkers) {
-            (Some(from), Some(to), None, None) => Ok(Participants::of_pair([from, to])),
+        match (self.start_point, self.end_point, &self.pairs, &self.walkers) {
+            (Some(start), Some(end), None, None) => Ok(Participants::of_pair([start, end])),
             (None, None, Some(file), None) => read_pairs(file),
             (None, None, None, Some(file)) => read_walkers(file),
             _ => Err(Failure::usage(
-                "give --from and --to, --pairs, or --walkers",
+                "give --start-point and --end-point, --pairs, or --walkers",
             )),
         }
     }

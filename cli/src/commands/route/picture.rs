@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 use tumble_routes::mesh::Mesh;
 
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::picture;
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::results::RouteOutcome;

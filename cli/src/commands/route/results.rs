@@ -8,7 +8,7 @@ use glam::DVec3;
 use tumble_routes::route::Route;
 use tumble_routes::walkers::Plan;
 
-use crate::batch::destination::{self, Destination};
+use crate::batch::target::{self, Destination};
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::tables::Participants;
 use crate::messages::exit::Failure;
@@ -67,7 +67,7 @@ impl RouteResults {
         let destinations = if participants.is_single {
             vec![new(out)?]
         } else {
-            destination::create_folder(out)?;
+            target::create_folder(out)?;
             let path = |name: &String| out.join(format!("{name}.csv"));
             participants
                 .names

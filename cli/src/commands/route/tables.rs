@@ -1,13 +1,16 @@
 //! Lists of pairs, and of walkers.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use glam::DVec3;
 use serde::Deserialize;
+use tumble_formats::beneath::open_beneath;
 use tumble_formats::{Code, Diagnostic, Location};
 use tumble_routes::walkers::Mover;
 
-use crate::commands::route::surface::{bytes, bytes_beneath};
+use crate::commands::route::surface::MAX_BYTES;
 use crate::messages::exit::Failure;
 
 /// The start and the goal of each route.
@@ -55,6 +58,40 @@ fn refuse(path: &Path, line: u64, code: Code, message: &str) -> Failure {
 fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
     let text = String::from_utf8(bytes);
     text.map_err(|_| whole(path, Code::Encoding, "is not UTF-8 text; save it as UTF-8"))
+}
+
+/// All bytes of a file; no pipe, which could have no end.
+fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
+    let open = || match std::fs::metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(io::Error::other("is not a regular file")),
+    };
+    read(path, open())
+}
+
+/// All bytes of a file that a file in `folder` names.
+fn bytes_beneath(folder: &Path, name: &Path) -> Result<Vec<u8>, Failure> {
+    read(name, open_beneath(folder, name))
+}
+
+fn read(path: &Path, file: io::Result<File>) -> Result<Vec<u8>, Failure> {
+    let refused = |code, message: String| {
+        let fault = Diagnostic::new(path.display().to_string(), code, message);
+        Failure::input(&fault, "")
+    };
+    let refuse = |error: io::Error| refused(Code::Open, format!("cannot be read: {error}"));
+    let mut bytes = Vec::new();
+    let file = file.map_err(refuse)?;
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(refuse)?;
+    match bytes.len() as u64 <= MAX_BYTES {
+        true => Ok(bytes),
+        false => {
+            let message = "is longer than 4 GiB; split it";
+            Err(refused(Code::FileTooLong, message.to_owned()))
+        }
+    }
 }
 
 /// Six numbers a line; lines with `#` in front and empty ones are skipped.

@@ -5,7 +5,6 @@ mod picture;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -18,30 +17,27 @@ use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
-use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::Inputs;
+use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
-use crate::batch::destination::Destination;
-use crate::batch::destination::WrittenFile;
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, makes_new};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::target::ResultTarget;
+use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::commands::smooth::picture::SmoothingSubject;
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::names;
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// Smooth rotations and translations by a kernel over samples
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Kernels act on the steps from sample to sample, so that still tracks keep their bits and uniform
-motion does not change: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
-deviation), savitzky-golay:RADIUS:ORDER. --low-pass HZ is the bell that halves the power of motion at
-that frequency, whatever the rate of the samples. Samples are the keys where these are evenly spaced, else
---fps sets the rate. NPY and CSV store the rotations, motion files everything. An output of the input's
-format keeps everything else in the file; stepped channels stay stepped.
+Kernels are linear, cubic, box:S and tent:S (S samples before and after), gaussian:S (standard deviation
+in samples), and savitzky-golay:RADIUS:ORDER. They filter the steps from sample to sample, so constant
+tracks keep their bits and uniform motion does not change. --low-pass HZ is the Gaussian that halves the
+power of motion at that frequency, at any rate of the samples. If keys are evenly spaced, they are the
+samples; otherwise give the rate by --fps. NPY and CSV contain only the rotations. If the output has the
+format of the input, everything else in the file is kept. Stepped channels stay stepped.
 
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
@@ -66,22 +62,22 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
     /// How samples continue beyond the first and the last one
-    #[arg(long, value_name = "ENDS", default_value_t, value_parser = ends())]
-    ends: SmoothingEnds,
-    /// Sample at this rate first [default: the keys themselves]
+    #[arg(id = "ends", long = "edges", alias = "ends", value_name = "EDGES", default_value_t, value_parser = edges())]
+    edges: SmoothingEnds,
+    /// Frames per second: sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
-    /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
+    /// The sequence of axes: of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw the speeds of the noisiest joint before and after, as .svg or .png; needs a single input
+    /// Also draw, as .svg or .png: the speeds of the noisiest joint before and after; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArguments,
 }
 
-fn ends() -> impl TypedValueParser<Value = SmoothingEnds> {
+fn edges() -> impl TypedValueParser<Value = SmoothingEnds> {
     let help = |ends| match ends {
         SmoothingEnds::Keep => "the end samples stay",
         SmoothingEnds::Parabolic => {
@@ -104,7 +100,7 @@ fn frequency(text: &str) -> Result<f64, String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let smoothing = Smoothing {
         kernel: arguments.kernel,
-        ends: arguments.ends,
+        ends: arguments.edges,
         passes: arguments.passes,
     };
     smoothing
@@ -140,7 +136,6 @@ impl Arguments {
         device: &mut OpenedDevice,
         plot: Option<&Destination>,
     ) -> Result<EvaluatedResult, Failure> {
-        let started = Instant::now();
         let (name, clips, target) = (&*work.name, work.clips(), &work.target);
         let loaded = &work.input.loaded;
         let tracks = &self.inputs.tracks;
@@ -181,8 +176,7 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        let some = tracks.is_set().then_some("some tracks make");
-        let document = document_to_rewrite(name, loaded, target, some);
+        let document = document_to_rewrite(name, loaded, target, makes_new(&self.inputs));
         let result = (target, options, document);
         let written = write(name, &clips, &samples, result)?;
         let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
@@ -192,18 +186,8 @@ impl Arguments {
             .iter()
             .map(|smoothed| smoothed.after.times.len())
             .sum();
-        let message = format!(
-            "{name}: {}, {}, on {} in {} → {target}",
-            words::count(times, "sample"),
-            kernels.join(", "),
-            device.label,
-            words::duration(started.elapsed()),
-        );
-        Ok(EvaluatedResult {
-            written,
-            device: device.label.clone(),
-            message,
-        })
+        let done = format!("{}, {}", words::count(times, "sample"), kernels.join(", "));
+        Ok(work.result(written, &done, Some(&device.label)))
     }
 }
 

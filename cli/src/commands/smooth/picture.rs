@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble_formats::sample::Samples;
 
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::plot::draw;
 use crate::commands::plot::figure::{
     Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,

@@ -23,28 +23,27 @@ use crate::arguments::interpolation::{
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
-use crate::batch::destination::Destination;
+use crate::batch::target::Destination;
 use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
-use crate::messages::names;
 use crate::messages::progress::Progress;
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
 const MAX_PAGE_BYTES: f64 = 256e6;
 /// Up to this size, every method is shown where none is named.
 const SMALL_PAGE_BYTES: f64 = 24e6;
 
-/// Write a page that shows boxes turning, skeletons moving and bodies on paths: one HTML file
+/// Write an HTML file that shows boxes, skeletons or bodies on paths in 3D
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file needs no network and nothing beside it. It shows the engine's own rotations and
-positions, at the frames asked for and at the keys between them; other methods, rates and times
-are evaluated in the page, by the same engine with the same bits. Files with skeletons are shown
-as bones, all their animations in a menu, in the meshes of glTF files that they move; files of
-paths, and joints without parents that move, as boxes on their paths, with frames as small axes.
+The file needs no network and no other files. It contains the rotations and positions at the frames
+and at the keys. Other methods, rates and times are evaluated in the page, by the same engine with
+the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and all animations of a
+file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their
+paths, with frames as small axes.
 
 Examples:
   tumble view data/pendulum.dat -o pendulum.html
@@ -55,7 +54,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
-    /// Where to write (`-`: standard output) [default with --open: a temporary file]
+    /// Where to write: a page (`-`: standard output) [default with --open: a temporary file]
     #[arg(
         short,
         long = "out",
@@ -63,17 +62,17 @@ pub(crate) struct Arguments {
         required_unless_present = "open"
     )]
     out: Option<PathBuf>,
-    /// Replace an existing file
+    /// Replace existing files
     #[arg(long)]
     overwrite: bool,
     /// Open the page in the browser
     #[arg(long)]
     open: bool,
-    /// The methods to choose from, or all; the first is shown first [default: all where the
+    /// How to interpolate: the methods to choose from, or all; the first is shown first [default: all where the
     /// page stays small, else authored,bessel-overhauser,slerp,catmull-rom,b-spline]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
     methods: Vec<MethodArgumentSelection>,
-    /// Frames per second, from the first key to the last: a number or a ratio
+    /// Frames per second: from the first key to the last, a number or a ratio
     #[arg(
         long,
         value_name = "FPS",

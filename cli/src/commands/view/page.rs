@@ -217,7 +217,7 @@ impl StoredSet {
             length: scenery.length(&shown.key_positions()),
             rotation: shown.body_rotation().to_array(),
             stand: !scenery.meshes.is_empty(),
-            axes: scenery.axes,
+            axes: scenery.drawn_frames,
         });
         let scales = (0..set.track_count()).any(|track| {
             let rest = shown.clip.rest(Channel::Scale, track);

@@ -259,7 +259,7 @@ impl<'a> GltfReader<'a> {
             let count = numbers.len() / width;
             if index >= count || before.is_some_and(|before| index <= before) {
                 let message =
-                    format!("index {index} of {count} elements; they increase and lie below that");
+                    format!("index {index} of {count} elements; indices must increase and be less than that");
                 return Err(refuse(message));
             }
             numbers[index * width..][..width].copy_from_slice(value);

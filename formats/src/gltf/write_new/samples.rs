@@ -42,22 +42,8 @@ impl<'a> ClipSamples<'a> {
     /// # Errors
     /// `InvalidInput` when a list is too short or too long.
     pub(super) fn of(clip: &'a SampledClip<'a>) -> io::Result<Self> {
+        clip.checked_len()?;
         let tracks = clip.clip.set.track_count();
-        let all = tracks.saturating_mul(clip.times.len());
-        let lists = [
-            ("rotations", clip.rotations.len(), all, false),
-            ("translations", clip.translations.len(), all, true),
-            ("scales", clip.scales.len(), all, true),
-            ("joints", clip.clip.skeleton.len(), tracks, true),
-            ("channels", clip.clip.channels.len(), tracks, true),
-        ];
-        for (name, length, expected, may_be_empty) in lists {
-            if length != expected && !(may_be_empty && length == 0) {
-                let message =
-                    format!("a clip of {tracks} tracks has {length} {name}, not {expected}");
-                return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
-            }
-        }
         Ok(Self { clip, tracks })
     }
 

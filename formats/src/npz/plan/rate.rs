@@ -33,7 +33,7 @@ impl ArchivePlan {
                 _ => Err(format!("{} numbers", numbers.len())),
             };
             let rate = rate.map_err(|found| {
-                let message = format!("{found} is not a frame rate; it is one number over 0");
+                let message = format!("{found} is not a frame rate; expected one number greater than 0");
                 archive.refuse(member, Code::FrameRate, message)
             })?;
             match self.rate {
@@ -73,7 +73,7 @@ impl ArchivePlan {
         self.two_rates.get_or_insert_with(|| {
             format!(
                 "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
-                 {by_length:.3} a second; the first is taken, --source-fps says another",
+                 {by_length:.3} a second; the first is used, --source-fps overrides it",
                 self.frames
             )
         });
@@ -91,7 +91,7 @@ impl ArchivePlan {
         let Some(list) = self.times else {
             let rate = options.source_rate.or(self.rate).ok_or_else(|| {
                 let message =
-                    "the file says neither times nor a frame rate; --source-fps gives one";
+                    "the file has neither times nor a frame rate; give the rate with --source-fps";
                 Diagnostic::new(&archive.file, Code::NoRate, message)
             })?;
             self.rate = Some(rate);
@@ -151,7 +151,7 @@ impl ArchivePlan {
         };
         if let (Some(first), None, Some(found)) = (self.rate, said, found) {
             self.two_rates = Some(format!(
-                "the file says {first} frames a second, and its times lie at {found}; the times are taken"
+                "the file says {first} frames a second, and its times lie at {found}; the times are used"
             ));
         }
         self.rate = said.or(found);

@@ -49,7 +49,7 @@ impl ArchivePlan {
         if let Some(names) = listed(quoted.collect()) {
             let has_shape = others.iter().any(|&index| SHAPE.contains(&name(index)));
             let hint = match self.is_body && has_shape {
-                true => "; --body-model brings the model that the shape is of",
+                true => "; the shape of a body is used with --body-model",
                 false => "",
             };
             let message = format!("not read: {names}; say what arrays are with --map{hint}");

@@ -1,4 +1,4 @@
-"""A library of clips over many machines, by Ray: the bytes of `tumble eval` on one.
+"""Evaluates a directory of clips on many machines by Ray, with the same bytes as `tumble eval` on one.
 
     python -m tumble.distributed LIBRARY OUT --fps 60 -m slerp
 
@@ -6,8 +6,8 @@ or from Python:
 
     report = tumble.distributed.evaluate("clips", "out", fps=60, method="slerp")
 
-LIBRARY and OUT are directories that every machine sees, or URLs of object stores. Wants Ray: `pip
-install 'tumble-rotations[ray]'`; docs/distributed.md has the rest.
+LIBRARY and OUT are directories with the same path on every machine, or URLs of object stores. Ray is
+required: `pip install 'tumble-rotations[ray]'`. See docs/distributed.md.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ def evaluate(
     progress: Callable[[Progress], None] | None = None,
     **options: Any,
 ) -> Report:
-    """Evaluates every clip of a library, as `tumble eval LIBRARY -o OUT` does, over a cluster.
+    """Evaluates every clip of a directory on a cluster, as `tumble eval LIBRARY -o OUT` does on one machine.
 
     `options` are those of `tumble eval`: `fps=60`, `method="slerp"`, `from_zero=True`, `tracks=[0, 1]`.
-    `address`: of a Ray cluster; "auto" is that of this machine, else one that is started for the call.
-    `device`: "auto" and "cpu" take a processor for each worker, "vulkan" a graphics card where the
-    cluster has any. `worker_memory`: what a task reserves of its machine's memory, so that Ray starts
-    no more of them than there is room for. `shard_bytes`: of input, at most, in what one task does. `into="parquet"`: a file
-    of rows for each shard instead of a file for each clip. `resume`: keep what is done, and whole.
-    `progress` is called with a `Progress` about twice a second.
+    `address`: the Ray cluster; "auto": that of this machine, or a new one for this call.
+    `device`: "auto" and "cpu" use a processor for each worker, "vulkan" a graphics card if the cluster
+    has cards. `worker_memory`: the memory that a task reserves, so that Ray runs only as many tasks on a
+    machine as fit. `shard_bytes`: the largest total size of the inputs of a task. `into="parquet"`:
+    write a file of rows for each shard instead of a file for each clip. `resume`: skip results that are
+    complete. `progress` is called with a `Progress` about twice a second.
 
-    Inputs that are refused are in the report, the others are done. What ends everything, such as an
-    output that cannot be written, is a `DistributedError`. After it, and after Ctrl-C, a second call
-    goes on with what is left. A connection to Ray that is there is used, and left open: tasks that
-    it was given before such an end run to theirs.
+    Inputs that are refused are listed in the report; the others are evaluated. An error that stops the
+    whole run, such as an output that cannot be written, raises `DistributedError`. After it, or after
+    Ctrl-C, a second call continues with the rest. If Ray is already connected, this connection is used
+    and left open; tasks that were submitted before an error then run to their end.
     """
     paths = [local(library), local(out)]
     return _driver.evaluate(

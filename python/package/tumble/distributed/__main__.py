@@ -15,22 +15,22 @@ from tumble.distributed import DistributedError, Progress, Report, _check, _driv
 from tumble.distributed._job import DIFFERENCE, USAGE, bytes_of, is_url, local
 
 HELP = """\
-Evaluate a library of clips over a Ray cluster; the bytes are those of `tumble eval` on one machine
+Evaluate a directory of clips on a Ray cluster; the results have the same bytes as those of `tumble eval` on one machine
 
 Usage: python -m tumble.distributed LIBRARY OUT [OPTIONS] [OPTIONS OF `tumble eval`]
        python -m tumble.distributed --check OUT
 
-LIBRARY and OUT are directories that every machine sees, or URLs such as s3://bucket/clips.
+LIBRARY and OUT are directories with the same path on every machine, or URLs such as s3://bucket/clips.
 
 Options:
-      --resume               Keep what is done, and whole
-      --overwrite            Make all again
-      --address ADDRESS      The cluster; `auto` is that of this machine, else one is started [default: auto]
-      --device DEVICE        auto (the processors), cpu, or vulkan (a graphics card for each worker where
-                             the cluster has any) [default: auto]
-      --shard-bytes SIZE     The input of a shard, at most [default: 32MiB]
-      --worker-memory SIZE   What a task reserves of its machine's memory [default: nothing]
-      --into files|parquet   A file for each clip, or a file of rows for each shard [default: files]
+      --resume               Skip results that are complete and were made from the same input with the same options
+      --overwrite            Replace all results
+      --address ADDRESS      The Ray cluster; `auto`: that of this machine, or a new one for this run [default: auto]
+      --device DEVICE        auto (the processors), cpu, or vulkan (a graphics card for each worker, if
+                             the cluster has cards) [default: auto]
+      --shard-bytes SIZE     The largest total size of the inputs in a shard [default: 32MiB]
+      --worker-memory SIZE   The memory that a task reserves on its machine [default: none]
+      --into files|parquet   Write a file for each clip, or a Parquet file for each shard [default: files]
       --check OUT            Check results against their manifest, as `tumble check`, in object stores too
       --json                 Print the report as JSON on standard output
   -h, --help                 Print this help; `tumble eval --help` has the other options
@@ -39,8 +39,9 @@ Examples:
   python -m tumble.distributed clips out --fps 60 -m slerp
   python -m tumble.distributed s3://bucket/clips s3://bucket/out --resume --into parquet
 
-Exit codes are those of `tumble`: 0 done, 2 the command line is wrong, 3 some inputs failed, 4 all did,
-6 a device failed, 7 output could not be written, 8 --check found a difference, 129 to 131 and 143 stopped by a signal: --resume goes on.
+Exit codes are those of `tumble`: 0 success, 2 the command line is wrong, 3 some inputs failed, 4 all inputs
+failed, 6 a device failed, 7 output could not be written, 8 --check found a difference, 129 to 131 and 143 stopped
+by a signal (--resume continues).
 """
 
 VALUES = {
@@ -69,7 +70,7 @@ def main(arguments: list[str]) -> int:
         return error.exit_code
     except KeyboardInterrupt as stopped:
         code = stopped.args[0] if stopped.args else 130
-        _say("stopped; shards that are done are kept: --resume goes on")
+        _say("stopped; shards that are done are kept: --resume continues")
         return int(code)
 
 
@@ -119,11 +120,11 @@ def _check_all(out: str) -> int:
     if checked.faults:
         _say(f"error: {len(checked.faults)} of {checked.results} results differ; --resume makes them again")
         return DIFFERENCE
-    print(f"{checked.results} results, every bit as written")
+    print(f"{checked.results} results, unchanged since they were written")
     if checked.shards is None:
         return 0
     done, shards = checked.shards
-    _say(f"error: {out}: {done} of {shards} shards are done; --resume goes on")
+    _say(f"error: {out}: {done} of {shards} shards are done; --resume continues")
     return DIFFERENCE
 
 

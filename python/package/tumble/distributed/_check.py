@@ -7,7 +7,8 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from tumble.distributed._job import ALL_INPUTS, DistributedError, Entry, is_whole, lines_of, split_record
+from tumble import _tumble
+from tumble.distributed._job import ALL_INPUTS, DistributedError
 from tumble.distributed._stores import Store, read_text, store
 
 # Objects that are read at once; each waits for the network most of its time.
@@ -32,8 +33,7 @@ def check(out: str) -> Checked:
     plan = read_text(results, "manifest.d/plan.json")
     if manifest is None and plan is None:
         raise DistributedError(f"{out}: has no manifest.jsonl", ALL_INPUTS)
-    entries: dict[str, Entry] = {}
-    lines = lines_of(manifest or "")
+    listed = {name: sha256 for name, sha256, _ in _tumble.manifest_results(manifest or "")}
     shards = None
     if plan is not None:
         recorded_plan = json.loads(plan)
@@ -42,24 +42,22 @@ def check(out: str) -> Checked:
             text = read_text(results, name) if name.endswith(".jsonl") else None
             if text is None:
                 continue
-            header, more = split_record(text)
-            done += is_whole(text) and header["plan"] == recorded_plan["plan"]
-            lines += more
+            record = _tumble.Record.parse(text)
+            if record is None:
+                continue
+            done += record.is_whole and record.plan == recorded_plan["plan"]
+            listed.update((name, sha256) for name, sha256, _ in record.results())
         shards = (done, recorded_plan["shards"])
-    for line in lines:
-        entry = json.loads(line)
-        entries[entry["output"]] = entry
     with ThreadPoolExecutor(_AT_ONCE) as threads:
-        found = threads.map(lambda entry: _fault(results, entry), entries.values())
+        found = threads.map(lambda result: _fault(results, *result), listed.items())
         faults = [fault for fault in found if fault is not None]
-    return Checked(len(entries), faults, shards)
+    return Checked(len(listed), faults, shards)
 
 
-def _fault(results: Store, entry: Entry) -> str | None:
-    name = str(entry["output"])
+def _fault(results: Store, name: str, sha256: str) -> str | None:
     content = results.read(name)
     if content is None:
         return f"{name}: is not there"
-    if hashlib.sha256(content).hexdigest() != entry["output_sha256"]:
+    if hashlib.sha256(content).hexdigest() != sha256:
         return f"{name}: its bits have changed since it was written"
     return None

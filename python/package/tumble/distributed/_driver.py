@@ -216,7 +216,7 @@ def _claim(plan: _tumble.Plan, out: str, into: str, resume: bool, overwrite: boo
         message = f"{out}: has shards that are done; resume keeps them, overwrite makes all again"
         raise DistributedError(message, USAGE)
     if into == "parquet" and fresh and results.size("part-00001.parquet") is not None:
-        message = f"{out}: part-00001.parquet exists; resume goes on, overwrite replaces it"
+        message = f"{out}: part-00001.parquet exists; resume continues the run, overwrite replaces it"
         raise DistributedError(message, USAGE)
     if not is_url(out):
         plan.claim(out)
@@ -380,7 +380,7 @@ class _Driver:
         alive = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
         if self._refused and alive <= set(self._refused):
             machines = ", ".join(sorted(self._refused.values()))
-            message = f"every machine has another wheel than this one: {machines}"
+            message = f"no machine has the same version of Tumble as this one: {machines}"
             raise DistributedError(message, USAGE)
 
     def _collect(self) -> None:
@@ -441,7 +441,7 @@ class _Driver:
             apart = self._apart.setdefault(task.shard, _Apart(self._inputs(task.shard)))
             apart.rounds += 1
             if apart.rounds > _ROUNDS:
-                message = f"shard {task.shard} ends every worker, and none of its inputs alone: {why}"
+                message = f"shard {task.shard} crashes every worker, but none of its inputs does so alone: {why}"
                 raise DistributedError(message, 1)
             left_out = {path for path, _ in task.refused}
             inputs = tuple(item for item in apart.inputs if item.path not in left_out)

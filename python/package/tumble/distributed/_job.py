@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
 from dataclasses import dataclass
@@ -12,7 +10,7 @@ from typing import Any
 import tumble
 from tumble import _tumble
 
-# A file's line of the manifest, or an input's refusal, as JSON has it.
+# What a shard came to, or an input's refusal, as JSON has it.
 Entry = dict[str, Any]
 
 USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT, DIFFERENCE = 2, 3, 4, 6, 7, 8
@@ -97,48 +95,8 @@ def wheel() -> tuple[str, str]:
 
 
 def refusal(path: str, message: str) -> Entry:
-    """An input without a result, as a shard's file names it."""
+    """An input without a result, as the program reports it."""
     return {"input": path, "code": ALL_INPUTS, "message": message}
-
-
-def record_name(shard: int) -> str:
-    """The file that says that a shard is done."""
-    return f"manifest.d/{shard:05}.jsonl"
-
-
-def split_record(text: str) -> tuple[Entry, list[str]]:
-    """The line about the shard itself, and the others, each with its end."""
-    first, *lines = lines_of(text)
-    header: Entry = json.loads(first)
-    counted = ("results", "results_sha256")
-    return {name: value for name, value in header.items() if name not in counted}, lines
-
-
-def is_whole(text: str) -> bool:
-    """Whether a shard's file has all its lines, as they were written."""
-    first, end, lines = text.partition("\n")
-    header: Entry = json.loads(first) if end else {}
-    return header.get("results") == lines.count("\n") and header.get("results_sha256") == _hash(lines)
-
-
-def lines_of(text: str) -> list[str]:
-    """Lines with their ends; names may have what Python takes for the end of a line."""
-    return [line + "\n" for line in text.split("\n")[:-1]]
-
-
-def join_record(header: Entry, lines: list[str]) -> str:
-    """A shard's file: the line about it says how many others there are, and their hash."""
-    text = "".join(lines)
-    return dump(header | {"results": len(lines), "results_sha256": _hash(text)}) + text
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def dump(entry: Entry) -> str:
-    """A line, written as the program writes it."""
-    return json.dumps(entry, ensure_ascii=False, separators=(",", ":")) + "\n"
 
 
 def is_url(name: str) -> bool:

@@ -7,7 +7,7 @@ import importlib
 import os
 from typing import Any
 
-from tumble.distributed._job import USAGE, DistributedError, Entry
+from tumble.distributed._job import USAGE, DistributedError
 
 # Rows of so many bytes become a row group.
 _GROUP = 64 << 20
@@ -17,7 +17,7 @@ def name_of(shard: int) -> str:
     return f"part-{shard:05}.parquet"
 
 
-def write(target: str, folder: str, entries: list[Entry]) -> None:
+def write(target: str, folder: str, results: list[str]) -> None:
     """Writes the NPY results of a shard, in the order of their names."""
     import numpy as np
 
@@ -64,8 +64,7 @@ def write(target: str, folder: str, entries: list[Entry]) -> None:
         waiting = 0
 
     with writer:
-        for entry in sorted(entries, key=lambda entry: str(entry["output"])):
-            name = str(entry["output"])
+        for name in sorted(results):
             found = np.load(os.path.join(folder, name), mmap_mode="r")
             if found.ndim != 3 or found.shape[-1] != 4 or found.dtype != np.float32:
                 message = f"{name}: --into parquet holds rotations, float32 x y z w"

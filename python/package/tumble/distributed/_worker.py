@@ -23,14 +23,8 @@ from tumble.distributed._job import (
     Entry,
     Job,
     Task,
-    dump,
     is_url,
-    is_whole,
-    join_record,
-    lines_of,
-    record_name,
     refusal,
-    split_record,
     wheel,
 )
 from tumble.distributed._stores import Store, objects, put_text, read_text, store
@@ -143,22 +137,22 @@ def _run(
         return before
     with tempfile.TemporaryDirectory(prefix="tumble-") as folder:
         outcome = _evaluate(worker, job, task, inputs, folder, record=False)
-        record = outcome.pop("record")
+        text = outcome.pop("record")
         if task.is_trial:
             return outcome
-        header, lines = split_record(record)
-        header["failed"] += refused
-        header["inputs"] += len(refused)
+        record = _tumble.Record.parse(text)
+        assert record is not None, "the program has written it"
+        for path, message in task.refused:
+            record.refuse(path, message)
         outcome["failed"] += refused
         try:
             if job.into == "parquet":
-                lines = _put_rows(job, task, inputs, folder, lines, out, worker.options)
+                _put_rows(job, task, inputs, folder, record, out)
             else:
-                for line in lines:
-                    name = json.loads(line)["output"]
+                for name, _, _ in record.results():
                     out.put(os.path.join(folder, name), name)
             # The last of all: it says that the others are there.
-            put_text(out, join_record(header, lines), record_name(task.shard))
+            put_text(out, record.text(), record.name_of(task.shard))
         except OSError as error:
             raise DistributedError(f"{job.out}: cannot be written: {error}", OUTPUT) from error
         return outcome
@@ -186,30 +180,25 @@ def _put_rows(
     task: Task,
     inputs: list[tuple[str, str]],
     folder: str,
-    lines: list[str],
+    record: _tumble.Record,
     out: Store,
-    options: str,
-) -> list[str]:
-    """Writes a shard's file of rows; gives its line of the manifest."""
-    entries = [json.loads(line) for line in lines]
-    if not entries:
-        return []
+) -> None:
+    """Writes a shard's file of rows, and its line of the manifest in the place of those of its results."""
+    results = [name for name, _, _ in record.results()]
+    if not results:
+        return
     name = _parquet.name_of(task.shard)
     path = os.path.join(folder, name)
-    _parquet.write(path, folder, entries)
-    entry = {
-        "output": name,
-        "output_sha256": _hash(path),
-        "output_bytes": os.path.getsize(path),
-        "input": job.library,
-        "input_sha256": _hash_of_all(inputs),
-        "options": f"{options} into=parquet",
-        "kernels_sha256": job.wheel[0],
-        "tumble": job.wheel[1],
-        "device": entries[0]["device"],
-    }
+    _parquet.write(path, folder, results)
+    record.join(
+        name,
+        sha256=_hash(path) or "",
+        bytes=os.path.getsize(path),
+        library=job.library,
+        inputs_sha256=_hash_of_all(inputs),
+        into=job.into,
+    )
     out.put(path, name)
-    return [dump(entry)]
 
 
 def _hash(path: str) -> str | None:
@@ -239,24 +228,17 @@ def _done(
     """What a shard came to that was done before, from the same inputs and in the same way: its file
     says so, or the manifest that it was merged into. The bytes of its results are not read again:
     whole is what has its length."""
-    text = read_text(out, record_name(task.shard))
-    if text is not None and not is_whole(text):
-        return None
+    file_name = _tumble.Record.name_of(task.shard)
+    text = read_text(out, file_name)
     if text is None:
         merged = _manifest(job.out, out.size("manifest.jsonl"))
-        header: Entry = {
-            "shard": task.shard,
-            "of": job.shards,
-            "plan": job.plan,
-            "inputs": len(inputs),
-            "failed": [],
-        }
-        recorded = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
-        text = join_record(header, recorded)
-    header, lines = split_record(text)
-    if header["failed"]:
-        return None
-    entries = [json.loads(line) for line in lines]
+        lines = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
+        record = _tumble.Record(task.shard, job.shards, job.plan, len(inputs), lines)
+    else:
+        recorded = _tumble.Record.parse(text)
+        if recorded is None or not recorded.is_whole:
+            return None
+        record = recorded
     options = worker.options
     if job.into == "parquet":
         options += " into=parquet"
@@ -266,25 +248,14 @@ def _done(
             key: _hash(path) or ""
             for key, (path, _) in zip(_keys(job, task, inputs), inputs, strict=True)
         }
-    made = set()
-    clips: dict[str, int] = {}
-    for entry in entries:
-        key, count = _key(entry)
-        is_same = (
-            entry["input_sha256"] == hashes.get(key)
-            and entry["options"] == options
-            and (entry["kernels_sha256"], entry["tumble"]) == job.wheel
-            and out.size(entry["output"]) == entry["output_bytes"]
-        )
-        if not is_same:
-            return None
-        clips[key] = clips.get(key, 0) + 1
-        if clips[key] == count:
-            made.add(key)
-    if made != set(hashes):
+    is_done = record.is_made_from(hashes, options) and all(
+        out.size(name) == length for name, _, length in record.results()
+    )
+    if not is_done:
         return None
-    if header["plan"] != job.plan or out.size(record_name(task.shard)) is None:
-        put_text(out, join_record({**header, "plan": job.plan}, lines), record_name(task.shard))
+    if record.plan != job.plan or text is None:
+        record.plan = job.plan
+        put_text(out, record.text(), file_name)
     return {
         "made": 0,
         "skipped": len(inputs),
@@ -301,19 +272,10 @@ def _keys(job: Job, task: Task, inputs: list[tuple[str, str]]) -> list[str]:
     return [os.path.splitext(below)[0] for _, below in inputs]
 
 
-def _key(entry: Entry) -> tuple[str, int]:
-    """Which input's result a line is of, and how many there are of it."""
-    name, count = entry.get("one_of") or (entry["output"], 1)
-    return (name if name.endswith(".parquet") else os.path.splitext(name)[0]), count
-
-
 def _manifest(location: str, size: int | None) -> dict[str, list[str]]:
     """The lines of a merged manifest of that size, by what they are of."""
     if (location, size) in _MANIFESTS:
         return _MANIFESTS[location, size]
-    found: dict[str, list[str]] = {}
     text = (read_text(store(location), "manifest.jsonl") or "") if size is not None else ""
-    for line in lines_of(text):
-        found.setdefault(_key(json.loads(line))[0], []).append(line)
     _MANIFESTS.clear()
-    return _MANIFESTS.setdefault((location, size), found)
+    return _MANIFESTS.setdefault((location, size), _tumble.manifest_by_input(text))

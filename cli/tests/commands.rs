@@ -1,0 +1,114 @@
+//! What follows from the list of commands, which is clap's: the table of the guide, and what is tested of
+//! every command. And the list of the tests' files. `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all
+//! commands::` writes the table and the list anew.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{Command, CommandFactory};
+
+/// The commands that help lists.
+pub(crate) fn commands() -> Vec<Command> {
+    let program = tumble_cli::Arguments::command();
+    let listed = program
+        .get_subcommands()
+        .filter(|command| !command.is_hide_set());
+    listed.cloned().collect()
+}
+
+/// Whether a command has an option, by the name of its field.
+pub(crate) fn has(command: &Command, option: &str) -> bool {
+    let mut options = command.get_arguments();
+    options.any(|argument| argument.get_id() == option)
+}
+
+/// The commands that make a result of each motion file, with a manifest for many.
+pub(crate) fn writing_results() -> Vec<String> {
+    let all = commands().into_iter();
+    let writing = all.filter(|command| has(command, "files_from") && has(command, "resume"));
+    let names: Vec<String> = writing
+        .map(|command| command.get_name().to_owned())
+        .collect();
+    assert!(names.len() >= 4, "{names:?}");
+    names
+}
+
+/// A file, its part between two lines, and what that part is to be.
+struct WrittenPart {
+    file: PathBuf,
+    begin: &'static str,
+    end: &'static str,
+    expected: String,
+}
+
+impl WrittenPart {
+    /// Compares the part with what it is to be, or writes it.
+    fn check(&self) {
+        let text = fs::read_to_string(&self.file).unwrap();
+        let shown = self.file.display();
+        let (before, rest) = text
+            .split_once(self.begin)
+            .expect("the first line is there");
+        let (found, after) = rest.split_once(self.end).expect("the last line is there");
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            let (begin, end, expected) = (self.begin, self.end, &self.expected);
+            fs::write(&self.file, format!("{before}{begin}{expected}{end}{after}")).unwrap();
+            return;
+        }
+        assert_eq!(found, self.expected, "{shown}: UPDATE_EXPECTED=1 writes it");
+    }
+}
+
+fn here() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn the_table_of_commands_is_that_of_the_program() {
+    let mut table = String::from("| command | what it does |\n|---|---|\n");
+    for command in commands() {
+        let about = command.get_about().expect("a command says what it does");
+        writeln!(table, "| `tumble {}` | {about} |", command.get_name()).unwrap();
+    }
+    let part = WrittenPart {
+        file: here().join("../docs/program.md"),
+        begin: "<!-- commands: written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli` -->\n",
+        end: "<!-- end of commands -->\n",
+        expected: table,
+    };
+    part.check();
+}
+
+/// A file of tests that is not in the list would never run.
+#[test]
+fn every_file_of_tests_is_run() {
+    /// Programs of their own (`Cargo.toml`), and those that only Unix has.
+    const PROGRAMS: [&str; 3] = ["all", "fuzz", "options"];
+    const UNIX: [&str; 2] = ["attack", "remedies"];
+    let entries = fs::read_dir(here().join("tests")).unwrap();
+    let mut files: Vec<String> = entries
+        .filter_map(|entry| {
+            let path = entry.unwrap().path();
+            let name = path.file_stem()?.to_str()?.to_owned();
+            let is_file = path.extension().is_some_and(|ending| ending == "rs");
+            let is_listed = is_file || path.join("mod.rs").is_file() && name != "support";
+            (is_listed && !PROGRAMS.contains(&&*name)).then_some(name)
+        })
+        .collect();
+    files.sort();
+    let mut list = String::new();
+    for name in files {
+        if UNIX.contains(&&*name) {
+            list += "#[cfg(unix)]\n";
+        }
+        writeln!(list, "mod {name};").unwrap();
+    }
+    let part = WrittenPart {
+        file: here().join("tests/all.rs"),
+        begin: "// Written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all commands::`.\n",
+        end: "// End of the list.\n",
+        expected: list,
+    };
+    part.check();
+}

@@ -1,0 +1,157 @@
+//! A clip: a set prepared for one method, on a device, ready for any frames.
+
+pub(crate) mod request;
+
+use glam::Quat;
+
+use crate::checks::{check_encoding, check_window};
+use crate::curve::options::Quantity;
+use crate::engine::Engine;
+use crate::engine::clip::request::Request;
+use crate::error::Error;
+use crate::evaluate::uploaded::Uploaded;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::value::OutputValue;
+use crate::output::window::Window;
+use crate::stream::{Chunk, run};
+use crate::time::error::SampleTimesError;
+use crate::time::frames::{SampleTimes, Timeline};
+
+/// A set prepared for one method, on its engine's device; evaluate it as often as
+/// needed, at any frames.
+pub struct Clip {
+    engine: Engine,
+    pub(crate) uploaded: Uploaded,
+}
+
+impl Clip {
+    pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
+        Self { engine, uploaded }
+    }
+
+    /// The engine that it was uploaded to.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// Number of tracks.
+    pub fn track_count(&self) -> usize {
+        self.uploaded.data.track_count()
+    }
+
+    /// The samples that `frames` means for this clip.
+    ///
+    /// # Errors
+    /// When they do not fit it.
+    pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
+        frames.resolve(self.track_count(), self.uploaded.data.time_span)
+    }
+
+    /// The rotation of every track at every sample, `[track][frame]`: short for
+    /// [`request`](Clip::request)`(frames).`[`evaluate`](Request::evaluate)`()`.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not
+    /// the memory for the result, or the device fails.
+    pub fn evaluate(&self, frames: &SampleTimes) -> Result<Rotations, Error> {
+        self.request(frames).evaluate()
+    }
+
+    /// The vectors of a clip of angular velocities or accelerations: short for
+    /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
+    ///
+    /// # Errors
+    /// As [`Clip::evaluate`]; also when the clip is of rotations.
+    pub fn rates(&self, frames: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
+        self.request(frames).layout(layout).rates()
+    }
+
+    pub(crate) fn quantity(&self) -> Quantity {
+        self.uploaded.data.interpolation.quantity
+    }
+
+    /// The stored values, whatever they are.
+    pub(crate) fn samples<T>(
+        &self,
+        timeline: &Timeline,
+        layout: Layout,
+    ) -> Result<Samples<T>, Error> {
+        let storage = (self.uploaded).evaluate(timeline, layout)?;
+        let (tracks, samples) = (self.track_count(), timeline.len());
+        Ok(Samples::new(storage, tracks, samples, layout))
+    }
+
+    /// Into memory of the result's type, of which [`Engine::evaluate_into`] says more: short for
+    /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`,
+    /// which takes memory of any type.
+    ///
+    /// # Errors
+    /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
+    /// type.
+    pub fn evaluate_into<R: OutputValue>(
+        &self,
+        frames: &SampleTimes,
+        layout: Layout,
+        output: &mut [R],
+    ) -> Result<(), Error> {
+        self.request(frames)
+            .layout(layout)
+            .evaluate_values_into(output)
+    }
+
+    /// Evaluates a window of the result into `output`, encoded, if both fit the result.
+    pub(crate) fn encode_window_into(
+        &self,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        check_encoding(encoding, self.quantity())?;
+        check_window(
+            &window,
+            self.track_count(),
+            timeline.len(),
+            encoding,
+            output,
+        )?;
+        if output.is_empty() {
+            return Ok(());
+        }
+        let timeline = self.uploaded.folded(timeline)?;
+        Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
+    }
+
+    /// A request for the samples that `frames` means: of all tracks, track by track, as rotations of four
+    /// f32, unless it says otherwise.
+    pub fn request<'a>(&'a self, frames: &'a SampleTimes) -> Request<'a> {
+        Request::of_clip(self, frames)
+    }
+
+    /// Evaluates a window of the result in chunks of about `chunk` values.
+    pub(crate) fn stream_window<E: From<Error>>(
+        &self,
+        timeline: &Timeline,
+        window: &Window,
+        chunk: usize,
+        sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let timeline = self.uploaded.folded(timeline).map_err(Error::from)?;
+        let fill = |window: &Window, output: &mut [Quat]| {
+            let bytes = bytemuck::cast_slice_mut(output);
+            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
+        };
+        run(window.cut(chunk), self.quantity(), fill, sink)
+    }
+}
+
+impl std::fmt::Debug for Clip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Clip")
+            .field("engine", &self.engine)
+            .field("method", &self.uploaded.data.interpolation.method)
+            .field("tracks", &self.track_count())
+            .finish_non_exhaustive()
+    }
+}

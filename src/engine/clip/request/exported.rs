@@ -1,0 +1,53 @@
+//! Results in memory of the engine's device that others on the same card import.
+
+use std::sync::Arc;
+
+use crate::engine::clip::request::Request;
+use crate::error::Error;
+use crate::evaluate::Backend;
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::EvaluateError;
+use crate::gpu::exported::{Exported, ExportedResult};
+use crate::gpu::in_flight::Target;
+use crate::gpu::job::Job;
+use crate::memory::OutOfMemoryError;
+use crate::output::window::Window;
+
+impl Request<'_> {
+    /// Evaluates into memory of the engine's device that others on the same card, such as CUDA, import. Where they
+    /// can wait for the device, this returns while it still writes.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the device exports no memory, the frames do not fit the clip, the encoding is for
+    /// rotations and the clip has none, or the device fails.
+    pub fn export(&self) -> Result<ExportedResult, Error> {
+        let Backend::Vulkan(opened) = &*self.source.engine().backend else {
+            return Err(Error::ExportOnCpu);
+        };
+        let (timeline, window) = self.window()?;
+        let bytes = (window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
+        let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
+        let export = |engine: &VulkanEngine, job: Job<'_>, window: &Window| {
+            // Smaller windows would not make room for it.
+            let exported = match Exported::new(&engine.device, bytes) {
+                Err(error) if error.is_out_of_memory() && engine.give_back() => {
+                    Exported::new(&engine.device, bytes)
+                }
+                made => made,
+            };
+            let exported = Arc::new(exported.map_err(|error| match error.is_out_of_memory() {
+                true => {
+                    OutOfMemoryError::new::<u8>("a result in the device's memory", needed).into()
+                }
+                false => EvaluateError::from(error),
+            })?);
+            let target = Target::Exported(Arc::clone(&exported));
+            engine.run(job, window, target, None)?;
+            Ok(ExportedResult::new(exported, bytes))
+        };
+        (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
+            let export = |engine: &VulkanEngine, job: Job<'_>| export(engine, job, window);
+            uploaded.on_device(opened, timeline, self.encoding, export)
+        })
+    }
+}

@@ -1,0 +1,372 @@
+//! A request: which samples of a clip or of a set, how they are stored, and where they go.
+
+#[cfg(feature = "vulkan")]
+mod application_device;
+#[cfg(feature = "vulkan")]
+mod exported;
+
+use std::ops::Range;
+
+use bytemuck::Pod;
+use glam::{Quat, Vec4};
+
+use crate::checks::{check_encoding, check_rows, check_within, in_quats};
+use crate::curve::options::Quantity;
+use crate::engine::Engine;
+use crate::engine::clip::Clip;
+use crate::error::Error;
+#[cfg(feature = "vulkan")]
+use crate::evaluate::uploaded::Uploaded;
+#[cfg(feature = "vulkan")]
+use crate::evaluate::uploaded::pieces::SetPieces;
+#[cfg(feature = "vulkan")]
+use crate::gpu::error::EvaluateError;
+#[cfg(feature = "vulkan")]
+use crate::memory::OutOfMemoryError;
+use crate::memory::zeroed;
+use crate::method::interpolation::Interpolation;
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::value::OutputValue;
+use crate::output::window::Window;
+#[cfg(feature = "vulkan")]
+use crate::prepare::prepared::SEGMENTS;
+use crate::stream::Chunk;
+use crate::time::frames::{SampleTimes, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// What is asked of a clip ([`Clip::request`]) or of a set ([`Engine::request`]): a layout, an encoding, some of
+/// the tracks, some of the samples, and a destination for the result. Of a set only what the samples need is
+/// prepared, a piece at a time where that takes less memory.
+///
+/// ```
+/// use tumble::{Device, Encoding, Engine, SampleTimes, Layout, TrackSet, method};
+/// use glam::Quat;
+///
+/// let mut set = TrackSet::new();
+/// let keys = [0.0, 0.7, 2.0].map(Quat::from_rotation_z);
+/// set.push("elbow", &[0.0, 0.5, 1.0], &keys)?;
+/// set.push("wrist", &[0.0, 0.5, 1.0], &keys)?;
+/// let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+///
+/// // The second half of a second at 60 frames a second, of the wrist alone, as bits of f16.
+/// let frames = SampleTimes::fps(60);
+/// let request = clip.request(&frames).encoding(Encoding::F16).tracks(1..2).samples(30..61);
+/// let mut halves = vec![[0_u16; 4]; 31];
+/// request.evaluate_into(&mut halves)?;
+/// # assert_eq!(halves[0][3], 0x3b84);
+/// # Ok::<(), tumble::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+#[must_use = "a request does nothing until its result is sent somewhere"]
+pub struct Request<'a> {
+    source: RequestSource<'a>,
+    frames: &'a SampleTimes,
+    layout: Layout,
+    encoding: Encoding,
+    tracks: Option<Range<usize>>,
+    samples: Option<Range<usize>>,
+}
+
+/// What is evaluated.
+#[derive(Debug, Clone, Copy)]
+enum RequestSource<'a> {
+    Clip(&'a Clip),
+    Set {
+        engine: &'a Engine,
+        set: &'a TrackSet,
+        interpolation: Interpolation,
+    },
+}
+
+impl RequestSource<'_> {
+    fn quantity(&self) -> Quantity {
+        match self {
+            Self::Clip(clip) => clip.quantity(),
+            Self::Set { interpolation, .. } => interpolation.quantity,
+        }
+    }
+
+    fn track_count(&self) -> usize {
+        match self {
+            Self::Clip(clip) => clip.track_count(),
+            Self::Set { set, .. } => set.track_count(),
+        }
+    }
+
+    fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, Error> {
+        Ok(match self {
+            Self::Clip(clip) => clip.timeline(frames)?,
+            Self::Set { set, .. } => frames.resolve(set.track_count(), set.time_span())?,
+        })
+    }
+
+    #[cfg(feature = "vulkan")]
+    fn engine(&self) -> &Engine {
+        match self {
+            Self::Clip(clip) => clip.engine(),
+            Self::Set { engine, .. } => engine,
+        }
+    }
+
+    /// Works on a window of the clip, or of what the window needs of the set, prepared for it: `work` gets the
+    /// samples and the window as they are there.
+    #[cfg(feature = "vulkan")]
+    fn with_uploaded<T>(
+        &self,
+        (timeline, window): (&Timeline, &Window),
+        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
+    ) -> Result<T, Error> {
+        Ok(match *self {
+            Self::Clip(clip) => {
+                let folded = clip.uploaded.folded(timeline)?;
+                work(&clip.uploaded, &folded, window)
+            }
+            Self::Set {
+                engine,
+                set,
+                interpolation,
+            } => {
+                let limit = engine.backend.budget().unwrap_or(usize::MAX);
+                let pieces = SetPieces {
+                    backend: &engine.backend,
+                    set,
+                    interpolation: &interpolation,
+                    timeline,
+                    encoding: Encoding::F32,
+                    limit,
+                };
+                let needed = pieces.bytes(window);
+                if needed > limit {
+                    return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
+                }
+                pieces.prepared(window)?.with(window, work)
+            }
+        }?)
+    }
+}
+
+impl<'a> Request<'a> {
+    /// All tracks of a clip, track by track, as values of four f32.
+    pub(crate) fn of_clip(clip: &'a Clip, frames: &'a SampleTimes) -> Self {
+        Self::new(RequestSource::Clip(clip), frames)
+    }
+
+    /// The same of a set.
+    pub(crate) fn of_set(
+        engine: &'a Engine,
+        set: &'a TrackSet,
+        interpolation: Interpolation,
+        frames: &'a SampleTimes,
+    ) -> Self {
+        let source = RequestSource::Set {
+            engine,
+            set,
+            interpolation,
+        };
+        Self::new(source, frames)
+    }
+
+    fn new(source: RequestSource<'a>, frames: &'a SampleTimes) -> Self {
+        Self {
+            source,
+            frames,
+            layout: Layout::TrackMajor,
+            encoding: Encoding::F32,
+            tracks: None,
+            samples: None,
+        }
+    }
+}
+
+impl Request<'_> {
+    /// The order of the result: `[track][sample]`, unless another is asked for.
+    pub fn layout(mut self, layout: Layout) -> Self {
+        self.layout = layout;
+        self
+    }
+
+    /// How each value is stored.
+    pub fn encoding(mut self, encoding: Encoding) -> Self {
+        self.encoding = encoding;
+        self
+    }
+
+    /// Only these tracks, from 0: the result has no others.
+    pub fn tracks(mut self, tracks: Range<usize>) -> Self {
+        self.tracks = Some(tracks);
+        self
+    }
+
+    /// Only these of the samples that the frames mean, from 0: the result has no others.
+    pub fn samples(mut self, samples: Range<usize>) -> Self {
+        self.samples = Some(samples);
+        self
+    }
+
+    /// Values of the result, and bytes of each.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, there are no such tracks or samples, or the encoding is for
+    /// rotations and the clip has none.
+    pub fn size(&self) -> Result<(usize, usize), Error> {
+        let (_, window) = self.window()?;
+        Ok((window.len(), self.encoding.bytes()))
+    }
+
+    /// The rotations.
+    ///
+    /// # Errors
+    /// As [`Request::size`]; also when the quantity is a velocity or an acceleration, another encoding than f32
+    /// is asked for, there is not the memory for the result, or the device fails.
+    pub fn evaluate(&self) -> Result<Rotations, Error> {
+        check_rows::<Quat>(self.source.quantity())?;
+        self.values()
+    }
+
+    /// The velocities or accelerations
+    /// ([`Interpolation::quantity`](crate::method::interpolation::Interpolation::quantity)).
+    ///
+    /// # Errors
+    /// As [`Request::evaluate`], but when the quantity is the rotation.
+    pub fn rates(&self) -> Result<Vectors, Error> {
+        check_rows::<Vec4>(self.source.quantity())?;
+        self.values()
+    }
+
+    /// The result's bytes, encoded where it is evaluated: those that [`Encoding::encode`] makes of the rotations.
+    ///
+    /// # Errors
+    /// As [`Request::size`]; also when there is not the memory for the result, or the device fails.
+    pub fn evaluate_bytes(&self) -> Result<Vec<u8>, Error> {
+        let (timeline, window) = self.window()?;
+        let bytes = window.len().saturating_mul(self.encoding.bytes());
+        let mut output = zeroed(bytes, "a result")?;
+        self.fill(&timeline, &window, &mut output)?;
+        Ok(output)
+    }
+
+    /// Evaluates into the caller's memory, of whatever type: its bytes are those of
+    /// [`Request::evaluate_bytes`], in the order of the layout. Memory that is aligned to 16 bytes is filled
+    /// without a copy.
+    ///
+    /// # Errors
+    /// As [`Request::size`]; also when `output` has not exactly the bytes of the result, or the device fails.
+    pub fn evaluate_into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
+        let (timeline, window) = self.window()?;
+        self.fill(&timeline, &window, bytemuck::cast_slice_mut(output))
+    }
+
+    /// As [`Request::evaluate_into`], but into values of the result's type alone.
+    pub(crate) fn evaluate_values_into<R: OutputValue>(
+        &self,
+        output: &mut [R],
+    ) -> Result<(), Error> {
+        check_rows::<R>(self.source.quantity())?;
+        let (timeline, window) = self.window()?;
+        in_quats(output, window.len(), |quats| {
+            self.fill(&timeline, &window, bytemuck::cast_slice_mut(quats))
+        })
+    }
+
+    /// Evaluates in chunks of about `chunk` values (at least one row of the layout is best); `sink` uses one while
+    /// others are evaluated. Memory is that of three chunks, and for a set that of the segments that a chunk
+    /// needs: track by track only the tracks of a chunk are prepared at a time; frame by frame, and where a chunk
+    /// is less than a track, all that the request's samples need are prepared at once if that takes no more than
+    /// [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory), or 256 MiB where that has no limit, else
+    /// those of a piece of a chunk at a time.
+    ///
+    /// ```
+    /// # use glam::{Quat, Vec4};
+    /// # use tumble::{Device, Engine, Error, SampleTimes, Layout, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
+    /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+    /// let mut largest: f32 = 0.0;
+    /// clip.request(&SampleTimes::fps(60)).layout(Layout::FrameMajor).stream(1 << 20, |chunk| {
+    ///     largest = chunk.rows.iter().map(|[x, ..]| *x).fold(largest, f32::max);
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// # assert_eq!(largest, (0.5f32).sin());
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The first error of `sink`; or as [`Request::size`], when another encoding than f32 is asked for, or the
+    /// device fails.
+    pub fn stream<E: From<Error>>(
+        &self,
+        chunk: usize,
+        sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.check_f32()?;
+        let (timeline, window) = self.window()?;
+        match self.source {
+            RequestSource::Clip(clip) => clip.stream_window(&timeline, &window, chunk, sink),
+            RequestSource::Set {
+                engine,
+                set,
+                interpolation,
+            } => engine.stream_window(set, interpolation, &timeline, &window, chunk, sink),
+        }
+    }
+
+    /// The stored values, whatever they are.
+    fn values<T>(&self) -> Result<Samples<T>, Error> {
+        self.check_f32()?;
+        let (timeline, window) = self.window()?;
+        if window == Window::whole(self.source.track_count(), timeline.len(), self.layout) {
+            return match self.source {
+                RequestSource::Clip(clip) => clip.samples(&timeline, self.layout),
+                RequestSource::Set {
+                    engine,
+                    set,
+                    interpolation,
+                } => engine.samples(set, interpolation, &timeline, self.layout),
+            };
+        }
+        let mut quats = OutputBuffer::new(window.len())?;
+        self.fill(&timeline, &window, bytemuck::cast_slice_mut(&mut quats))?;
+        let (tracks, samples) = (window.tracks.len(), window.samples.len());
+        Ok(Samples::new(Box::new(quats), tracks, samples, self.layout))
+    }
+
+    /// Evaluates a part of the result into `output`, encoded, if both fit.
+    fn fill(&self, timeline: &Timeline, window: &Window, output: &mut [u8]) -> Result<(), Error> {
+        match self.source {
+            RequestSource::Clip(clip) => {
+                clip.encode_window_into(timeline, window, self.encoding, output)
+            }
+            RequestSource::Set {
+                engine,
+                set,
+                interpolation,
+            } => {
+                let destination = (self.encoding, output);
+                engine.encode_window_into(set, interpolation, timeline, window, destination)
+            }
+        }
+    }
+
+    /// Refuses an encoding where the result is of four f32 a value.
+    fn check_f32(&self) -> Result<(), Error> {
+        match self.encoding {
+            Encoding::F32 => Ok(()),
+            encoding => Err(Error::ResultOfF32 { encoding }),
+        }
+    }
+
+    /// The samples that are meant, and which part of them the result is.
+    pub(crate) fn window(&self) -> Result<(Timeline, Window), Error> {
+        check_encoding(self.encoding, self.source.quantity())?;
+        let timeline = self.source.timeline(self.frames)?;
+        let (tracks, samples) = (self.source.track_count(), timeline.len());
+        let part = |asked: &Option<Range<usize>>, all| asked.clone().unwrap_or(0..all);
+        let (window_tracks, window_samples) =
+            (part(&self.tracks, tracks), part(&self.samples, samples));
+        let window = Window::of(window_tracks, window_samples, self.layout);
+        check_within(&window, tracks, samples)?;
+        Ok((timeline, window))
+    }
+}

@@ -1,0 +1,34 @@
+//! Twin of `shaders/crowd/gather.wgsl` and `shaders/crowd/scatter.wgsl`.
+
+use crate::shader::{CrowdChange, CrowdEntry};
+
+/// The entries of the instances of a list, of so many layers each, side by side.
+pub(crate) fn gather<'a>(
+    all: &'a [CrowdEntry],
+    visible: &'a [u32],
+    layers: usize,
+) -> impl Iterator<Item = CrowdEntry> + 'a {
+    let of = move |&instance: &u32| &all[instance as usize * layers..][..layers];
+    visible.iter().flat_map(of).copied()
+}
+
+/// What `scatter` takes.
+pub(crate) fn change(index: u32, entry: &CrowdEntry) -> CrowdChange {
+    CrowdChange {
+        index,
+        clip_and_weight: entry.clip_and_weight,
+        speed_and_modes: entry.speed_and_modes,
+        start: entry.start,
+        anchor: entry.anchor,
+    }
+}
+
+/// Writes an entry that changed where it belongs.
+pub(crate) fn scatter(change: &CrowdChange, all: &mut [CrowdEntry]) {
+    all[change.index as usize] = CrowdEntry {
+        clip_and_weight: change.clip_and_weight,
+        speed_and_modes: change.speed_and_modes,
+        start: change.start,
+        anchor: change.anchor,
+    };
+}
