@@ -232,7 +232,7 @@ pub enum CrowdError {
     /// made again.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
-    /// There is not the memory.
+    /// Not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
     /// The system refused worker threads.

@@ -74,7 +74,7 @@ pub enum Error {
         /// How many tracks and samples there are.
         whole: (usize, usize),
     },
-    /// There is not the memory.
+    /// Not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
     /// There is no such track.

@@ -30,7 +30,7 @@
 #define TUMBLE_VERSION_PATCH 0
 
 /*
- What became of a call.
+ The result of a call.
  */
 enum TumbleResult
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -38,7 +38,7 @@ enum TumbleResult
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   It did what it says.
+   Success.
    */
   TUMBLE_RESULT_OK = 0,
   /*
@@ -46,7 +46,7 @@ enum TumbleResult
    */
   TUMBLE_RESULT_INVALID_POINTER = 1,
   /*
-   A handle was freed, was never given, or is of another kind.
+   A handle was freed, never existed, or has another type.
    */
   TUMBLE_RESULT_INVALID_HANDLE = 2,
   /*
@@ -59,7 +59,7 @@ enum TumbleResult
    */
   TUMBLE_RESULT_WRONG_SIZE = 4,
   /*
-   There is nothing at that index.
+   The index is out of range.
    */
   TUMBLE_RESULT_OUT_OF_RANGE = 5,
   /*
@@ -67,7 +67,7 @@ enum TumbleResult
    */
   TUMBLE_RESULT_INVALID_INPUT = 6,
   /*
-   There is not the memory.
+   Not enough memory.
    */
   TUMBLE_RESULT_OUT_OF_MEMORY = 7,
   /*
@@ -75,12 +75,12 @@ enum TumbleResult
    */
   TUMBLE_RESULT_DEVICE = 8,
   /*
-   A mistake of the library's; please report it.
+   An internal error of the library; please report it.
    */
   TUMBLE_RESULT_INTERNAL = 9,
   /*
-   Not now: nothing was submitted, the result of a submission was not taken, or what is asked for
-   needs something that the object has not been given.
+   The call is not possible now: nothing was submitted, the result of a submission was not taken, or it
+   needs data that the object does not have.
    */
   TUMBLE_RESULT_WRONG_STATE = 10,
 };
@@ -118,7 +118,7 @@ typedef uint32_t TumbleLayout;
 #endif // __cplusplus
 
 /*
- Which of the two quaternions of each key counts.
+ Which of the two quaternions `q` and `-q` of each key is used.
  */
 enum TumblePath
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -126,11 +126,11 @@ enum TumblePath
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The one nearer to the key before: no rotation goes the long way round.
+   The one nearer to the previous key, so that every rotation is the shorter one.
    */
   TUMBLE_PATH_SHORTEST = 0,
   /*
-   The one that was given. Methods that have a path of their own keep it.
+   The stored one. Methods that define the path themselves ignore this.
    */
   TUMBLE_PATH_AS_AUTHORED = 1,
 };
@@ -143,7 +143,7 @@ typedef uint32_t TumblePath;
 #endif // __cplusplus
 
 /*
- How fast a track runs through its curve.
+ The speed along the curve of a track.
  */
 enum TumbleSpeed
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -168,7 +168,7 @@ typedef uint32_t TumbleSpeed;
 #endif // __cplusplus
 
 /*
- What happens outside the keys.
+ The values outside the keys.
  */
 enum TumbleWrap
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -180,7 +180,7 @@ enum TumbleWrap
    */
   TUMBLE_WRAP_HOLD = 0,
   /*
-   The track starts again.
+   The track repeats.
    */
   TUMBLE_WRAP_LOOP = 1,
   /*
@@ -188,7 +188,7 @@ enum TumbleWrap
    */
   TUMBLE_WRAP_MIRROR = 2,
   /*
-   The rotation goes on at the angular velocity that it has at that end.
+   The rotation continues at the angular velocity at that end.
    */
   TUMBLE_WRAP_EXTRAPOLATE = 3,
 };
@@ -201,7 +201,7 @@ typedef uint32_t TumbleWrap;
 #endif // __cplusplus
 
 /*
- The curve in the first and the last segment.
+ The boundary condition: the curve in the first and the last segment.
  */
 enum TumbleEnds
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -209,7 +209,7 @@ enum TumbleEnds
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The method's own.
+   That of the method.
    */
   TUMBLE_ENDS_OF_METHOD = 0,
   /*
@@ -229,7 +229,7 @@ enum TumbleEnds
    */
   TUMBLE_ENDS_SECANT = 4,
   /*
-   The last key repeats the first; neighbours are taken across the seam.
+   A closed curve: the last key equals the first.
    */
   TUMBLE_ENDS_LOOP = 5,
   /*
@@ -299,11 +299,11 @@ enum TumbleSampling
    */
   TUMBLE_SAMPLING_RANGE = 1,
   /*
-   The times given, the same for every track, in any order.
+   The listed times, the same for every track, in any order.
    */
   TUMBLE_SAMPLING_TIMES = 2,
   /*
-   The times given, for each track its own: first those of the first track, then those of the
+   The listed times, different for each track: first those of the first track, then those of the
    second, the same number for each.
    */
   TUMBLE_SAMPLING_TIMES_OF_TRACKS = 3,
@@ -357,8 +357,8 @@ typedef uint32_t TumbleCrowdValues;
 typedef struct TumbleClip TumbleClip;
 
 /*
- Many instances of a library's skeleton, each of which plays clips at its own time and speed. Threads
- that use one crowd at once are served one after another.
+ Many instances of a library's skeleton, each of which plays clips at a separate time and speed. Threads
+ that use the same crowd at once wait for each other.
  */
 typedef struct TumbleCrowd TumbleCrowd;
 
@@ -373,7 +373,7 @@ typedef struct TumbleCrowdLibrary TumbleCrowdLibrary;
 typedef struct TumbleCrowdTarget TumbleCrowdTarget;
 
 /*
- One device, open. Any number of threads may use it at once.
+ An open device. Any number of threads may use it at once.
  */
 typedef struct TumbleEngine TumbleEngine;
 
@@ -396,7 +396,7 @@ typedef struct TumbleEngineOptions {
    */
   size_t size;
   /*
-   Bytes of a Vulkan device's memory that segments may take; 0: as many as it has.
+   The bytes of a Vulkan device's memory that segments may use; 0: no limit.
    */
   uint64_t memory;
   /*
@@ -579,7 +579,7 @@ typedef struct TumbleVulkan {
 } TumbleVulkan;
 
 /*
- What a layer of an instance plays. All zeros but `size` stand still at the start of the first clip.
+ What a layer of an instance plays. If all is zero but `size`, it stands still at the start of the first clip.
  */
 typedef struct TumbleCrowdLayer {
   /*
@@ -599,7 +599,7 @@ typedef struct TumbleCrowdLayer {
    */
   size_t clip;
   /*
-   Where in the clip it stands now, ticks; `wrap` says what lies outside of the clip.
+   The time in the clip, ticks; `wrap` says what happens outside of the clip.
    */
   int64_t time;
   /*
@@ -608,7 +608,7 @@ typedef struct TumbleCrowdLayer {
    */
   float speed;
   /*
-   How much of it is laid over the layers below, 0 to 1, kept in units of 2^-15. The first layer
+   The weight with which it is blended over the layers below, 0 to 1, stored in units of 2^-15. The first layer
    has no weight.
    */
   float weight;
@@ -617,8 +617,8 @@ typedef struct TumbleCrowdLayer {
    */
   uint32_t wrap;
   /*
-   1: the clip's difference from its reference pose is added to the layers below; 0: they go over
-   into it.
+   1: the clip's difference from its reference pose is added to the layers below; 0: it is blended
+   over them.
    */
   uint32_t additive;
   /*
@@ -638,7 +638,7 @@ extern "C" {
 uint32_t tumble_version(void);
 
 /*
- What was wrong with the last call of this thread that failed, in words: UTF-8, empty before the
+ The error message of the last failed call of this thread: UTF-8, empty before the
  first. It stays valid until another call of this thread fails.
  */
 const char *tumble_last_error(void);
@@ -809,7 +809,7 @@ TumbleResult tumble_file_clip_time_offset(const struct TumbleFile *file,
                                           int64_t *seconds);
 
 /*
- What was subtracted from the translations of a track of a clip, so that f32 has the digits of positions
+ What was subtracted from the translations of a track of a clip, so that f32 is accurate enough for positions
  such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
 
  # Safety
@@ -857,7 +857,7 @@ TumbleResult tumble_set_sample_count(const struct TumbleSet *set,
                                      size_t *count);
 
 /*
- Prepares and evaluates a set in one go, into the caller's memory: `output_count` floats, exactly
+ Prepares and evaluates a set in one call, into the caller's memory: `output_count` floats, exactly
  4 × tracks × samples. Memory that is aligned to 16 bytes is filled without a copy. All arguments are
  checked before anything is written.
 
@@ -874,7 +874,7 @@ TumbleResult tumble_evaluate(const struct TumbleEngine *engine,
                              size_t output_count);
 
 /*
- Prepares a set for a method and brings it to the engine's device, where it stays.
+ Prepares a set for a method and uploads it to the engine's device, where it stays.
 
  # Safety
  `interpolation` is null (the defaults) or such a structure, and `clip` has room for a handle.
@@ -932,7 +932,7 @@ TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
 
 /*
- Gives a track translations, in place of those that it had. `times` are seconds, strictly increasing,
+ Sets the translations of a track, replacing any it had. `times` are seconds, strictly increasing,
  and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
  `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
  curve arrives, then the one with which it leaves, units per second. If anything is refused, the set
@@ -950,7 +950,7 @@ TumbleResult tumble_set_translations(struct TumbleSet *set,
                                      size_t key_count);
 
 /*
- Gives a track scales along its axes; otherwise as `tumble_set_translations`.
+ Sets the scales of a track along its axes; otherwise as `tumble_set_translations`.
 
  # Safety
  As there.
@@ -963,7 +963,7 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
                                size_t key_count);
 
 /*
- An engine on an application's own Vulkan device, for crowds that are recorded into its command buffers
+ Creates an engine on an application's Vulkan device, for crowds that are recorded into its command buffers
  (`tumble_crowd_record`), and for all else that engines do.
 
  The handles stay the application's, which destroys them after it has freed the engine, its clips,
@@ -980,9 +980,9 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
                                        struct TumbleEngine **engine);
 
 /*
- An empty library for a skeleton of arrays. `parents` has the index of each joint's parent, -1 for a
+ Creates an empty library for a skeleton that is given by arrays. `parents` has the index of each joint's parent, -1 for a
  root; parents may come after their children. `offsets` has three numbers for each joint: where it
- hangs in its parent's frame while a clip has no translations for it; null: nowhere but at the parent.
+ is in its parent's frame if a clip has no translations for it; null: at the parent.
  `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
 
  # Safety
@@ -1026,7 +1026,7 @@ TumbleResult tumble_crowd_library_push_mask(struct TumbleCrowdLibrary *library,
                                             size_t *mask);
 
 /*
- Gives every joint the inverse of its matrix in the model in the pose in which vertices were bound:
+ Sets the inverse bind matrix of every joint: the inverse of its model matrix in the bind pose,
  three rows of four numbers each, for column vectors, the last column the translation, as results are.
  (A matrix of 16 numbers in columns, as glTF has them, has `m[0] m[4] m[8] m[12]` in its first row.)
 
@@ -1062,7 +1062,7 @@ size_t tumble_crowd_library_clip_count(const struct TumbleCrowdLibrary *library)
 uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *library);
 
 /*
- How long a clip is, ticks: from the first key of anything to the last, and at least 1. 0 where there
+ The length of a clip, ticks: from the first key of any channel to the last, at least 1. 0 if there
  is no such clip.
  */
 uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library,
@@ -1092,7 +1092,7 @@ TumbleResult tumble_crowd_library_free(struct TumbleCrowdLibrary *library);
 
 /*
  An empty library for the skeleton of a file: the joints of all of its clips, by name, with their
- parents and where they rest; roots all of them where the file has no hierarchy. Its clips are then
+ parents and rest positions; all of them are roots if the file has no hierarchy. Its clips are then
  pushed by `tumble_crowd_library_push_clip`. `ticks_per_second` is as in `tumble_crowd_library_new`.
 
  # Safety
@@ -1120,7 +1120,7 @@ TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
                                             size_t *clip);
 
 /*
- A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the start of
+ Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each. All of them stand still at the start of
  the library's first clip until they are set. The library is copied, to the device too: what is
  pushed to it later is not in this crowd.
 
@@ -1166,7 +1166,7 @@ TumbleResult tumble_crowd_tick(const struct TumbleCrowd *crowd,
                                uint32_t *tick);
 
 /*
- Moves the clock of all instances on by the ticks nearest to some seconds. Where the sum must not
+ Advances the clock of all instances by the ticks nearest to a number of seconds. Where the sum must not
  drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
  */
 TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd, double seconds);
@@ -1261,7 +1261,7 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
                                     size_t output_count);
 
 /*
- Makes ready what it takes to evaluate into a range of a buffer of the application's, on the device of
+ Prepares everything to evaluate into a range of an application's buffer, on the device of
  `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
  is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
  `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
@@ -1302,8 +1302,8 @@ TumbleResult tumble_crowd_record(struct TumbleCrowd *crowd,
                                  void *commands);
 
 /*
- Forgets what was recorded: the next evaluation sends the device all that instances play.
- For an application that threw a recorded frame away.
+ Forgets what was recorded: the next evaluation writes all layers again.
+ Call it if a recorded frame was discarded.
  */
 TumbleResult tumble_crowd_forget_recorded(struct TumbleCrowd *crowd);
 

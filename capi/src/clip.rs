@@ -61,7 +61,7 @@ pub unsafe extern "C" fn tumble_set_sample_count(
     })
 }
 
-/// Prepares and evaluates a set in one go, into the caller's memory: `output_count` floats, exactly
+/// Prepares and evaluates a set in one call, into the caller's memory: `output_count` floats, exactly
 /// 4 × tracks × samples. Memory that is aligned to 16 bytes is filled without a copy. All arguments are
 /// checked before anything is written.
 ///
@@ -97,7 +97,7 @@ pub unsafe extern "C" fn tumble_evaluate(
     })
 }
 
-/// Prepares a set for a method and brings it to the engine's device, where it stays.
+/// Prepares a set for a method and uploads it to the engine's device, where it stays.
 ///
 /// # Safety
 /// `interpolation` is null (the defaults) or such a structure, and `clip` has room for a handle.

@@ -9,7 +9,7 @@ use crate::arguments::{Out, flag, sized, text};
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 
-/// One device, open. Any number of threads may use it at once.
+/// An open device. Any number of threads may use it at once.
 pub struct TumbleEngine {
     pub(crate) inner: Engine,
     /// Whether the Vulkan device is the application's.
@@ -39,7 +39,7 @@ impl Object for TumbleEngine {
 pub struct TumbleEngineOptions {
     /// `sizeof(TumbleEngineOptions)`.
     pub size: usize,
-    /// Bytes of a Vulkan device's memory that segments may take; 0: as many as it has.
+    /// The bytes of a Vulkan device's memory that segments may use; 0: no limit.
     pub memory: u64,
     /// Threads of the CPU; 0: one for each core, shared by all engines.
     pub threads: u32,

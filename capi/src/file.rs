@@ -175,7 +175,7 @@ pub unsafe extern "C" fn tumble_file_clip_time_offset(
     })
 }
 
-/// What was subtracted from the translations of a track of a clip, so that f32 has the digits of positions
+/// What was subtracted from the translations of a track of a clip, so that f32 is accurate enough for positions
 /// such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
 ///
 /// # Safety

@@ -11,21 +11,21 @@ use tumble::{
 use crate::arguments::{option, sized, text};
 use crate::result::Failure;
 
-/// Which of the two quaternions of each key counts.
+/// Which of the two quaternions `q` and `-q` of each key is used.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumblePath {
-    /// The one nearer to the key before: no rotation goes the long way round.
+    /// The one nearer to the previous key, so that every rotation is the shorter one.
     Shortest = 0,
-    /// The one that was given. Methods that have a path of their own keep it.
+    /// The stored one. Methods that define the path themselves ignore this.
     AsAuthored = 1,
 }
 
-/// The curve in the first and the last segment.
+/// The boundary condition: the curve in the first and the last segment.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleEnds {
-    /// The method's own.
+    /// That of the method.
     OfMethod = 0,
     /// The parabola through the last three keys.
     Parabolic = 1,
@@ -35,7 +35,7 @@ pub enum TumbleEnds {
     Clamped = 3,
     /// The angular velocity of slerp between the last two keys.
     Secant = 4,
-    /// The last key repeats the first; neighbours are taken across the seam.
+    /// A closed curve: the last key equals the first.
     Loop = 5,
     /// The first and the last segment hold their first key.
     Frozen = 6,
@@ -57,7 +57,7 @@ pub enum TumbleQuantity {
     AccelerationInParent = 4,
 }
 
-/// How fast a track runs through its curve.
+/// The speed along the curve of a track.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleSpeed {
@@ -67,17 +67,17 @@ pub enum TumbleSpeed {
     Constant = 1,
 }
 
-/// What happens outside the keys.
+/// The values outside the keys.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleWrap {
     /// The end value is held.
     Hold = 0,
-    /// The track starts again.
+    /// The track repeats.
     Loop = 1,
     /// The track runs backwards, then forwards again.
     Mirror = 2,
-    /// The rotation goes on at the angular velocity that it has at that end.
+    /// The rotation continues at the angular velocity at that end.
     Extrapolate = 3,
 }
 

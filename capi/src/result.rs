@@ -10,33 +10,33 @@ use tumble::vulkan::VulkanError;
 use tumble::{Error, SkeletonError, TrackError};
 use tumble_formats::Diagnostic;
 
-/// What became of a call.
+/// The result of a call.
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TumbleResult {
-    /// It did what it says.
+    /// Success.
     Ok = 0,
     /// A pointer is null, or not aligned for what it points to.
     InvalidPointer = 1,
-    /// A handle was freed, was never given, or is of another kind.
+    /// A handle was freed, never existed, or has another type.
     InvalidHandle = 2,
     /// An argument has a value that it cannot have: an unknown constant or name, a size that
     /// overflows, a structure of another version, text that is not UTF-8.
     InvalidArgument = 3,
     /// Memory for a result is not exactly as large as the result, or a buffer's range does not fit it.
     WrongSize = 4,
-    /// There is nothing at that index.
+    /// The index is out of range.
     OutOfRange = 5,
     /// Keys, times, samples or a file are refused; the message says where.
     InvalidInput = 6,
-    /// There is not the memory.
+    /// Not enough memory.
     OutOfMemory = 7,
     /// There is no such device, it cannot be opened, it is not exact, or it failed.
     Device = 8,
-    /// A mistake of the library's; please report it.
+    /// An internal error of the library; please report it.
     Internal = 9,
-    /// Not now: nothing was submitted, the result of a submission was not taken, or what is asked for
-    /// needs something that the object has not been given.
+    /// The call is not possible now: nothing was submitted, the result of a submission was not taken, or it
+    /// needs data that the object does not have.
     WrongState = 10,
 }
 
@@ -203,7 +203,7 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::default();
 }
 
-/// What was wrong with the last call of this thread that failed, in words: UTF-8, empty before the
+/// The error message of the last failed call of this thread: UTF-8, empty before the
 /// first. It stays valid until another call of this thread fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_last_error() -> *const c_char {

@@ -23,9 +23,9 @@ pub enum TumbleSampling {
     Keys = 0,
     /// Frames at a rate, from `start` to `end`.
     Range = 1,
-    /// The times given, the same for every track, in any order.
+    /// The listed times, the same for every track, in any order.
     Times = 2,
-    /// The times given, for each track its own: first those of the first track, then those of the
+    /// The listed times, different for each track: first those of the first track, then those of the
     /// second, the same number for each.
     TimesOfTracks = 3,
 }

@@ -45,7 +45,7 @@ unsafe fn give(
     Ok(to(&mut tracks, track, times, keys, &tangents)?)
 }
 
-/// Gives a track translations, in place of those that it had. `times` are seconds, strictly increasing,
+/// Sets the translations of a track, replacing any it had. `times` are seconds, strictly increasing,
 /// and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
 /// `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
 /// curve arrives, then the one with which it leaves, units per second. If anything is refused, the set
@@ -77,7 +77,7 @@ pub unsafe extern "C" fn tumble_set_translations(
     })
 }
 
-/// Gives a track scales along its axes; otherwise as `tumble_set_translations`.
+/// Sets the scales of a track along its axes; otherwise as `tumble_set_translations`.
 ///
 /// # Safety
 /// As there.

@@ -238,7 +238,7 @@ pub(crate) fn buffer_range(
     })
 }
 
-/// An engine on an application's own Vulkan device, for crowds that are recorded into its command buffers
+/// Creates an engine on an application's Vulkan device, for crowds that are recorded into its command buffers
 /// (`tumble_crowd_record`), and for all else that engines do.
 ///
 /// The handles stay the application's, which destroys them after it has freed the engine, its clips,

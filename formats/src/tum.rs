@@ -258,7 +258,7 @@ impl TrajectoryPoses {
         let from_offset = |mut said: Diagnostic| {
             let of_times = [Code::EqualKeys, Code::EqualTimes, Code::TimeNotIncreasing];
             if offset != 0 && of_times.contains(&said.code) {
-                said.message += &format!(" (times from second {offset} on)");
+                said.message += &format!(" (times are counted from second {offset})");
             }
             said
         };

@@ -107,7 +107,7 @@ fn joints_are_written_below_their_parents_with_usable_names() {
         .iter()
         .map(|warning| (warning.code, &*warning.message))
         .collect();
-    let no_room = "BVH has no room for it, left out: the scales";
+    let no_room = "BVH cannot store this, left out: the scales";
     let changed = "`hips` is called `hips#3` in BVH";
     assert_eq!(
         reported,

@@ -109,8 +109,8 @@ fn is_valid(clip: &Motion) {
     }
 }
 
-/// Writes the keys of a clip, and reads and writes them again: the clip is alike, and the bytes are the same.
-/// Gives why that is refused.
+/// Writes the keys of a clip and reads them: the clip is alike. What was read is then the same to the last byte
+/// however often it is written and read. Gives why that is refused.
 fn rewritten(clip: &Motion, format: &Format) -> Option<Code> {
     let Ok(samples) = keyed(clip) else {
         return None; // channels at their own times, or tangents
@@ -124,15 +124,24 @@ fn rewritten(clip: &Motion, format: &Format) -> Option<Code> {
         source_rate: rate.filter(|_| format.takes(FormatOption::TimesApart)),
         ..ReadOptions::default()
     };
-    let again = (format.read_bytes)("fuzz", bytes.clone(), &options);
-    let again = again.expect("a written file is read again");
-    assert_eq!((again.clips.len(), &again.refused), (1, &Vec::new()));
-    let again = &again.clips[0];
-    is_valid(again);
-    are_alike(again, clip, &samples, format, &warnings);
-    let samples = keyed(again).expect("one list of times, as it was written");
-    let again = written(again, &samples, again.rate.or(rate), format).expect("as before");
-    assert!(again.0 == bytes, "other bytes when it is written again");
+    let read = |bytes: Vec<u8>| {
+        let again = (format.read_bytes)("fuzz", bytes, &options);
+        let mut again = again.expect("a written file is read again");
+        assert_eq!((again.clips.len(), &again.refused), (1, &Vec::new()));
+        again.clips.remove(0)
+    };
+    let again = read(bytes);
+    is_valid(&again);
+    are_alike(&again, clip, &samples, format, &warnings);
+    let write = |clip: &Motion| {
+        let samples = keyed(clip).expect("one list of times, as it was written");
+        let written = written(clip, &samples, clip.rate.or(rate), format);
+        written.expect("as before").0
+    };
+    // The first time, zeros may lose their sign.
+    let second = write(&again);
+    let third = write(&read(second.clone()));
+    assert!(second == third, "other bytes when it is written again");
     None
 }
 

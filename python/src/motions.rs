@@ -331,7 +331,7 @@ fn check(motion: &Motion) -> Result<(), &'static str> {
         return Err("its positions count from an origin (`clip.origins`); subtract it first");
     }
     match (0..motion.set.track_count()).any(has_scales) {
-        true => Err("it has keys of scales, which a motion library has no room for"),
+        true => Err("it has scale keys, which a motion library cannot store"),
         false => Ok(()),
     }
 }

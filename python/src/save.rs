@@ -269,7 +269,7 @@ impl Save {
         };
         self.clips.iter().any(hangs).then(|| {
             let message = format!(
-                "{} has no room for it, left out: the skeleton",
+                "{} cannot store this, left out: the skeleton",
                 self.format.name.to_uppercase()
             );
             Diagnostic::new(self.path.display().to_string(), Code::NoRoom, message)

@@ -323,10 +323,10 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
         found = said("nod.bvh", file["Nod"], **options)
         ours = [text for _, at, text in found if at == str(path)]
         assert len(ours) == 1, found
-        assert ours[0].endswith(f"warning[W208]: bvh has no room for it, left out: {BESIDE}")
+        assert ours[0].endswith(f"warning[W208]: bvh cannot store this, left out: {BESIDE}")
     # The program says it in the same words.
     printed = program("convert", path, "--animation", "Nod", "-o", tmp_path / "printed.bvh").stderr
-    assert f"bvh has no room for it, left out: {BESIDE}" in printed
+    assert f"bvh cannot store this, left out: {BESIDE}" in printed
     # A file of the same format keeps all, or is a new one.
     assert said("all.glb", file) == [] and said("baked.glb", file["Nod"], fps=30) == []
     assert len(tumble.load(tmp_path / "baked.glb")) == 2
@@ -483,7 +483,7 @@ def test_parents_and_offsets_come_back(tmp_path, rng, name, recwarn):
 
 def test_csv_says_what_it_has_no_room_for(tmp_path, rng):
     clip = tumble.Clip([0.0, 1.0], unit(rng, 2, 2), parents=[None, 0], offsets=np.ones((2, 3)))
-    with pytest.warns(tumble.InputWarning, match="CSV has no room for it, left out: the skeleton"):
+    with pytest.warns(tumble.InputWarning, match="CSV cannot store this, left out: the skeleton"):
         tumble.save(tmp_path / "walk.csv", clip)
     assert tumble.load(tmp_path / "walk.csv").clip.parents is None
 

@@ -181,7 +181,7 @@ pub enum Ends {
     /// The angular velocity of slerp between the last two keys: constant velocity stays constant
     /// too. The default of [`C2`](crate::method::c2::C2).
     Secant,
-    /// The last key repeats the first; neighbours are taken across the seam.
+    /// A closed curve: the last key equals the first.
     Loop,
     /// The first and the last segment hold their first key.
     Frozen,

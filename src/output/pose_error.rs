@@ -225,7 +225,7 @@ pub enum SkeletonError {
         /// Tracks given.
         tracks: usize,
     },
-    /// There is not the memory.
+    /// Not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
 }

@@ -113,7 +113,7 @@ pub enum SamplesError {
         /// `x y z w`, or `x y z 0` of a vector.
         value: [f32; 4],
     },
-    /// There is not the memory.
+    /// Not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
 }

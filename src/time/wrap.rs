@@ -21,11 +21,11 @@ pub enum WrapMode {
     /// The end value is held.
     #[default]
     Hold,
-    /// The track starts again. A sample on the seam is the first key's.
+    /// The track repeats. A sample on the seam is the first key's.
     Loop,
     /// The track runs backwards, then forwards again, and so on.
     Mirror,
-    /// The rotation goes on at the angular velocity that it has at that end.
+    /// The rotation continues at the angular velocity at that end.
     Extrapolate,
 }
 

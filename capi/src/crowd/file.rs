@@ -81,7 +81,7 @@ fn joints(file: &TumbleFile) -> Result<Vec<LibraryJoint>, Failure> {
 }
 
 /// An empty library for the skeleton of a file: the joints of all of its clips, by name, with their
-/// parents and where they rest; roots all of them where the file has no hierarchy. Its clips are then
+/// parents and rest positions; all of them are roots if the file has no hierarchy. Its clips are then
 /// pushed by `tumble_crowd_library_push_clip`. `ticks_per_second` is as in `tumble_crowd_library_new`.
 ///
 /// # Safety

@@ -6,7 +6,7 @@ use tumble::crowd::CrowdLayer;
 use crate::arguments::{flag, option};
 use crate::result::Failure;
 
-/// What a layer of an instance plays. All zeros but `size` stand still at the start of the first clip.
+/// What a layer of an instance plays. If all is zero but `size`, it stands still at the start of the first clip.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleCrowdLayer {
@@ -18,18 +18,18 @@ pub struct TumbleCrowdLayer {
     pub layer: usize,
     /// The clip, by its number in the library.
     pub clip: usize,
-    /// Where in the clip it stands now, ticks; `wrap` says what lies outside of the clip.
+    /// The time in the clip, ticks; `wrap` says what happens outside of the clip.
     pub time: i64,
     /// Ticks of the clip for a tick of the clock: 1 as keyed, 0 to stand still, negative to run
     /// backwards; magnitudes below 128, kept in units of 2^-16.
     pub speed: f32,
-    /// How much of it is laid over the layers below, 0 to 1, kept in units of 2^-15. The first layer
+    /// The weight with which it is blended over the layers below, 0 to 1, stored in units of 2^-15. The first layer
     /// has no weight.
     pub weight: f32,
     /// A `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
     pub wrap: u32,
-    /// 1: the clip's difference from its reference pose is added to the layers below; 0: they go over
-    /// into it.
+    /// 1: the clip's difference from its reference pose is added to the layers below; 0: it is blended
+    /// over them.
     pub additive: u32,
     /// 0: all joints take part; or a mask, by the number that `tumble_crowd_library_push_mask` gave.
     pub mask: usize,

@@ -56,9 +56,9 @@ impl TumbleCrowdLibrary {
     }
 }
 
-/// An empty library for a skeleton of arrays. `parents` has the index of each joint's parent, -1 for a
+/// Creates an empty library for a skeleton that is given by arrays. `parents` has the index of each joint's parent, -1 for a
 /// root; parents may come after their children. `offsets` has three numbers for each joint: where it
-/// hangs in its parent's frame while a clip has no translations for it; null: nowhere but at the parent.
+/// is in its parent's frame if a clip has no translations for it; null: at the parent.
 /// `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
 ///
 /// # Safety
@@ -187,7 +187,7 @@ pub unsafe extern "C" fn tumble_crowd_library_push_mask(
     })
 }
 
-/// Gives every joint the inverse of its matrix in the model in the pose in which vertices were bound:
+/// Sets the inverse bind matrix of every joint: the inverse of its model matrix in the bind pose,
 /// three rows of four numbers each, for column vectors, the last column the translation, as results are.
 /// (A matrix of 16 numbers in columns, as glTF has them, has `m[0] m[4] m[8] m[12]` in its first row.)
 ///
@@ -251,7 +251,7 @@ pub extern "C" fn tumble_crowd_library_ticks_per_second(library: *const TumbleCr
     guarded(|| Ok(handle::get(library)?.read()?.ticks_per_second())).unwrap_or(0)
 }
 
-/// How long a clip is, ticks: from the first key of anything to the last, and at least 1. 0 where there
+/// The length of a clip, ticks: from the first key of any channel to the last, at least 1. 0 if there
 /// is no such clip.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_clip_ticks(

@@ -11,8 +11,8 @@ use crate::engine::TumbleEngine;
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
 
-/// Many instances of a library's skeleton, each of which plays clips at its own time and speed. Threads
-/// that use one crowd at once are served one after another.
+/// Many instances of a library's skeleton, each of which plays clips at a separate time and speed. Threads
+/// that use the same crowd at once wait for each other.
 pub struct TumbleCrowd {
     state: Mutex<State>,
     /// Whether its engine is on the application's Vulkan device.
@@ -35,7 +35,7 @@ impl TumbleCrowd {
     }
 }
 
-/// A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the start of
+/// Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each. All of them stand still at the start of
 /// the library's first clip until they are set. The library is copied, to the device too: what is
 /// pushed to it later is not in this crowd.
 ///
@@ -144,7 +144,7 @@ pub unsafe extern "C" fn tumble_crowd_tick(
     })
 }
 
-/// Moves the clock of all instances on by the ticks nearest to some seconds. Where the sum must not
+/// Advances the clock of all instances by the ticks nearest to a number of seconds. Where the sum must not
 /// drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_advance(crowd: *mut TumbleCrowd, seconds: f64) -> TumbleResult {

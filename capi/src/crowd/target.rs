@@ -20,7 +20,7 @@ impl Object for TumbleCrowdTarget {
     const NAME: &'static str = "crowd target";
 }
 
-/// Makes ready what it takes to evaluate into a range of a buffer of the application's, on the device of
+/// Prepares everything to evaluate into a range of an application's buffer, on the device of
 /// `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
 /// is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
 /// `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
@@ -85,8 +85,8 @@ pub unsafe extern "C" fn tumble_crowd_record(
     })
 }
 
-/// Forgets what was recorded: the next evaluation sends the device all that instances play.
-/// For an application that threw a recorded frame away.
+/// Forgets what was recorded: the next evaluation writes all layers again.
+/// Call it if a recorded frame was discarded.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_forget_recorded(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| {

@@ -238,7 +238,7 @@ impl SampleRequest {
                     let time = times[first];
                     let from = match clip.time_offset {
                         0 => String::new(),
-                        second => format!(" (from second {second} on)"),
+                        second => format!(" (counted from second {second})"),
                     };
                     let message = format!(
                         "{found}, the first at {time} s{from}; continue with --in-gaps leave-out or hold"

@@ -172,13 +172,13 @@ impl DeviceEntry {
         let _ = writeln!(text, "   uuid        {}", info.uuid);
         let _ = writeln!(
             text,
-            "   buffers     {} visible of one, {} in one allocation",
+            "   buffers     at most {} in a binding, at most {} in an allocation",
             words::bytes(info.max_storage_buffer_range as f64),
             words::bytes(info.max_memory_allocation_size as f64),
         );
         let _ = writeln!(
             text,
-            "   workgroups  {} invocations in one, {x} × {y} × {z} in a dispatch",
+            "   workgroups  at most {} invocations, at most {x} × {y} × {z} in a dispatch",
             info.max_compute_work_group_invocations,
         );
         let _ = writeln!(

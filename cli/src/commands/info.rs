@@ -222,14 +222,14 @@ impl Summary {
             match self.time_offset {
                 0 => format!("{} to {} s", self.first_time, self.last_time),
                 from => format!(
-                    "{} to {} s, from second {from} on",
+                    "{} to {} s, counted from second {from}",
                     self.first_time, self.last_time
                 ),
             },
         );
         if let (Some(shortest), Some(longest)) = (self.shortest_step, self.longest_step) {
             line(
-                "steps",
+                "key spacing",
                 match self.uniform {
                     true => format!("uniform, {shortest:.6} s"),
                     false => format!("{shortest:.6} to {longest:.6} s"),
@@ -268,7 +268,11 @@ impl Summary {
                 .count();
             line(
                 "skeleton",
-                format!("{} joints, {roots} roots", self.parents.len()),
+                format!(
+                    "{}, {}",
+                    words::count(self.parents.len(), "joint"),
+                    words::count(roots, "root")
+                ),
             );
         }
         if let (Some(metres), Some(up)) = (self.metres, self.up) {

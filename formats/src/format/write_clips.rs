@@ -101,7 +101,7 @@ fn no_room(
         others => format!("{} and {last}", others.join(", ")),
     };
     let name = format.name.to_uppercase();
-    let message = format!("{name} has no room for it, left out: {all}");
+    let message = format!("{name} cannot store this, left out: {all}");
     Some(Diagnostic::new(&options.name, Code::NoRoom, message))
 }
 
@@ -183,6 +183,6 @@ pub fn left_behind(
     let all = contents.join(", ");
     Some(match why.filter(|_| is_kept) {
         Some(why) => format!("{why} a new file; not copied: {all}"),
-        None => format!("{} has no room for it, left out: {all}", format.name),
+        None => format!("{} cannot store this, left out: {all}", format.name),
     })
 }

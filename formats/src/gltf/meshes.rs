@@ -30,7 +30,7 @@ pub struct Triangles {
 /// The meshes of a scene.
 pub static SURFACE: SurfaceFormat = SurfaceFormat {
     name: FORMAT.name,
-    summary: "glTF 2.0: the triangles of the scene, where its nodes rest",
+    summary: "glTF 2.0: the triangles of the scene, with its nodes at rest",
     extensions: FORMAT.extensions,
     kind: SurfaceKind::Mesh,
     read_bytes: |name, bytes, folder, limits| {

@@ -9,8 +9,8 @@ use crate::text::number;
 /// Points as text.
 pub static FORMAT: PathFormat = PathFormat {
     name: "csv",
-    summary: "a point a row: `x,y,z`, before it its time `t`, behind it the upward direction `ux,uy,uz` there, \
-              which may be blank; both may be missing",
+    summary: "one point per row, with the columns `t,x,y,z,ux,uy,uz`; the time `t` and the upward direction \
+              `ux,uy,uz` are optional, and upward directions may be blank",
     probe: |_| false,
     holds_paths,
     read_bytes: |file, bytes| Ok(vec![read_text(file, bytes)?]),

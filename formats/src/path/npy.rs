@@ -9,7 +9,7 @@ use crate::path::{PathFormat, PathPoints};
 /// Arrays of `NumPy`.
 pub static FORMAT: PathFormat = PathFormat {
     name: "npy",
-    summary: "NumPy's array of floats of shape (tracks, points, 3), without times",
+    summary: "a NumPy array of floats of shape (tracks, points, 3), without times",
     probe: npy::FORMAT.probe,
     holds_paths: |start| npy::shape_of(start).is_some_and(|shape| matches!(shape[..], [_, _, 3])),
     read_bytes: read_array,

@@ -9,7 +9,7 @@ use crate::surface::{ControlNet, Surface, SurfaceFormat, SurfaceKind};
 /// Arrays of `NumPy`.
 pub static FORMAT: SurfaceFormat = SurfaceFormat {
     name: "npy",
-    summary: "NumPy's array of shape (m, n, 3): the control points of a Bézier surface",
+    summary: "a NumPy array of shape (m, n, 3): the control points of a Bézier surface",
     extensions: &[],
     kind: SurfaceKind::Net,
     read_bytes: |name, bytes, _, _| Ok(Surface::Net(read_net(name, &bytes)?)),

@@ -99,7 +99,7 @@ impl Crowd {
     }
 
     /// Takes back that anything was recorded since the instances were last known to be on the device:
-    /// the next evaluation writes all of them. For an application that threw a recorded frame away.
+    /// the next evaluation writes all of them. Call it if a recorded frame was discarded.
     pub fn forget_recorded(&mut self) {
         self.instances.forget();
     }
