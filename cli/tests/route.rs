@@ -158,7 +158,7 @@ fn many_pairs_and_what_fails_of_them() {
     assert!(
         batch
             .words
-            .contains("route-2: start and goal lie on pieces"),
+            .contains("route-2: start and goal are on parts of the surface that are not connected"),
         "{}",
         batch.words
     );
