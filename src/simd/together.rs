@@ -9,6 +9,21 @@ use crate::simd::lanes::{Lanes, Number};
 #[derive(Clone, Copy)]
 pub(crate) struct Together<L, const VECTORS: usize>(pub(crate) [L; VECTORS]);
 
+/// Does something for each vector, up to eight. Written out: a loop for each operation would make these functions by far
+/// those that take longest to compile.
+macro_rules! for_each_vector {
+    ($v:ident: $body:expr) => {
+        for_each_vector!(@0 1 2 3 4 5 6 7; $v: $body)
+    };
+    (@$($index:literal)+; $v:ident: $body:expr) => {
+        const { assert!(VECTORS <= 8) };
+        $(if VECTORS > $index {
+            let $v = $index;
+            $body;
+        })+
+    };
+}
+
 /// Functions of which each vector is given to the one of the same name. Written out, without closures: their
 /// bodies would not be compiled for the vector width.
 macro_rules! of_each {
@@ -18,18 +33,14 @@ macro_rules! of_each {
     (@function $name:ident, ($($other:ident),*), ($($value:ident: $type:ty),*)) => {
         #[inline(always)]
         fn $name(mut self $(, $value: $type)*) -> Self {
-            for v in 0..VECTORS {
-                self.0[v] = self.0[v].$name($($value),*);
-            }
+            for_each_vector!(v: self.0[v] = self.0[v].$name($($value),*));
             self
         }
     };
     (@operator $name:ident, ($other:ident), ()) => {
         #[inline(always)]
         fn $name(mut self, $other: Self) -> Self {
-            for v in 0..VECTORS {
-                self.0[v] = self.0[v].$name($other.0[v]);
-            }
+            for_each_vector!(v: self.0[v] = self.0[v].$name($other.0[v]));
             self
         }
     };
@@ -72,9 +83,7 @@ impl<L: Lanes, const VECTORS: usize> Together<L, VECTORS> {
     /// `then` where a number is `value`, else `otherwise`.
     #[inline(always)]
     pub(crate) fn where_equal(self, value: f32, then: Self, mut otherwise: Self) -> Self {
-        for v in 0..VECTORS {
-            otherwise.0[v] = self.0[v].where_equal(value, then.0[v], otherwise.0[v]);
-        }
+        for_each_vector!(v: otherwise.0[v] = self.0[v].where_equal(value, then.0[v], otherwise.0[v]));
         otherwise
     }
 
@@ -82,9 +91,7 @@ impl<L: Lanes, const VECTORS: usize> Together<L, VECTORS> {
     #[inline(always)]
     pub(crate) fn any_at_least(self, limit: f32) -> bool {
         let mut largest = self.0[0];
-        for v in 1..VECTORS {
-            largest = largest.larger(self.0[v]);
-        }
+        for_each_vector!(v: largest = largest.larger(self.0[v]));
         (-largest).any_at_most(-limit)
     }
 }
