@@ -115,7 +115,7 @@ pub(crate) fn assert_stated(method: Method, column: Column, error: f64) {
         is_update(),
         "{ERRORS} states {stated:e} for {method}, {column:?}, and it is {error:e}: UPDATE_EXPECTED=1 writes it"
     );
-    cells[column as usize] = format!("{rounded:e}");
+    cells[column as usize] = format!("{error:.1e}");
     let line = format!("{} {} |", row_of(method), cells.join(" | "));
     if let Some(row) = row {
         lines[row] = line;

@@ -156,7 +156,9 @@ fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
         let passed = words(code);
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
-        assert!(bare.len() < passed.len());
+        // These copy words.
+        let has_floats = !["crowd_gather", "crowd_scatter"].contains(&name);
+        assert_eq!(bare.len() < passed.len(), has_floats, "{name}");
         assert_eq!(no_contraction(&bare).unwrap(), passed, "{name}");
     }
 }

@@ -352,9 +352,39 @@ typedef uint32_t TumbleCrowdValues;
 #endif // __cplusplus
 
 /*
+ How a matrix lies in memory.
+ */
+enum TumbleMatrixOrder
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   Row by row.
+   */
+  TUMBLE_MATRIX_ORDER_ROW_MAJOR = 0,
+  /*
+   Column by column.
+   */
+  TUMBLE_MATRIX_ORDER_COLUMN_MAJOR = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumbleMatrixOrder TumbleMatrixOrder;
+#else
+typedef uint32_t TumbleMatrixOrder;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  A set prepared for one method, on an engine's device. Any number of threads may use it at once.
  */
 typedef struct TumbleClip TumbleClip;
+
+/*
+ A range of an application's buffer that a request of a clip is evaluated into, with all that recording needs.
+ */
+typedef struct TumbleClipTarget TumbleClipTarget;
 
 /*
  Many instances of a library's skeleton, each of which plays clips at a separate time and speed. Threads
@@ -504,6 +534,53 @@ typedef struct TumbleInterpolation {
    */
   double bias;
 } TumbleInterpolation;
+
+/*
+ What is asked of a clip. All zeros but `size` and `samples` ask for all of it, as `x y z w` in f32, track by track.
+ */
+typedef struct TumbleRequest {
+  /*
+   `sizeof(TumbleRequest)`.
+   */
+  size_t size;
+  /*
+   At which times.
+   */
+  const struct TumbleSamples *samples;
+  /*
+   A `TumbleLayout`.
+   */
+  uint32_t layout;
+  /*
+   A `TumbleMatrixOrder`, for matrices.
+   */
+  uint32_t matrix_order;
+  /*
+   The name of what each rotation is stored as, such as "f16" or "matrix-3x4" (`tumble_encoding_name`); null:
+   "f32".
+   */
+  const char *encoding;
+  /*
+   The axes of "euler": "ZXY" about turned axes, "zxy" about fixed ones; null: "XYZ".
+   */
+  const char *sequence;
+  /*
+   The first track, from 0.
+   */
+  size_t first_track;
+  /*
+   How many tracks; 0: all from the first one on.
+   */
+  size_t track_count;
+  /*
+   The first of the samples, from 0.
+   */
+  size_t first_sample;
+  /*
+   How many of the samples; 0: all from the first one on.
+   */
+  size_t sample_count;
+} TumbleRequest;
 
 /*
  An application's Vulkan instance, device and queue. They stay the application's.
@@ -932,6 +1009,81 @@ TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
 
 /*
+ The number of encodings.
+ */
+size_t tumble_encoding_count(void);
+
+/*
+ The name of an encoding, from 0; null where there is none.
+ */
+const char *tumble_encoding_name(size_t index);
+
+/*
+ How many bytes the result of a request has.
+
+ # Safety
+ `request` is such a structure, and `bytes` has room for a number.
+ */
+TumbleResult tumble_request_bytes(const struct TumbleClip *clip,
+                                  const struct TumbleRequest *request,
+                                  size_t *bytes);
+
+/*
+ Evaluates what is asked of a clip into the caller's memory: exactly `tumble_request_bytes`, values of the encoding in
+ the order of the layout. All arguments are checked before anything is written.
+
+ # Safety
+ `request` is such a structure, and `output` has room for so many bytes, which nothing else uses during the call.
+ */
+TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
+                                     const struct TumbleRequest *request,
+                                     void *output,
+                                     size_t output_bytes);
+
+/*
+ Makes ready what it takes to evaluate a request into a range of a buffer of the application's, on the device of
+ `tumble_engine_from_vulkan`: kernels are compiled, and what they read of the samples is brought to the device, here,
+ and not when a frame is recorded. `buffer` is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at
+ a multiple of the bytes of a value (16 for "f32"), and has at least `tumble_request_bytes`.
+
+ The buffer belongs to that device, has memory, and was made for use as `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and
+ `VK_BUFFER_USAGE_TRANSFER_DST_BIT`; it stays the application's, and lives longer than the target. The target needs
+ neither the clip nor the engine that it was made of. This call submits to the queue, as uploading does.
+
+ # Safety
+ `request` is such a structure, the buffer is as said, and `target` has room for a handle.
+ */
+TumbleResult tumble_clip_target_new(const struct TumbleClip *clip,
+                                    const struct TumbleRequest *request,
+                                    uint64_t buffer,
+                                    uint64_t offset,
+                                    uint64_t size,
+                                    struct TumbleClipTarget **target);
+
+/*
+ Records an evaluation into the application's `VkCommandBuffer`, to `offset` bytes behind the beginning of the
+ target's range, a multiple of the bytes of a value. Nothing is waited for, submitted or allocated. What is recorded
+ waits for all that was recorded before it, and all that comes behind it sees the result; it may be submitted any
+ number of times, to any queue of the family.
+
+ The command buffer is of the engine's device and of a family that computes, in recording, outside of a render pass.
+
+ # Safety
+ The command buffer is as said, and nobody else uses it during the call.
+ */
+TumbleResult tumble_clip_record(const struct TumbleClipTarget *target,
+                                void *commands,
+                                uint64_t offset);
+
+/*
+ Frees a target, after all work that was recorded with it has ended. Null is allowed.
+
+ # Safety
+ No such work is in flight, and none will be submitted.
+ */
+TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
+
+/*
  Sets the translations of a track, replacing any it had. `times` are seconds, strictly increasing,
  and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
  `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
@@ -1065,8 +1217,7 @@ uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *
  The length of a clip, ticks: from the first key of any channel to the last, at least 1. 0 if there
  is no such clip.
  */
-uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library,
-                                         size_t clip);
+uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library, size_t clip);
 
 /*
  The name of a joint, empty in libraries that were made of arrays: UTF-8, valid until the library is
@@ -1169,7 +1320,8 @@ TumbleResult tumble_crowd_tick(const struct TumbleCrowd *crowd,
  Advances the clock of all instances by the ticks nearest to a number of seconds. Where the sum must not
  drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
  */
-TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd, double seconds);
+TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
+                                  double seconds);
 
 /*
  Sets the clock, ticks below 2^52; all instances move with it, forwards or backwards.
@@ -1190,7 +1342,7 @@ TumbleResult tumble_crowd_clock(const struct TumbleCrowd *crowd, uint64_t *ticks
 TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
 
 /*
- How many numbers a result has: 4 or 12 × joints × instances.
+ How many numbers a result has: 4 or 12 × joints × instances, those that are visible.
 
  # Safety
  `count` has room for a number.
@@ -1200,7 +1352,7 @@ TumbleResult tumble_crowd_output_count(const struct TumbleCrowd *crowd,
                                        size_t *count);
 
 /*
- Evaluates all instances at the clock's time into the caller's memory, and waits until it is done.
+ Evaluates all instances, or those that are visible, at the clock's time into the caller's memory, and waits until it is done.
  `values` is a `TumbleCrowdValues`; `output_count` is exactly as `tumble_crowd_output_count` says.
 
  # Safety
@@ -1265,7 +1417,8 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
  `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
  is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
  `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
- at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`.
+ at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`: as many instances as have room there may be
+ visible later.
 
  The buffer belongs to that device, has memory, and was made for use as
  `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; it stays the application's, and lives longer than the target.
@@ -1282,8 +1435,8 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
                                      struct TumbleCrowdTarget **target);
 
 /*
- Records an evaluation at the clock's time into the application's `VkCommandBuffer`: 16 bytes for each
- layer that changed since the last evaluation, and the dispatches. Nothing is waited for, submitted or
+ Records an evaluation at the clock's time into the application's `VkCommandBuffer`: up to 20 bytes for each
+ layer that changed since the last evaluation, 4 for each instance of a new list of visible ones, and the dispatches. Nothing is waited for, submitted or
  allocated. What is recorded behind it, or submitted to the same queue later, sees the result; it
  waits for all that was recorded before it.
 

@@ -106,11 +106,8 @@ impl TumbleRequest {
     }
 }
 
-/// Every name once.
 static ENCODING_NAMES: LazyLock<Vec<CString>> = LazyLock::new(|| {
-    let mut names = Encoding::ALL.map(Encoding::name).to_vec();
-    names.dedup();
-    let names = names.into_iter().map(CString::new);
+    let names = Encoding::kinds().map(|encoding| CString::new(encoding.name()));
     names.map(Result::unwrap_or_default).collect()
 });
 

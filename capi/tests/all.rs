@@ -43,6 +43,8 @@ fn the_header_is_what_the_sources_say() {
         "crowd/file",
         "crowd/layer",
         "crowd/player",
+        "crowd/fade",
+        "crowd/visible",
         "crowd/output",
         "crowd/target",
     ];

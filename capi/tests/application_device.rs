@@ -774,7 +774,7 @@ fn handles_that_do_not_belong_together_are_refused() {
                 ..good
             },
             argument,
-            "the queue for copies is the one that computes",
+            "the copy queue is the compute queue",
         ),
         (controls, argument, "`vulkan->shader_float_controls` is 7"),
         (

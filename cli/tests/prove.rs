@@ -359,20 +359,23 @@ fn tables() -> String {
     });
     row("date", &|p| words(&p["date"]).chars().take(10).collect());
     row("verdict", &|p| words(&p["verdict"]).replace('_', " "));
-    row("kernels beside their twins", &|p| {
+    row("kernels equal to their twins", &|p| {
         let kernels = &p["kernels"];
         format!("{} of {}", count(&kernels["ran"]), count(&kernels["count"]))
     });
-    row("negative control: values that differ", &|p| {
-        let control = &p["negative_control"];
-        format!(
-            "{} of {}",
-            count(&control["differing"]),
-            count(&control["values"])
-        )
-    });
     row(
-        "recorded results, and settings they were compared in",
+        "negative control: values that differ without the decorations",
+        &|p| {
+            let control = &p["negative_control"];
+            format!(
+                "{} of {}",
+                count(&control["differing"]),
+                count(&control["values"])
+            )
+        },
+    );
+    row(
+        "recorded results; configurations in which they were compared",
         &|p| {
             let golden = &p["golden"];
             let settings = golden["by_setting"].as_array().map_or(0, Vec::len);
@@ -383,26 +386,23 @@ fn tables() -> String {
             )
         },
     );
-    row(
-        "random values of how many rounds, and crowds of them",
-        &|p| {
-            let random = &p["random"];
-            format!(
-                "{:.1} million, {}, {}",
-                number(&random["values"]) / 1e6,
-                count(&random["rounds"]),
-                count(&random["crowds"])
-            )
-        },
-    );
-    row("a renderer's device, values", &|p| {
+    row("random values; rounds; crowds among them", &|p| {
+        let random = &p["random"];
+        format!(
+            "{:.1} million, {}, {}",
+            number(&random["values"]) / 1e6,
+            count(&random["rounds"]),
+            count(&random["crowds"])
+        )
+    });
+    row("a renderer's device: values compared", &|p| {
         let checks = p["renderer"]["checks"].as_array().into_iter().flatten();
         checks
             .map(|check| count(&check["values"]))
             .sum::<u64>()
             .to_string()
     });
-    row("… its memory, its copy queue", &|p| {
+    row("… its memory; its copy queue", &|p| {
         let hidden = p["renderer"]["memory_is_hidden"] == true;
         let queue = p["renderer"]["copy_queue_family"].is_u64();
         let hidden = if hidden {
@@ -419,11 +419,11 @@ fn tables() -> String {
             validation => count(&validation["message_count"]).to_string(),
         },
     );
-    row("opened, then again", &|p| {
+    row("time to open the device; to open it again", &|p| {
         let opened = &p["device"]["opened_in"];
         format!("{:.0} ms, {:.0} ms", number(&opened[0]), number(&opened[1]))
     });
-    row("kernels compiled without a cache", &|p| {
+    row("kernels compiled without a cache; time", &|p| {
         let compile = &p["compile_times"];
         let kernels = compile["kernels"].as_array().map_or(0, Vec::len);
         format!(
@@ -431,19 +431,19 @@ fn tables() -> String {
             number(&compile["milliseconds_total"])
         )
     });
-    row("filling memory, copying it", &|p| {
+    row("speed of filling memory; of copying it", &|p| {
         let figures = &p["figures"];
         let [fill, copy] =
             ["fill_rate", "device_copy_rate"].map(|figure| rate(number(&figures[figure])));
         format!("{fill}, {copy}")
     });
-    row("bus up, down", &|p| {
+    row("bus to the device; to the host", &|p| {
         let figures = &p["figures"];
         let [up, down] =
             ["upload_rate", "download_rate"].map(|figure| rate(number(&figures[figure])));
         format!("{up}, {down}")
     });
-    row("submit and fence", &|p| {
+    row("time from submission to fence", &|p| {
         milliseconds(number(&p["figures"]["submit_and_fence"]))
     });
     for (case, part, name) in [

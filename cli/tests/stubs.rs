@@ -33,11 +33,8 @@ macro_rules! names {
 
 /// A type of each option, and its names.
 fn options() -> Vec<(&'static str, Vec<&'static str>)> {
-    let rotations = Encoding::ALL
-        .into_iter()
-        .filter(|&encoding| encoding != Encoding::Vector);
-    let mut encodings: Vec<&str> = rotations.map(Encoding::name).collect();
-    encodings.dedup(); // those that differ by their options
+    let rotations = Encoding::kinds().filter(|encoding| encoding.stores_rotations());
+    let encodings = rotations.map(Encoding::name).collect();
     vec![
         ("_Align", names!(Align)),
         ("_Axes", [&names!(Axes)[..], &["world"]].concat()),

@@ -207,7 +207,9 @@ pub enum OffsetsError {
         joints: usize,
     },
     /// Translations say where a joint is.
-    #[error("joint {joint} (`{name}`) has translation keys, and an offset is only for joints without them")]
+    #[error(
+        "joint {joint} (`{name}`) has translation keys, and an offset is only for joints without them"
+    )]
     Moved {
         /// The first such joint, from 0.
         joint: usize,

@@ -152,7 +152,8 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
         .map(|(_, token)| number::parse(token))
         .collect();
     if words.len() == 2 && words.iter().all(Result::is_ok) {
-        let message = "a second header; split the file, or make this line a comment by adding words";
+        let message =
+            "a second header; split the file, or make this line a comment by adding words";
         return Err(lines.refuse(1, Code::SecondHeader, message.to_owned()));
     }
     Ok(())

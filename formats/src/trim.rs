@@ -116,7 +116,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
             };
             match channel {
                 Channel::Translation => {
-                    trimmed.set_translations(new_track, &times, &keys, tangents)?
+                    trimmed.set_translations(new_track, &times, &keys, tangents)?;
                 }
                 Channel::Scale => trimmed.set_scales(new_track, &times, &keys, tangents)?,
             }

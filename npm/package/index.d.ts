@@ -13,7 +13,7 @@ export interface SampleOptions {
   method?: Method;
   /** Default: `track`. */
   layout?: Layout;
-  /** What happens in the first and the last segment. Default: the method's own. */
+  /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
   /** Which way to rotate between neighbouring keys. Default: `shortest`. */
   path?: "shortest" | "as-authored";
@@ -23,11 +23,11 @@ export interface SampleOptions {
   before?: "hold" | "loop" | "mirror" | "extrapolate";
   /** The values after the last key. Default: `hold`. */
   after?: "hold" | "loop" | "mirror" | "extrapolate";
-  /** kochanek-bartels: 1 stands still at the keys, -1 is twice as fast. Default: 0. */
+  /** kochanek-bartels: 0 is neutral, 1 stops at the keys, -1 doubles the speed at the keys. Default: 0. */
   tension?: number;
-  /** kochanek-bartels: -1 makes corners at the keys. Default: 0. */
+  /** kochanek-bartels: 0 is smooth, -1 makes corners at the keys. Default: 0. */
   continuity?: number;
-  /** kochanek-bartels: 1 follows the interval before a key, -1 the one after it. Default: 0. */
+  /** kochanek-bartels: 0 is neutral, 1 uses the velocity of the interval before a key, -1 of the one after it. Default: 0. */
   bias?: number;
 }
 
@@ -58,7 +58,7 @@ export interface Result {
   times?: Float64Array;
 }
 
-/** Each track as its file has it, relative to its parent. */
+/** The pose of each track, relative to its parent. */
 export interface Pose extends Result {
   /** Unit quaternions `x y z w`; neighbouring samples of a track have the nearer signs. */
   rotations: Float32Array;
@@ -172,25 +172,25 @@ export class Tumble {
   /** A clip of arrays. */
   clip(tracks: Track[], options?: { name?: string | null; isWorld?: boolean }): Clip;
   /**
-   * The clips of a file; by their first bytes, then by the ending of `name`, it is known which it is. `refused`:
-   * what is wrong with those that cannot be read.
+   * The clips of a file. Its format is recognised by its first bytes, then by the ending of `name`. `refused`:
+   * error messages for clips that cannot be read.
    */
   read(
     bytes: ArrayBuffer | ArrayBufferView,
     options?: { name?: string; sourceRate?: number | string },
   ): { clips: Clip[]; warnings: string[]; refused: string[] };
-  /** A clip in one piece of bytes, as the pages of `tumble view` carry it. */
+  /** A clip in the packed form that the pages of `tumble view` contain. */
   unpack(bytes: ArrayBuffer | ArrayBufferView): Clip;
 }
 
 /** An error of the engine, a file or an argument. */
 export class TumbleError extends Error {
-  /** The fault of a file, by its name in the program's list. */
+  /** The code of an error in a file, as in the program (`tumble explain`). */
   readonly code: string | null;
 }
 
 /** The poses of a clip at times: `clip.sample(times, options)`. */
 export function sample(clip: Clip, times: Times, options?: SampleOptions): Pose;
 
-/** The engine. `source`: the module's bytes, its address, or the answer to a request for it; else the file beside. */
+/** Loads the engine. `source`: the module's bytes, its URL, or a response with it; by default the file in the package. */
 export function load(source?: URL | string | Response | WebAssembly.Module | ArrayBuffer | ArrayBufferView): Promise<Tumble>;

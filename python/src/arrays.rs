@@ -96,7 +96,9 @@ fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, 
     };
     let made = numpy(py)?.call_method1(name, (value,));
     let made = made.map_err(|error| match error.is_instance_of::<PyValueError>(py) {
-        true => input(format!("{label}: it cannot be converted to an array: {error}")),
+        true => input(format!(
+            "{label}: it cannot be converted to an array: {error}"
+        )),
         false => error,
     })?;
     Ok(made.cast_into::<PyUntypedArray>()?)

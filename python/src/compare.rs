@@ -238,13 +238,11 @@ fn of_compare(error: CompareError) -> PyErr {
 /// Compares two clips, or two arrays: the largest and the mean difference, and where it is.
 ///
 /// `compare(first, second, *, fps=None, at=None, start=None, end=None, world=False, engine=None)`
-///
-/// Clips are sampled as their files say, at every key of both and halfway between neighbouring keys, or
-/// at `fps` (from `start` to `end`) or the seconds of `at`; their tracks belong together by their names,
-/// or by their order where the names differ. `world` compares joints in the world instead of
-/// relative to their parents. Gives a `ClipDifference`, whose `rotation` is in degrees.
-///
-/// Arrays of one shape are compared number by number, and by angles where they hold rotations: an
+/// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or
+/// at `fps` (from `start` to `end`), or at the times `at`. Tracks are matched by name, or by their order if the names
+/// differ. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`,
+/// whose `rotation` is in degrees.
+/// Arrays of the same shape are compared number by number, and by angles if they contain rotations. Returns an
 /// `ArrayDifference`.
 ///
 /// >>> import tumble
@@ -365,16 +363,16 @@ fn of_clips(
     Ok((difference, warning))
 }
 
-/// The errors of an estimated path beside its reference, as benchmarks of odometry and SLAM say them;
-/// the numbers are those of `evo`.
+/// The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The
+/// numbers are the same as those of the program `evo`.
 ///
 /// `path_errors(reference, estimate, *, align="none", rpe=None, max_gap=None, track=None, engine=None)`
 ///
-/// Both are clips of one track, or `track` names one of each. The estimate is interpolated by lines and
-/// arcs at the times of the reference's poses, and laid over it by `align`: "position" moves it, "yaw"
-/// turns it about z too, "se3" about any axis, "sim3" scales it too. Absolute errors are those of each
-/// pose; `rpe` asks for those over steps too, of so many seconds or units of length: "1s", "0.5m".
-/// `max_gap`: seconds between two keys of the estimate, beyond which it is not interpolated.
+/// Both clips have one track, or `track` selects one. The estimate is interpolated by lines and arcs at the times
+/// of the reference's poses, and aligned to the reference by `align`: "position" translates it, "yaw" also rotates
+/// it about z, "se3" about any axis, "sim3" also scales it. Absolute errors are computed for each pose. `rpe` adds
+/// relative errors over steps of a time or a length: "1s", "0.5m". `max_gap`: the estimate is not interpolated
+/// between keys that are more than this many seconds apart.
 ///
 /// >>> import numpy as np, tumble
 /// >>> path = np.random.default_rng(1).normal(size=(9, 3))

@@ -24,16 +24,16 @@ const TICKS: u32 = 705_600;
 /// Joints of an evaluation from which on Ctrl-C is looked for.
 const MANY: usize = 1 << 20;
 
-/// Many instances of a skeleton, each of which plays clips at its own time and speed: poses for skinning.
+/// Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning.
 ///
 /// `Crowd(clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
 /// inverse_bind=None, references=None, ticks_per_second=705600, engine=None)`
 ///
-/// `clips`: of one skeleton, that of the first unless `parents` and `offsets` say it. `layers`: of an
-/// instance, 1 to 4, each laid over the ones below. `masks`: lists of a weight from 0 to 1 for each joint,
-/// which a layer's weight is multiplied with. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
-/// values "skinning". `references`: {clip: (other clip, seconds)}, the pose that additive layers of a clip
-/// differ from, instead of its own at its start.
+/// `clips`: clips of one skeleton; it is that of the first clip, or given by `parents` and `offsets`. `layers`: the
+/// number of layers of an instance, 1 to 4, each blended over the ones below. `masks`: lists of a weight from 0 to 1
+/// for each joint, by which a layer's weight is multiplied. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
+/// values "skinning". `references`: {clip: (other clip, seconds)}, the reference pose for additive layers of a clip;
+/// the default is the first pose of the clip.
 ///
 /// All instances follow one clock, which counts whole ticks: a clip in a loop gives the same bits in the
 /// first second and a day later, on the CPU and every Vulkan device. At the start all play the first clip

@@ -152,29 +152,29 @@ impl File {
     }
 }
 
-/// Reads a motion file of any format (docs/formats.md lists them). What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
-/// with the position.
+/// Reads a motion file of any format (docs/formats.md lists them). An invalid file raises an `InputError` with the
+/// position of the error; oddities are reported as `InputWarning`.
 ///
 /// `load(path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
 /// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
 ///
-/// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
-/// keys of files without times; `source_times`: a file of them, seconds a line, for KITTI. `map`: which array or column is what, where names do not
-/// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
-/// or "ns". A map has entries NAME=SOURCE, separated by commas: NAME is `rotations`, `translations` or
-/// `time` of arrays, a known column or a track's name of tables; SOURCE is an array, a column, a part of a list
-/// such as `state[3:7]`, or neighbouring columns `rx..rz`; `:wxyz`, `:rotvec`, `:euler-ZXY` and the like behind
-/// it say what its numbers are. Known columns are `time`, `track` (or `joint`, `body`), `clip` (`clip_id`,
-/// `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`. `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
-/// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
-/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `keyframes`: of FBX
-/// the keys at the key times of the file alone, instead of as many as following its curves takes. `offsets`:
-/// where the joints of a body rest relative to their parents, (joints, 3), for files that do not say it, such
-/// as those of AMASS; `body_model`: the same by a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender.
-/// `scale`: multiply translations, and the length of boxes; "metres" by the unit that an FBX file says. `up`:
-/// turn so that "y" or "z" is up, from the axis that an FBX file says, else where the other was.
-///
-/// `read` is another name of it.
+/// `format`: the file's format; by default it is recognised by its first bytes and its name. `source_fps`: the
+/// frame rate of a file without times. `source_times`: a text file of times, for KITTI, one time in seconds per line.
+/// `time_unit`: the unit of times that are whole numbers, "s", "ms", "us" or "ns". `map`: what arrays or columns
+/// contain, if their names do not say it, such as "rotations=keys:wxyz,time=t". It has entries NAME=SOURCE, separated
+/// by commas. NAME is `rotations`, `translations` or `time` for arrays, and a known column or a track for tables.
+/// SOURCE is an array, a column, a part of a list such as `state[3:7]`, or a range of columns `rx..rz`; a suffix such
+/// as `:wxyz`, `:rotvec` or `:ZXY` gives the representation of rotations. Known columns are `time`, `track` (or `joint`, `body`), `clip` (`clip_id`,
+/// `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`. `duplicates`: which of two different keys at the
+/// same time to keep: "first", "last" or "both", which makes a jump.
+/// `raw_times`: keep times as stored, instead of moving them to exact frame times. `bridge_gaps`: skip keys with
+/// missing numbers in a table, instead of refusing it. `keyframes`: read only the keys of an FBX file at its key
+/// times, instead of adding keys until its curves are followed. `offsets`: the positions of joints relative to their
+/// parents, (joints, 3), for files that do not store them, such as those of AMASS. `body_model`: computes the offsets
+/// from a model of SMPL, SMPL-H or SMPL-X as NPZ, or from a folder with one per gender. `scale`: a factor for
+/// translations and the length of boxes; "metres" converts from the unit that an FBX file states. `up`: rotate so
+/// that "y" or "z" is up, from the up axis that an FBX file states, otherwise from the other of the two.
+/// `read` is the same function.
 ///
 /// >>> import tumble
 /// >>> tumble.load("missing.glb")  # doctest: +IGNORE_EXCEPTION_DETAIL
@@ -325,7 +325,9 @@ impl Scale {
         }
         match scale.extract::<f64>()? {
             factor if factor.is_finite() && factor > 0.0 => Ok(Self::Factor(factor)),
-            factor => Err(input(format!("scale: {factor} is not a number greater than 0"))),
+            factor => Err(input(format!(
+                "scale: {factor} is not a number greater than 0"
+            ))),
         }
     }
 }

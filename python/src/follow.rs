@@ -98,7 +98,9 @@ impl FollowOptions<'_, '_> {
     fn pace(&self) -> PyResult<Option<Pace>> {
         let positive = |name: &str, number: f64| match number.is_finite() && number > 0.0 {
             true => Ok(number),
-            false => Err(input(format!("{name}: {number} is not a number greater than 0"))),
+            false => Err(input(format!(
+                "{name}: {number} is not a number greater than 0"
+            ))),
         };
         match (self.duration, self.rate) {
             (Some(_), Some(_)) => Err(input(
@@ -214,7 +216,9 @@ pub(crate) fn follow<'py>(
     let paths: Vec<PathPoints> = paths.collect();
     for (track, path) in paths.iter().enumerate() {
         if path.points.is_empty() {
-            return Err(input(format!("points[{track}]: a path needs at least one point")));
+            return Err(input(format!(
+                "points[{track}]: a path needs at least one point"
+            )));
         }
         if let Some(point) = path.points.iter().position(|point| !point.is_finite()) {
             return Err(input(format!(

@@ -25,9 +25,7 @@ pub(crate) fn type_name(component: ComponentType) -> &'static str {
 pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
     let kind = PyArrayDescr::new(dtype.py(), dtype.clone())?;
     let name = kind.str()?.to_string();
-    let mut all = Encoding::ALL
-        .into_iter()
-        .filter(|encoding| encoding.is_quaternion());
+    let mut all = Encoding::kinds().filter(|encoding| encoding.is_quaternion());
     let found = all.find(|encoding| type_name(encoding.component_type()) == name);
     found.ok_or_else(|| {
         input(format!(
@@ -38,23 +36,19 @@ pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
 
 /// The representation of rotations of that name, with its options.
 pub(crate) fn encoding_named(name: &str, options: EncodingOptions) -> PyResult<Encoding> {
-    let names = encoding_names();
-    match name.parse::<Encoding>() {
-        Ok(encoding) if names.contains(&name) => Ok(encoding.with(options)),
-        _ => Err(input(format!(
+    let found = rotation_encodings().find(|encoding| encoding.name() == name);
+    found.map(|encoding| encoding.with(options)).ok_or_else(|| {
+        let names: Vec<&str> = rotation_encodings().map(Encoding::name).collect();
+        input(format!(
             "encoding: there is no `{name}`; there are {}",
             names.join(", ")
-        ))),
-    }
+        ))
+    })
 }
 
-/// The names of the representations of rotations, each once.
-pub(crate) fn encoding_names() -> Vec<&'static str> {
-    let all = Encoding::ALL.into_iter();
-    let rotations = all.filter(|&encoding| encoding != Encoding::Vector);
-    let mut names: Vec<&str> = rotations.map(Encoding::name).collect();
-    names.dedup();
-    names
+/// The representations of rotations, with the first of their options.
+pub(crate) fn rotation_encodings() -> impl Iterator<Item = Encoding> {
+    Encoding::kinds().filter(|encoding| encoding.stores_rotations())
 }
 
 /// An array of float32 for a result of that shape: a fresh one, or `out`, if it is exactly what is needed and

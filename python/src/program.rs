@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, METHODS};
+use tumble::METHODS;
 use tumble_cli::host;
 
 use crate::errors::{device, guarded, input};
-use crate::output::encoding_names;
+use crate::output::rotation_encodings;
 use crate::save::clips_of;
 
 /// Runs the program `tumble` with these arguments, the first of which is its name; gives its exit
@@ -68,11 +68,8 @@ pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 #[pyfunction]
 pub(crate) fn encodings(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let found = PyDict::new(py);
-    let names = encoding_names();
-    for encoding in Encoding::ALL {
-        if names.contains(&encoding.name()) {
-            found.set_item(encoding.name(), encoding.summary())?;
-        }
+    for encoding in rotation_encodings() {
+        found.set_item(encoding.name(), encoding.summary())?;
     }
     Ok(found)
 }

@@ -22,8 +22,8 @@ use crate::run::interruptible;
 /// `Surface(vertices, faces, *, weld=0.0)`
 ///
 /// `vertices`: (n, 3). `faces`: the indices of triangles (m, 3), of polygons (m, k), or a list of lists of any
-/// lengths. Vertices within `weld` of each other are one, so that routes cross seams. What is odd about a mesh
-/// is an `InputWarning`.
+/// lengths. Vertices within the distance `weld` are merged, so that routes can cross seams. Oddities of a mesh are
+/// reported as `InputWarning`.
 ///
 /// >>> import numpy as np, tumble
 /// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -102,7 +102,9 @@ fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     let index =
         |number: &f64| match number.fract() == 0.0 && (0.0..4_294_967_295.0).contains(number) {
             true => Ok(*number as u32),
-            false => Err(input(format!("faces: {number} is not an index of a vertex"))),
+            false => Err(input(format!(
+                "faces: {number} is not an index of a vertex"
+            ))),
         };
     let face = |numbers: &[f64]| numbers.iter().map(index).collect::<PyResult<Vec<u32>>>();
     if let Some(parts) = parts(value) {
@@ -488,14 +490,14 @@ impl Walk {
     }
 }
 
-/// Plans those who walk routes, one after another: each waits where needed for what moves and for those
-/// before it. A list with a `Walk` for each, and None for one who cannot pass, of which an `InputWarning`
-/// says why.
+/// Plans walkers on routes, one after another. Each waits on its route where this is necessary, for moving obstacles
+/// and for the walkers before it. Returns a list with a `Walk` for each, or None for a walker that cannot pass, with
+/// an `InputWarning` that says why.
 ///
 /// `walk(routes, *, speed, radius, start=0.0, movers=())`
 ///
-/// `speed`, units of length a second, `radius`, of the ball that each fills, and `start`, seconds, are one for
-/// all or (n,). `movers`: what moves on tracks of its own, each (times, points, radius).
+/// `speed` (units of length per second), `radius` (of the ball around a walker) and `start` (seconds) are one number
+/// for all or (n,). `movers`: moving obstacles, each (times, points, radius).
 ///
 /// >>> import tumble
 /// >>> plane = tumble.Surface([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2, 3]])
@@ -546,7 +548,9 @@ pub(crate) fn walk(
             )));
         }
         if !(parts.2 >= 0.0 && parts.2.is_finite()) {
-            return Err(input(format!("{name}: a radius must be a number of 0 or more")));
+            return Err(input(format!(
+                "{name}: a radius must be a number of 0 or more"
+            )));
         }
         Ok(Mover {
             track: times.into_iter().zip(points).collect(),

@@ -33,27 +33,23 @@ use crate::run::interruptible;
 /// Rotations evaluated at once.
 const CHUNK: usize = 1 << 20;
 
-/// Writes clips to a file, whole or not at all; its format is that of the name's ending.
+/// Writes clips to a file, atomically; the format is that of the file's ending.
 ///
 /// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
 /// layout="track", times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None, …)`
 ///
-/// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
-/// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
-/// into the same format baked: all else in the file stays as it is. Without, the keys are written
-/// at their own times. What the file of a clip holds beside it and the new one does not, such as meshes and
-/// channels of weights, is named in an `InputWarning`. NPY, and CSV, Parquet and Arrow for clips without a skeleton, hold rotations
-/// alone, in the `order` ("xyzw" or "wxyz"; CSV has w first where none is asked for) and `layout`
-/// that is asked for; the bytes are those that the program
-/// `tumble` writes.
-///
-/// `sequence`: of BVH's angles, such as "ZXY". `linear`: arrays of an NPZ file with a number for
-/// each frame that are to be interpolated linearly instead of being left out. `times_out`: where the times of
-/// the poses go, seconds a line, for KITTI, which has none. `quantize`: glTF's rotations have 16 bits a
-/// component, within 6e-5 rad. `meshopt`: a new glTF is compressed by `EXT_meshopt_compression`. `engine`: which
-/// evaluates, else one that all calls share.
-///
-/// `write` is another name of it.
+/// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled as by
+/// `Engine.evaluate`, with its options; without, the keys are written at their times. A clip of a glTF or NPZ file
+/// that is saved in the same format is baked: everything else in the file is kept. An `InputWarning` names what the
+/// clip's file contains and the new file does not, such as meshes and morph weights. NPY, and CSV, Parquet and Arrow
+/// for clips without a skeleton, store only rotations, in the `order` ("xyzw" or "wxyz"; the default of CSV is
+/// "wxyz") and `layout` of these options. The bytes are those that the program `tumble` writes.
+/// `sequence`: the axes of BVH's angles, such as "ZXY". `linear`: names of arrays in an NPZ file, with a number
+/// for each frame, to be interpolated linearly instead of left out. `times_out`: for KITTI, which stores no times, a file
+/// for the times of the poses, one time in seconds per line. `quantize`: store glTF rotations with 16 bits a
+/// component, within 6e-5 rad. `meshopt`: compress a new glTF file by `EXT_meshopt_compression`. `engine`: the engine
+/// that evaluates; by default one that all calls share.
+/// `write` is the same function.
 ///
 /// >>> import numpy as np, tempfile, os, tumble
 /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])

@@ -178,7 +178,7 @@ def test_broken_files_are_refused(clips, tmp_path):
     with pytest.raises(tumble.InputError):
         tumble.MotionLibrary.open(broken)
     np.savez(broken, x=1)
-    with pytest.raises(tumble.InputError, match="no motion library"):
+    with pytest.raises(tumble.InputError, match="not a motion library"):
         tumble.MotionLibrary.open(broken)
 
 

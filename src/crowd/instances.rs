@@ -6,7 +6,7 @@ use crate::memory::{OutOfMemoryError, reserved, zeroed};
 use crate::output::crowd::{CrowdFrame, EntryChanges, VisibleInstances, listed_changes};
 use crate::shader::{CrowdChange, CrowdClip, CrowdEntry};
 use crate::twin::crowd_entries::change;
-use crate::twin::crowd_times::ELAPSED_BITS;
+use crate::twin::crowd_times::{ELAPSED_BITS, elapsed};
 
 /// The entries, the clock, and the entries that the device does not know yet.
 #[derive(Debug)]
@@ -71,20 +71,29 @@ impl Instances {
         }
     }
 
-    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later; where that would
-    /// not do, all get new anchors.
+    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later. Where it goes farther, all
+    /// get new anchors, and where it goes back, those whose anchors would come after it.
     pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
-        let is_near = clock >= self.clock && clock - self.since < 1 << (ELAPSED_BITS - 1);
-        if !is_near {
+        let is_late = clock.saturating_sub(self.since) >= 1 << (ELAPSED_BITS - 1);
+        let back = self.clock.saturating_sub(clock);
+        if is_late || back > 0 {
             for index in 0..self.entries.len() {
-                let layer = CrowdLayer::moved(&self.entries[index], clips, self.clock, clock);
+                let old = self.entries[index];
+                if !is_late && back <= elapsed(&old, self.clock) {
+                    continue;
+                }
+                let layer = CrowdLayer::moved(&old, clips, self.clock, clock);
                 // What was packed once can be packed again.
                 if let Ok(mut entry) = layer.packed(clips, masks, clock) {
-                    entry.clip_and_weight = self.entries[index].clip_and_weight;
+                    entry.clip_and_weight = old.clip_and_weight;
                     self.set(index, entry);
                 }
             }
-            self.since = clock;
+            self.since = if is_late {
+                clock
+            } else {
+                self.since.min(clock)
+            };
         }
         let mut fades = std::mem::take(&mut self.fades);
         fades.set_clock(clock, clock < self.clock, |index, units| {
@@ -183,8 +192,8 @@ mod tests {
     use super::*;
     use crate::twin::crowd_entries::scatter;
 
-    /// Takes a frame as a device does; the bytes that it takes for it.
-    fn taken(all: &mut Instances, known: &mut [CrowdEntry]) -> usize {
+    /// Applies a frame as a device does; the bytes that it takes for it.
+    fn applied(all: &mut Instances, known: &mut [CrowdEntry]) -> usize {
         match all.take_frame(2).changes {
             EntryChanges::None => 0,
             EntryChanges::Range(first, entries) => {
@@ -219,7 +228,7 @@ mod tests {
                         start: 2,
                         ..CrowdEntry::zeroed()
                     });
-                    assert_eq!(taken(&mut all, &mut known), whole);
+                    assert_eq!(applied(&mut all, &mut known), whole);
                     assert!(known == all.entries);
                 }
                 let changes = random.usize(0..[3, 40, 3 * instances][round % 3]);
@@ -236,16 +245,16 @@ mod tests {
                     );
                     distinct.insert(index);
                 }
-                let bytes = taken(&mut all, &mut known);
+                let bytes = applied(&mut all, &mut known);
                 assert!(known == all.entries);
-                let few = distinct.len() <= listed_changes(known.len());
-                let most = if few {
+                let is_listed = distinct.len() <= listed_changes(known.len());
+                let limit = if is_listed {
                     20 * distinct.len() + 256
                 } else {
                     whole
                 };
-                assert!(bytes <= most.min(whole), "{bytes} of {most}");
-                assert_eq!(taken(&mut all, &mut known), 0);
+                assert!(bytes <= limit.min(whole), "{bytes} of {limit}");
+                assert_eq!(applied(&mut all, &mut known), 0);
             }
         }
     }
@@ -255,7 +264,7 @@ mod tests {
     fn a_hundredth_of_the_instances_takes_two_kilobytes() {
         let mut all = Instances::new(10_000, 2, CrowdEntry::zeroed()).unwrap();
         let mut known = vec![CrowdEntry::zeroed(); 20_000];
-        assert_eq!(taken(&mut all, &mut known), 320_000);
+        assert_eq!(applied(&mut all, &mut known), 320_000);
         for index in 0..100 {
             let start = index as u32 + 1;
             all.set(
@@ -266,7 +275,7 @@ mod tests {
                 },
             );
         }
-        assert_eq!(taken(&mut all, &mut known), 2000);
+        assert_eq!(applied(&mut all, &mut known), 2000);
         assert!(known == all.entries);
     }
 

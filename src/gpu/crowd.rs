@@ -461,23 +461,27 @@ impl CrowdTarget {
                     continue;
                 }
                 Kernel::CrowdWalk => {
+                    let mut is_bound = false;
                     for level in self.crowd.tables.levels.windows(2) {
+                        let joints = level[1] - level[0];
                         let level_arguments = CrowdDispatch {
-                            joints: level[1] - level[0],
+                            count: instances * joints,
+                            joints,
                             layers: arguments.joints,
                             first_link: level[0],
                             ..arguments
                         };
-                        let count = instances * level_arguments.joints;
-                        if count > 0 {
-                            order(values);
-                            dispatch(
-                                CrowdDispatch {
-                                    count,
-                                    ..level_arguments
-                                },
-                                count,
-                            );
+                        if joints == 0 {
+                            continue;
+                        }
+                        order(values);
+                        if is_bound {
+                            let groups = self.crowd.engine.workgroups(level_arguments.count);
+                            let bytes = bytemuck::bytes_of(&level_arguments);
+                            commands.dispatch_again(&bound.pipeline, bytes, groups);
+                        } else {
+                            dispatch(level_arguments, level_arguments.count);
+                            is_bound = true;
                         }
                     }
                     continue;

@@ -292,17 +292,25 @@ impl<'a> Commands<'a> {
         pipeline: &Pipeline,
         set: vk::DescriptorSet,
         constants: &[u8],
-        [x, y, z]: [u32; 3],
+        groups: [u32; 3],
     ) {
         let (device, layout) = (self.device, pipeline.layout);
         let compute = vk::PipelineBindPoint::COMPUTE;
-        let stage = vk::ShaderStageFlags::COMPUTE;
         // SAFETY: recording is on, and set and pipeline belong to this device (`new`).
         unsafe {
             device.cmd_bind_pipeline(self.raw, compute, pipeline.raw);
             device.cmd_bind_descriptor_sets(self.raw, compute, layout, 0, &[set], &[]);
-            device.cmd_push_constants(self.raw, layout, stage, 0, constants);
-            device.cmd_dispatch(self.raw, x, y, z);
+        }
+        self.dispatch_again(pipeline, constants, groups);
+    }
+
+    /// Records another dispatch of the pipeline that was dispatched last, with the same set.
+    pub(crate) fn dispatch_again(self, pipeline: &Pipeline, constants: &[u8], [x, y, z]: [u32; 3]) {
+        let stage = vk::ShaderStageFlags::COMPUTE;
+        // SAFETY: as in `dispatch`, which has bound pipeline and set.
+        unsafe {
+            (self.device).cmd_push_constants(self.raw, pipeline.layout, stage, 0, constants);
+            self.device.cmd_dispatch(self.raw, x, y, z);
         }
     }
 

@@ -338,11 +338,8 @@ impl FromStr for Encoding {
     type Err = UnknownNameError;
 
     fn from_str(name: &str) -> Result<Self, UnknownNameError> {
-        let mut found = named("encoding", &Self::ALL, Self::name, name);
-        if let Err(error) = &mut found {
-            error.known.dedup(); // those that differ by their options
-        }
-        found
+        let kinds: Vec<Self> = Self::kinds().collect();
+        named("encoding", &kinds, Self::name, name)
     }
 }
 
@@ -388,6 +385,22 @@ impl Encoding {
     #[must_use]
     pub fn component_type(self) -> ComponentType {
         self.row().component_type
+    }
+
+    /// One for each name, with the first of its options: row by row, XYZ.
+    pub fn kinds() -> impl Iterator<Item = Self> {
+        let all = Self::ALL.into_iter().enumerate();
+        let kinds = all.filter(|(index, encoding)| {
+            let mut before = Self::ALL[..*index].iter();
+            before.all(|other| other.name() != encoding.name())
+        });
+        kinds.map(|(_, encoding)| encoding)
+    }
+
+    /// Whether rotations are stored in it, and can be read again; else it is for velocities and accelerations alone.
+    #[must_use]
+    pub fn stores_rotations(self) -> bool {
+        self.row().error_bound.is_some()
     }
 
     /// Every representation with every value of its options, in the order of [`Encoding::ALL`].

@@ -1,8 +1,6 @@
 //! Poses: blending and adding layers of rotations, skeletons with rotations and positions in the
 //! world, and transforms of rotations, translations and scales.
 
-#[cfg(feature = "vulkan")]
-mod application_device;
 pub(crate) mod follow;
 pub(crate) mod local_to_model;
 #[cfg(feature = "vulkan")]

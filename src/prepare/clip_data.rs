@@ -108,16 +108,14 @@ fn prepare(
         if let Some(timeline) = only_for {
             preparation.only_for(timeline, set);
         }
-        match &batch {
-            Batch::Tracks(tracks) => prepared.reserve(set.keys_of(tracks.clone()))?,
-            Batch::Span { .. } => {
-                let keys = batch
-                    .intervals(set)
-                    .map(|(_, intervals)| intervals.len() + 1);
-                prepared.reserve(keys.sum())?;
+        let keys = match &batch {
+            Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
+            Batch::Span { .. } | Batch::Intervals { .. } => {
+                let intervals = batch.intervals(set);
+                intervals.map(|(_, intervals)| intervals.len() + 1).sum()
             }
-            Batch::Intervals { .. } => {}
-        }
+        };
+        prepared.reserve(keys)?;
         stop::during(stop.clone(), || {
             preparation.push(&mut prepared, set, batch.intervals(set))
         })?;
@@ -369,12 +367,69 @@ fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
             .len()
             .max(size_of_val(group.constants.as_slice()))
     };
-    let mut merged: Vec<Prepared> = Vec::new();
+    let mut merged: Vec<Vec<Prepared>> = Vec::new();
+    let mut merged_bytes = 0;
     for group in groups {
+        let group_bytes = bytes(&group);
         match merged.last_mut() {
-            Some(last) if bytes(last) + bytes(&group) <= limit => last.append(group),
-            _ => merged.push(group),
+            Some(last) if merged_bytes + group_bytes <= limit => {
+                merged_bytes += group_bytes;
+                last.push(group);
+            }
+            _ => {
+                merged_bytes = group_bytes;
+                merged.push(vec![group]);
+            }
         }
     }
-    merged
+    merged.into_iter().filter_map(Prepared::together).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method;
+
+    /// Catches lists that grow by doubling: a clip keeps their memory.
+    #[test]
+    fn prepared_lists_have_hardly_more_room_than_they_need() {
+        let times: Vec<f64> = (0..10_000).map(|key| f64::from(key) * 0.01).collect();
+        let keys = times.iter().map(|&time| {
+            let half = time as f32 * 0.4;
+            Quat::from_xyzw(0.0, libm::sinf(half), 0.0, libm::cosf(half))
+        });
+        let keys: Vec<Quat> = keys.collect();
+        let mut set = TrackSet::new();
+        for _ in 0..3 {
+            set.push("", &times, &keys).unwrap();
+        }
+        for method in [
+            method::STEP,
+            method::SLERP,
+            method::BESSEL_OVERHAUSER,
+            method::C2,
+        ] {
+            for group_bytes in [None, Some(2 << 20), Some(usize::MAX)] {
+                let request = PrepareRequest {
+                    group_bytes,
+                    ..PrepareRequest::all(&set)
+                };
+                let clip = ClipData::new(&set, method.into(), request).unwrap();
+                assert!(group_bytes != Some(usize::MAX) || clip.groups.len() == 1);
+                for group in &clip.groups {
+                    let (arcs, polynomials) = (&group.segments.arcs, &group.segments.polynomials);
+                    let rooms = [
+                        (arcs.len(), arcs.capacity()),
+                        (polynomials.len(), polynomials.capacity()),
+                        (group.constants.len(), group.constants.capacity()),
+                        (group.spans.starts.len(), group.spans.starts.capacity()),
+                    ];
+                    for (len, capacity) in rooms.into_iter().filter(|&(len, _)| len > 0) {
+                        let allowed = len + len / 16 + 16;
+                        assert!(capacity <= allowed, "{method}, {group_bytes:?}: {rooms:?}");
+                    }
+                }
+            }
+        }
+    }
 }

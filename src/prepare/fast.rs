@@ -19,7 +19,7 @@ use crate::fit::nodes::NodeSamples;
 use crate::fit::tangent_weights::KeyWeights;
 use crate::method::{FastCurves, SmoothCurves};
 use crate::prepare::fitting::Fitting;
-use crate::prepare::prepared::{CurveSlot, Prepared};
+use crate::prepare::prepared::{CurveSlot, Prepared, SPARE_SEGMENTS};
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, MAX_LANES};
@@ -238,7 +238,7 @@ fn fit_list<const PAIRS: usize>(
         let segments = &mut prepared.segments.polynomials;
         let len = segments.len();
         // The lanes of the last vector that have no curve write to two extra segments.
-        segments.extend([PolynomialSegment::zeroed(); 2]);
+        segments.extend([PolynomialSegment::zeroed(); SPARE_SEGMENTS]);
         in_lanes(&mut ListFit::<_, PAIRS> {
             key_fit,
             lanes: &list.all,

@@ -34,6 +34,9 @@ pub(crate) struct Prepared {
     pub(crate) wrap: Wrap,
 }
 
+/// Segments behind the last to which lanes without a curve write while others are fitted.
+pub(crate) const SPARE_SEGMENTS: usize = 2;
+
 /// What [`OutOfMemoryError`] calls it.
 pub(crate) const SEGMENTS: &str = "the segments of a set";
 
@@ -65,11 +68,13 @@ impl Prepared {
         }
     }
 
-    /// Makes room for this many keys, so that the lists are not copied as they grow.
+    /// Makes room for this many keys, so that the lists are not copied as they grow, and do not keep twice the
+    /// memory that they need.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
         let refused = |_| OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
-        self.segments.try_reserve(keys).map_err(refused)?;
+        let segments = keys.saturating_add(SPARE_SEGMENTS);
+        self.segments.try_reserve(segments).map_err(refused)?;
         self.constants.try_reserve(keys).map_err(refused)?;
         self.spans.try_reserve(keys).map_err(refused)
     }
@@ -84,8 +89,31 @@ impl Prepared {
         self.parts.clear();
     }
 
+    /// All groups in the first, whose lists get room for all at once; `None` of no groups.
+    pub(crate) fn together(groups: Vec<Self>) -> Option<Self> {
+        let total = |count: fn(&Self) -> usize| groups.iter().skip(1).map(count).sum();
+        let [segments, constants, exact, spans, parts]: [usize; 5] = [
+            total(|group| group.segments.len()),
+            total(|group| group.constants.len()),
+            total(|group| group.exact.len()),
+            total(|group| group.spans.starts.len()),
+            total(|group| group.parts.len()),
+        ];
+        let mut groups = groups.into_iter();
+        let mut first = groups.next()?;
+        first.segments.reserve_exact(segments);
+        first.constants.reserve_exact(constants);
+        first.exact.reserve_exact(exact);
+        first.spans.reserve_exact(spans);
+        first.parts.reserve_exact(parts);
+        for group in groups {
+            first.append(group);
+        }
+        Some(first)
+    }
+
     /// Moves all of `other` behind what it has.
-    pub(crate) fn append(&mut self, other: Self) {
+    fn append(&mut self, other: Self) {
         let constants = self.constants.len() as u32;
         let segments = self.segments.len() as u32;
         let exact = self.exact.len() as u32;
@@ -291,10 +319,10 @@ impl Segments {
         self.arcs.len() + self.polynomials.len()
     }
 
-    pub(crate) fn reserve(&mut self, count: usize) {
+    pub(crate) fn reserve_exact(&mut self, count: usize) {
         match self.form {
-            Form::Arc => self.arcs.reserve(count),
-            Form::Polynomial => self.polynomials.reserve(count),
+            Form::Arc => self.arcs.reserve_exact(count),
+            Form::Polynomial => self.polynomials.reserve_exact(count),
         }
     }
 

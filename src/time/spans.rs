@@ -122,6 +122,12 @@ impl Spans {
         self.keys.reserve(count);
     }
 
+    pub(crate) fn reserve_exact(&mut self, count: usize) {
+        self.starts.reserve_exact(count);
+        self.sources.reserve_exact(count);
+        self.keys.reserve_exact(count);
+    }
+
     pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
         self.starts.try_reserve(count)?;
         self.sources.try_reserve(count)?;

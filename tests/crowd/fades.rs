@@ -39,12 +39,7 @@ fn a_jump_and_many_steps_fade_alike() {
     let mut random = Random(41);
     let library = library(&mut random, 17, &SOME[..2]);
     let plays: Vec<CrowdLayer> = (0..INSTANCES * LAYERS)
-        .map(|_| CrowdLayer {
-            // Where the clock goes back, parts of a tick would be cut off, and what lies outside of a clip.
-            speed: random.pick(&[0.0, 1.0, -1.0, 2.0]),
-            wrap: random.pick(&[WrapMode::Loop, WrapMode::Mirror]),
-            ..layer(&mut random, &library)
-        })
+        .map(|_| layer(&mut random, &library))
         .collect();
     let began = 10 * TENTH;
     let ends = [

@@ -158,8 +158,8 @@ fn recorded_passes_give_the_bits_of_those_over_results() {
             let runs: [(&[vk::CommandBuffer], usize); 4] = [
                 (&[first], 0),
                 (&[second], 1),
-                (&[first, second, first], 0),
-                (&[first, second, second], 1),
+                (&[second, first], 0),
+                (&[first, second], 1),
             ];
             for (run, weights) in runs {
                 commands.run(run);

@@ -16,7 +16,7 @@ use crate::arguments::output::one_of;
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct InterpolationArguments {
-    /// What happens at the first and the last key [default: as the method says]
+    /// The boundary condition at the first and the last key [default: depends on the method]
     #[arg(long, value_name = "ENDS", value_parser = ends())]
     ends: Option<Ends>,
     /// Which way to rotate between neighbouring keys

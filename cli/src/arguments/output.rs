@@ -53,7 +53,7 @@ type NamedValue<T> = (&'static str, &'static str, T);
 
 /// The values of `--output`: quaternions, the other representations of rotations, rates, and poses.
 fn outputs() -> Vec<NamedValue<OutputKind>> {
-    let others = encodings(|encoding| !encoding.is_quaternion() && encoding != Encoding::Vector);
+    let others = encodings(|encoding| encoding.stores_rotations() && !encoding.is_quaternion());
     let others = others.map(|(name, help, encoding)| (name, help, OutputKind::Encoded(encoding)));
     let poses = "(frames, tracks, 10): translation x y z, rotation x y z w, scale x y z";
     let world = "(frames, tracks, 7): position x y z and rotation x y z w in the world";
@@ -70,14 +70,11 @@ fn outputs() -> Vec<NamedValue<OutputKind>> {
         ("transform", poses, OutputKind::Transform),
         ("world", world, OutputKind::World),
     ]);
-    outputs.dedup_by_key(|(name, ..)| *name); // those that differ by their options
     outputs
 }
 
 fn encodings(filter: impl Fn(Encoding) -> bool) -> impl Iterator<Item = NamedValue<Encoding>> {
-    let all = Encoding::ALL
-        .into_iter()
-        .filter(move |encoding| filter(*encoding));
+    let all = Encoding::kinds().filter(move |encoding| filter(*encoding));
     all.map(|encoding| (encoding.name(), encoding.summary(), encoding))
 }
 

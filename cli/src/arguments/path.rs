@@ -33,7 +33,7 @@ pub(crate) struct PathArguments {
     /// How to interpolate: the curve through the points of a path
     #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
     path_method: VectorMethod,
-    /// What happens at the first and the last key: of a path, at its first and last point
+    /// The boundary condition at the first and the last key: of a path, at its first and last point
     #[arg(long, value_name = "ENDS", default_value_t, value_parser = ends())]
     path_ends: Ends,
     /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK

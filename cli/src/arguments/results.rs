@@ -179,9 +179,9 @@ pub(crate) fn makes_new(inputs: &Inputs) -> Option<&'static str> {
 }
 
 /// Refuses, before any work, formats that hold results and no keys.
-pub(crate) fn check_holds_keys(plan: &OutputPlan) -> Result<(), Failure> {
-    let holds_results = |target: &&ResultTarget| !target.format().writes_clips();
-    match plan.targets.iter().find(holds_results) {
+pub(crate) fn check_stores_keys(plan: &OutputPlan) -> Result<(), Failure> {
+    let stores_results = |target: &&ResultTarget| !target.format().writes_clips();
+    match plan.targets.iter().find(stores_results) {
         None => Ok(()),
         Some(target) => Err(Failure::usage(format!(
             "{target}: {} holds results of `tumble eval`, not keys",

@@ -14,7 +14,7 @@ use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::{component_order, sequence};
 use crate::arguments::results::{
-    ResultArguments, check_holds_keys, check_sequence, document_to_rewrite, makes_new, write_keys,
+    ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new, write_keys,
 };
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
@@ -22,7 +22,7 @@ use crate::batch::target::ResultTarget;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Write the keys of motion files in another format, at their own times
+/// Convert motion files to another format, without resampling
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Nothing is resampled: keys keep their values and their times. If channels have keys at different times
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
-    check_holds_keys(&plan)?;
+    check_stores_keys(&plan)?;
     let format = plan.targets.first().map(ResultTarget::format);
     if let Some(format) = format.filter(|format| !format.takes(FormatOption::Order))
         && arguments.order.is_some()

@@ -8,7 +8,7 @@ use tumble::METHODS;
 use crate::messages::exit::Failure;
 use crate::messages::listing;
 
-/// List the methods of interpolation
+/// List the interpolation methods
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Print JSON: with formulas and sources

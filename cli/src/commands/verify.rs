@@ -19,7 +19,7 @@ use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each
 use crate::messages::progress::Progress;
 use crate::messages::{listing, names, words};
 
-/// Compare the device with the CPU, bit for bit, and both with f64
+/// Compare a device with the CPU, bit for bit, and both with textbook formulas in f64
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by

@@ -180,7 +180,7 @@ fn all_broken_animations_are_told() {
 /// Escapes, line ends, and marks that turn text round.
 const NAMES: [&str; 2] = [
     "\x1b]0;FORGED\x07\x1b[2J\x1b[1;1H\u{9b}31mFORGED\u{202e}",
-    "a\nFORGED: every bit as written\r\x1b[KFORGED",
+    "a\nFORGED: unchanged since they were written\r\x1b[KFORGED",
 ];
 
 fn is_quiet(text: &str, line: &[&str]) {

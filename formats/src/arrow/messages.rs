@@ -99,7 +99,8 @@ impl<'a> Messages<'a> {
 
     fn read_footer(&mut self) -> Result<(), Diagnostic> {
         let bytes = self.bytes.as_slice();
-        let cut = || self.damaged("the file does not end with ARROW1; it is truncated, copy it again");
+        let cut =
+            || self.damaged("the file does not end with ARROW1; it is truncated, copy it again");
         let rest = bytes.strip_suffix(MAGIC).ok_or_else(cut)?;
         let (rest, length) = rest.split_last_chunk::<4>().ok_or_else(cut)?;
         let footer = usize::try_from(i32::from_le_bytes(*length)).ok();
@@ -213,7 +214,8 @@ impl<'a> Messages<'a> {
     }
 
     fn next_of_stream(&mut self) -> Result<Option<(Message<'a>, Buffer)>, Diagnostic> {
-        let cut = || self.damaged("the stream ends within a message; it is truncated, copy it again");
+        let cut =
+            || self.damaged("the stream ends within a message; it is truncated, copy it again");
         let bytes = self.bytes.as_slice();
         let mut rest = &bytes[self.at..];
         if rest.is_empty() {

@@ -70,14 +70,14 @@ impl FrameKeys {
         }
         // Rows without numbers are blank lines.
         if (rows.count as u64) < frames && hierarchy.columns > 0 {
-            let message = format!("{} rows of {frames} frames; is the file truncated?", rows.count);
+            let message = format!(
+                "{} rows of {frames} frames; is the file truncated?",
+                rows.count
+            );
             return Err(lines.refuse_end(Code::BvhCut, message));
         }
         if rows.count == 0 {
-            let end = lines.refuse_end(
-                Code::BvhNoFrames,
-                "no frames; nothing moves".to_owned(),
-            );
+            let end = lines.refuse_end(Code::BvhNoFrames, "no frames; nothing moves".to_owned());
             lines.warnings.push(end);
         }
         Ok(rows)

@@ -308,10 +308,10 @@ impl TextCell<'_> {
                 }
             }
             ColumnValues::Numbers(ColumnNumbers::F64(numbers)) => {
-                numbers.push(self.number(text, warnings)?)
+                numbers.push(self.number(text, warnings)?);
             }
             ColumnValues::Decimals(times, decimals) => {
-                self.time(text, times, decimals, warnings)?
+                self.time(text, times, decimals, warnings)?;
             }
             // Text has no other columns.
             ColumnValues::Numbers(ColumnNumbers::F32(_))

@@ -225,8 +225,7 @@ impl<'a> GltfReader<'a> {
                 });
             }
             if self.required.contains(name) {
-                let message =
-                    format!("the data needs the extension {name}, which is not known");
+                let message = format!("the data needs the extension {name}, which is not known");
                 return Err(self.json.refuse(&pointer, Code::Extension, message));
             }
         }
@@ -254,7 +253,9 @@ impl<'a> GltfReader<'a> {
             && !view.extensions.0.iter().any(is_compressed)
         {
             self.warn(Code::ByteStride, &format!("{pointer}/byteStride"), || {
-                format!("a stride of {stride} bytes is allowed only for vertices; it is used anyway")
+                format!(
+                    "a stride of {stride} bytes is allowed only for vertices; it is used anyway"
+                )
             });
         }
     }

@@ -221,7 +221,7 @@ impl NpzDocument {
                 }
                 MemberOutcome::Times => times(&mut members, sampled)?,
                 MemberOutcome::Constant => {
-                    members.bytes(path, &self.archive.unpack(index)?, deflated)?
+                    members.bytes(path, &self.archive.unpack(index)?, deflated)?;
                 }
                 MemberOutcome::Linear(axis) => {
                     let array = self.archive.array(index)?;

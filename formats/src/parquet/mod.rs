@@ -96,7 +96,9 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     };
     let [a, b, c, d, magic @ ..] = *tail;
     if magic != *MAGIC {
-        return refuse("the file does not end with PAR1; it is truncated, copy it again".to_owned());
+        return refuse(
+            "the file does not end with PAR1; it is truncated, copy it again".to_owned(),
+        );
     }
     let (length, limit) = (
         u32::from_le_bytes([a, b, c, d]),

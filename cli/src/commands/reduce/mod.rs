@@ -21,7 +21,7 @@ use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{
-    ResultArguments, check_holds_keys, check_sequence, document_to_rewrite, makes_new,
+    ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new,
 };
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
@@ -146,7 +146,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     let format = plan.targets.first().map(ResultTarget::format);
-    check_holds_keys(&plan)?;
+    check_stores_keys(&plan)?;
     check_sequence(arguments.sequence, format)?;
     let is_bessel = matches!(arguments.curve, ReducedCurve::BesselOverhauser);
     if is_bessel && format.is_some_and(|format| format.takes(FormatOption::AtKeys)) {

@@ -27,7 +27,7 @@ Examples:
   tumble route plaza.glb --walkers people.csv -o ways/
   tumble route hood.npy --by facets:40 --start-point 0,0,0 --end-point 1,0,1 -o way.csv";
 
-/// Find routes over a mesh or a surface: shortest ones, or approximations
+/// Find shortest routes over a mesh or a surface, exactly or approximately
 #[derive(Debug, Args)]
 #[command(after_help = format!("The surface is {}.\n{NOTES}", kinds()))]
 pub(crate) struct Arguments {

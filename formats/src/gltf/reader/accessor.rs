@@ -258,8 +258,9 @@ impl<'a> GltfReader<'a> {
             let index = index as usize;
             let count = numbers.len() / width;
             if index >= count || before.is_some_and(|before| index <= before) {
-                let message =
-                    format!("index {index} of {count} elements; indices must increase and be less than that");
+                let message = format!(
+                    "index {index} of {count} elements; indices must increase and be less than that"
+                );
                 return Err(refuse(message));
             }
             numbers[index * width..][..width].copy_from_slice(value);

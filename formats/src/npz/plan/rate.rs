@@ -33,7 +33,8 @@ impl ArchivePlan {
                 _ => Err(format!("{} numbers", numbers.len())),
             };
             let rate = rate.map_err(|found| {
-                let message = format!("{found} is not a frame rate; expected one number greater than 0");
+                let message =
+                    format!("{found} is not a frame rate; expected one number greater than 0");
                 archive.refuse(member, Code::FrameRate, message)
             })?;
             match self.rate {

@@ -1,5 +1,7 @@
 //! Passes over rotations that lie in buffers of an application's device: what is asked, and whether it fits.
 
+mod application_device;
+
 use glam::Quat;
 
 use crate::engine::Engine;
@@ -83,9 +85,9 @@ impl PosePass<'_> {
 #[derive(Debug, Clone, Copy)]
 #[must_use = "a pass does nothing until its result is sent somewhere"]
 pub struct PassRequest<'a> {
-    pub(super) engine: &'a Engine,
+    engine: &'a Engine,
     pass: PosePass<'a>,
-    pub(super) shape: PassShape,
+    shape: PassShape,
 }
 
 impl Engine {
@@ -134,7 +136,7 @@ impl<'a> PassRequest<'a> {
     }
 
     /// The device, the pass and its weights, where all fits.
-    pub(super) fn checked(
+    fn checked(
         &self,
         result: VulkanBuffer,
     ) -> Result<(&'a Opened, PassJob<'a>, Vec<f32>), Error> {
