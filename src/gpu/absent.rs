@@ -5,8 +5,6 @@
 pub(crate) mod cache;
 #[path = "error.rs"]
 pub(crate) mod error;
-#[path = "exclusive.rs"]
-pub(crate) mod exclusive;
 #[path = "options.rs"]
 pub(crate) mod options;
 #[path = "reports.rs"]

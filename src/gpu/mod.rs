@@ -60,7 +60,6 @@ pub(crate) mod crowd;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;
-pub(crate) mod exclusive;
 pub(crate) mod exported;
 pub(crate) mod handles;
 pub(crate) mod imported_memory;

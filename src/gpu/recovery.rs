@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::exclusive::Exclusive;
 use crate::gpu::job::ClipBuffers;
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
@@ -15,6 +14,7 @@ use crate::gpu::self_test::{self, SelfTestReport};
 use crate::output::encoding::Encoding;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Form, Kernel};
+use crate::threads::exclusive::Exclusive;
 use crate::threads::lock;
 
 /// How often a lost device is opened again for one call.

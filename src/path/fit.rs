@@ -64,7 +64,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
         cuts: 0,
     });
     let mut waiting: Vec<PendingSpan> = whole.collect();
-    prepared.segments.reserve_exact(spans.len());
+    prepared.segments.reserve(spans.len());
     let mut block: Vec<PendingSpan> = Vec::with_capacity(MAX_LANES);
     let mut block_spans: Vec<Span> = Vec::with_capacity(MAX_LANES);
     let mut lanes = Box::new(FittedLanes::zeroed());

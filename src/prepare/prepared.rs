@@ -319,7 +319,14 @@ impl Segments {
         self.arcs.len() + self.polynomials.len()
     }
 
-    pub(crate) fn reserve_exact(&mut self, count: usize) {
+    pub(crate) fn reserve(&mut self, count: usize) {
+        match self.form {
+            Form::Arc => self.arcs.reserve(count),
+            Form::Polynomial => self.polynomials.reserve(count),
+        }
+    }
+
+    fn reserve_exact(&mut self, count: usize) {
         match self.form {
             Form::Arc => self.arcs.reserve_exact(count),
             Form::Polynomial => self.polynomials.reserve_exact(count),

@@ -5,6 +5,7 @@
 //! would else, as rayon's workers do, take up other tasks of that pool while it waits, and one of these
 //! may need what the waiting call, or the caller around it, has locked.
 
+pub(crate) mod exclusive;
 pub(crate) mod stop;
 
 use std::cell::Cell;

@@ -19,7 +19,6 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::engine::from_keys::KeyUploads;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::exclusive::Exclusive;
 use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
@@ -41,6 +40,7 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
+use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
 
 /// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's

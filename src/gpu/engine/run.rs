@@ -9,7 +9,6 @@ use std::time::Instant;
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::exclusive::Exclusive;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
 use crate::gpu::job::Job;
@@ -21,6 +20,7 @@ use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
 use crate::shader::{Dispatch, Grid, Item, LINE, List, WORKGROUP};
+use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
 
 /// Bytes of the lines in which a card's memory is written, at most.
