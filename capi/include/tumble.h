@@ -704,6 +704,41 @@ typedef struct TumbleCrowdLayer {
   size_t mask;
 } TumbleCrowdLayer;
 
+/*
+ A layer's weight as a function of the clock: `from` before `start`, `to` from `ticks` later on, and between them in
+ equal parts for equal ticks.
+ */
+typedef struct TumbleCrowdFade {
+  /*
+   `sizeof(TumbleCrowdFade)`.
+   */
+  size_t size;
+  /*
+   The instance, from 0.
+   */
+  size_t instance;
+  /*
+   Its layer, from 1: the first has no weight.
+   */
+  size_t layer;
+  /*
+   When it starts, ticks of the clock; before now or later.
+   */
+  uint64_t start;
+  /*
+   How many ticks it takes; 0 for a step.
+   */
+  uint64_t ticks;
+  /*
+   The weight before, 0 to 1, kept in units of 2^-15.
+   */
+  float from;
+  /*
+   The weight after, likewise.
+   */
+  float to;
+} TumbleCrowdFade;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1340,6 +1375,74 @@ TumbleResult tumble_crowd_clock(const struct TumbleCrowd *crowd, uint64_t *ticks
  Frees a crowd, after waiting for what was submitted; its targets stay. Null is allowed.
  */
 TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
+
+/*
+ Sets the weight of a layer above the first, 0 to 1, kept in units of 2^-15. The rest of what it plays goes on, and
+ a fade of it ends.
+ */
+TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
+                                     size_t instance,
+                                     size_t layer,
+                                     float weight);
+
+/*
+ Lets the weight of a layer above the first go from what it is now to `weight`, in equal parts for equal ticks of
+ the clock, within `ticks`; 0 is at once. From then on it stays. Another fade of the layer, `tumble_crowd_set` and
+ `tumble_crowd_set_weight` end it.
+ */
+TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
+                               size_t instance,
+                               size_t layer,
+                               float weight,
+                               uint64_t ticks);
+
+/*
+ Sets the weight of a layer above the first as a function of the clock: as `tumble_crowd_fade`, from any weight and
+ any time. What `tumble_crowd_get_fade` reports, set in another crowd whose clock stands at the same time, gives
+ the same weights at all times.
+
+ # Safety
+ `fade` is such a structure.
+ */
+TumbleResult tumble_crowd_set_fade(struct TumbleCrowd *crowd,
+                                   const struct TumbleCrowdFade *fade);
+
+/*
+ The fade that the weight of a layer follows, with its weights as they were rounded; one that has ended too, for
+ the clock may go back. `fade->size`, `fade->instance` and `fade->layer` say which. `fades`: whether there is one;
+ where there is none, the structure stays as it is.
+
+ # Safety
+ `fade` is such a structure, which nothing else uses during the call, and `fades` has room for a truth value.
+ */
+TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
+                                   struct TumbleCrowdFade *fade,
+                                   bool *fades);
+
+/*
+ From now on evaluates the instances of a list alone, as a camera sees them: a result has their rows and no others,
+ in the list's order, with the bits that they have among all. The others go on meanwhile. The list is in any
+ order, names no instance twice, and may be empty; it is copied. If it is refused, everything stays.
+
+ # Safety
+ `instances` has `count` numbers.
+ */
+TumbleResult tumble_crowd_set_visible(struct TumbleCrowd *crowd,
+                                      const uint32_t *instances,
+                                      size_t count);
+
+/*
+ From now on evaluates all instances again.
+ */
+TumbleResult tumble_crowd_set_all_visible(struct TumbleCrowd *crowd);
+
+/*
+ How many instances are evaluated: as many as the list has, or all.
+
+ # Safety
+ `count` has room for a number.
+ */
+TumbleResult tumble_crowd_visible_count(const struct TumbleCrowd *crowd, size_t *count);
 
 /*
  How many numbers a result has: 4 or 12 × joints × instances, those that are visible.

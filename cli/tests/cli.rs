@@ -307,7 +307,7 @@ fn outputs_have_their_shapes_and_names() {
         ),
         (
             ["--output", "velocity", "--after", "mirror"],
-            "not mirrored",
+            "cannot be mirrored",
         ),
     ] {
         let line = [&["eval", "a.dat", "-o", "no.npy"][..], &wrong].concat();

@@ -26,7 +26,7 @@ pub struct PathFormat {
     /// Whether a file that begins with these bytes is one, whatever it holds.
     pub probe: fn(&[u8]) -> bool,
     /// Whether a file of the format that begins with these bytes is one of paths.
-    pub holds_paths: fn(&[u8]) -> bool,
+    pub is_of_paths: fn(&[u8]) -> bool,
     /// Reads the paths of the bytes of a file; the text is what messages call it.
     pub read_bytes: fn(&str, &[u8]) -> Result<Vec<PathPoints>, Diagnostic>,
 }
@@ -92,7 +92,7 @@ pub fn looks_like_paths(path: &Path) -> bool {
     }
     let read =
         std::fs::File::open(path).and_then(|file| file.take(MAX_HEADER).read_to_end(&mut start));
-    read.is_ok() && (PathFormat::detect(&start).holds_paths)(&start)
+    read.is_ok() && (PathFormat::detect(&start).is_of_paths)(&start)
 }
 
 /// More than the header of an array or the first line of a table needs.

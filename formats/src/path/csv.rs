@@ -12,7 +12,7 @@ pub static FORMAT: PathFormat = PathFormat {
     summary: "one point per row, with the columns `t,x,y,z,ux,uy,uz`; the time `t` and the upward direction \
               `ux,uy,uz` are optional, and upward directions may be blank",
     probe: |_| false,
-    holds_paths,
+    is_of_paths,
     read_bytes: |file, bytes| Ok(vec![read_text(file, bytes)?]),
 };
 
@@ -20,7 +20,7 @@ pub static FORMAT: PathFormat = PathFormat {
 const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
 
 /// Whether the first line names the columns of points.
-fn holds_paths(start: &[u8]) -> bool {
+fn is_of_paths(start: &[u8]) -> bool {
     let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next();
     let line = String::from_utf8_lossy(line.unwrap_or_default()).to_lowercase();
     let names = line.trim_start_matches('\u{feff}').split(',');

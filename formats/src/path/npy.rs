@@ -11,7 +11,7 @@ pub static FORMAT: PathFormat = PathFormat {
     name: "npy",
     summary: "a NumPy array of floats of shape (tracks, points, 3), without times",
     probe: npy::FORMAT.probe,
-    holds_paths: |start| npy::shape_of(start).is_some_and(|shape| matches!(shape[..], [_, _, 3])),
+    is_of_paths: |start| npy::shape_of(start).is_some_and(|shape| matches!(shape[..], [_, _, 3])),
     read_bytes: read_array,
 };
 

@@ -41,8 +41,8 @@ impl ArchivePlan {
                 None => (self.rate, self.rate_member, before) = (Some(rate), Some(member), name),
                 Some(first) if first != rate => {
                     self.two_rates = Some(format!(
-                        "`{before}` says {first} frames a second, `{name}` {rate}; the first is taken, \
-                         --source-fps says another"
+                        "`{before}` says {first} frames a second, `{name}` {rate}; the first is used, \
+                         --source-fps overrides it"
                     ));
                 }
                 Some(_) => {}
