@@ -217,7 +217,7 @@ fn a_handle_that_was_freed_or_is_another_is_refused() {
     fails(try_with(null(), set), invalid, "the engine is null");
     fails(try_with(engine, null()), invalid, "the set is null");
     fails(try_with(set.cast(), set), invalid, "kind `engine`");
-    fails(try_with(engine, dangling()), invalid, "never given");
+    fails(try_with(engine, dangling()), invalid, "never existed");
     assert_eq!(tumble_set_free(set), TumbleResult::Ok);
     fails(try_with(engine, set), invalid, "was freed");
     fails(tumble_set_free(set), invalid, "was freed");

@@ -52,7 +52,7 @@ fn handles_of_crowds_are_checked() {
     fails(
         evaluate(dangling_mut(), 0, &mut memory),
         invalid,
-        "never given",
+        "never existed",
     );
     let set = one_track();
     fails(
@@ -172,7 +172,7 @@ fn libraries_refuse_what_does_not_fit() {
         ));
         let pushed =
             tumble_crowd_library_push(single, set, &raw const velocity, null(), null_mut());
-        fails(pushed, input, "a crowd takes rotations");
+        fails(pushed, input, "a crowd needs rotations");
         let clip = std::ptr::without_provenance_mut(3);
         let pushed = tumble_crowd_library_push(single, set, null(), null(), clip);
         fails(
