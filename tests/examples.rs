@@ -26,7 +26,10 @@ fn every_example_runs_and_says_what_it_found() {
             "crowd" => (&["300", drawn], " 0 differ from the CPU's, 0 allocations"),
             "into_memory" => (&["8", "3", "5"], "0."),
             "application_device" if !has_vulkan => continue, // in CI its absence has failed already
-            "application_device" => (&[], "60 joints of two clips mixed, in the world, 0 values differ"),
+            "application_device" => (
+                &[],
+                "60 joints of two clips mixed, in the world, 0 values differ",
+            ),
             "same_bits" => (&[], ""),
             _ => panic!("{name}: say here what it prints"),
         };

@@ -311,7 +311,14 @@ fn bad_inputs_and_lines() {
     fs::write(folder.join("pairs.txt"), "1 2 3\n").unwrap();
     fs::write(folder.join("hill.txt"), "").unwrap();
     fs::write(folder.join("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 1 3 4 2\nf 1 2 6 5\nf 1 5 7 3\nf 8 7 5 6\nf 8 6 2 4\nf 8 4 3 7\n").unwrap();
-    let ends = ["--start-point", "0,0,0", "--end-point", "1,1,1", "-o", "out.csv"];
+    let ends = [
+        "--start-point",
+        "0,0,0",
+        "--end-point",
+        "1,1,1",
+        "-o",
+        "out.csv",
+    ];
     for (code, words, message) in [
         (4, vec!["route", "flat.obj"], "face 0 (from 0) has no area"),
         (4, vec!["route", "empty.ply"], "no faces"),

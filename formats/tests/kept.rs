@@ -362,9 +362,9 @@ fn weights_are_not_cut_and_that_is_said() {
     };
     assert_eq!(warning.code, Code::StaysWhole);
     assert!(
-        warning
-            .to_string()
-            .contains(":/animations/0: warning[W111]: 1 channel of weights or another property is not cut"),
+        warning.to_string().contains(
+            ":/animations/0: warning[W111]: 1 channel of weights or another property is not cut"
+        ),
         "{warning}"
     );
     let written = json_of(&glb);

@@ -419,7 +419,15 @@ fn pictures_are_refused_before_anything_is_written() {
     succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
     let before = entries(folder);
     let route = [
-        "route", "hill.obj", "--start-point", "1,0,1", "--end-point", "8,0,8", "-o", "way.csv", "--plot",
+        "route",
+        "hill.obj",
+        "--start-point",
+        "1,0,1",
+        "--end-point",
+        "8,0,8",
+        "-o",
+        "way.csv",
+        "--plot",
     ];
     let smooth = ["smooth", "a.dat", "--fps", "30", "-o", "o.npy", "--plot"];
     let reduce = ["reduce", "a.dat", "--fps", "30", "-o", "o.npz", "--plot"];

@@ -136,10 +136,7 @@ impl<'a> PassRequest<'a> {
     }
 
     /// The device, the pass and its weights, where all fits.
-    fn checked(
-        &self,
-        result: VulkanBuffer,
-    ) -> Result<(&'a Opened, PassJob<'a>, Vec<f32>), Error> {
+    fn checked(&self, result: VulkanBuffer) -> Result<(&'a Opened, PassJob<'a>, Vec<f32>), Error> {
         let Backend::Vulkan(opened) = &*self.engine.backend else {
             return Err(Error::BufferOnCpu);
         };
