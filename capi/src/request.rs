@@ -1,5 +1,5 @@
 //! What is asked of a clip beside its samples: an encoding, some of the tracks and samples; and where the result goes:
-//! the caller's memory, or an application's own command buffers.
+//! the caller's memory, or an application's command buffers.
 
 use std::ffi::{CString, c_char, c_void};
 use std::sync::LazyLock;

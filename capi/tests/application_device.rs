@@ -1,4 +1,4 @@
-//! Crowds and clips on an application's own Vulkan device, through the functions that C has.
+//! Crowds and clips on an application's Vulkan device, through the functions that C has.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use std::ffi::{CStr, c_void};

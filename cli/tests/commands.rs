@@ -83,7 +83,7 @@ fn the_table_of_commands_is_that_of_the_program() {
 /// A file of tests that is not in the list would never run.
 #[test]
 fn every_file_of_tests_is_run() {
-    /// Programs of their own (`Cargo.toml`), and those that only Unix has.
+    /// Separate programs (`Cargo.toml`), and those that only Unix has.
     const PROGRAMS: [&str; 3] = ["all", "fuzz", "options"];
     const UNIX: [&str; 2] = ["attack", "remedies"];
     let entries = fs::read_dir(here().join("tests")).unwrap();

@@ -113,7 +113,7 @@ fn is_valid(clip: &Motion) {
 /// byte. Gives why that is refused.
 fn rewritten(clip: &Motion, format: &Format) -> Option<Code> {
     let Ok(samples) = keyed(clip) else {
-        return None; // channels at their own times, or tangents
+        return None; // channels at separate times, or tangents
     };
     let rate = clip.rate.or_else(|| clip.rate_of_keys());
     let (bytes, warnings) = match written(clip, &samples, rate, format) {

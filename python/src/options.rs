@@ -212,7 +212,7 @@ fn samples(
     match (rate, times) {
         (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
         (None, Some(_)) if start.is_some() || end.is_some() => Err(input(
-            "`start` and `end` go with `fps`; `at` says all times",
+            "`start` and `end` need `fps`; `at` lists all times",
         )),
         (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
         (None, Some(times)) => arrays::sample_times(&times).map(Some),

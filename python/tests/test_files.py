@@ -148,7 +148,7 @@ def test_messages_name_keywords(tmp_path):
     with pytest.raises(tumble.InputError, match='duplicates="first" or "last" keeps one'):
         tumble.load(path)
     np.savez(tmp_path / "own.npz", foo=np.zeros((10, 4)))
-    with pytest.raises(tumble.InputError, match='map="rotations=ARRAY:wxyz,time=ARRAY" tells'):
+    with pytest.raises(tumble.InputError, match='say what they are with map="rotations=ARRAY:wxyz,time=ARRAY"'):
         tumble.load(tmp_path / "own.npz")
 
 

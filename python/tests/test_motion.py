@@ -140,7 +140,7 @@ def test_wrong_arguments_are_refused(clips, rng):
     with pytest.raises(tumble.InputError, match="no skeleton"):
         tumble.MotionLibrary([other])
     scaled = tumble.Clip([0.0, 1.0], unit(rng, 1, 2), parents=[None], scales=np.ones((1, 2, 3)))
-    with pytest.raises(tumble.InputError, match="scales"):
+    with pytest.raises(tumble.InputError, match="scale keys"):
         tumble.MotionLibrary([scaled])
 
 

@@ -109,6 +109,8 @@ fn prepare(
             preparation.only_for(timeline, set);
         }
         let keys = match &batch {
+            // As many as have a sample; these lists are not kept.
+            Batch::Intervals { .. } if preparation.leaves_intervals_out() => 0,
             Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
             Batch::Span { .. } | Batch::Intervals { .. } => {
                 let intervals = batch.intervals(set);

@@ -94,6 +94,11 @@ impl Preparation {
         }
     }
 
+    /// Whether intervals without a sample are left out.
+    pub(crate) fn leaves_intervals_out(&self) -> bool {
+        matches!(&self.strategy, Strategy::Smooth(smooth) if smooth.frames.is_some())
+    }
+
     /// Prepares intervals of a set's tracks; each range of intervals becomes a part.
     pub(crate) fn push(
         &mut self,
@@ -241,7 +246,7 @@ fn first_sample(time: f64, timeline: &Timeline, steps: bool) -> usize {
 /// How a set is cut into batches.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BatchSize {
-    /// The most keys and the most tracks of a batch; a track with more keys is a batch of its own.
+    /// The most keys and the most tracks of a batch; a track with more keys is a batch by itself.
     pub(crate) keys: usize,
     pub(crate) tracks: usize,
     /// A track with more keys is cut after this many intervals; `None` if it may not be cut.

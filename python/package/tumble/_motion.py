@@ -282,7 +282,7 @@ class MotionLibrary:
     ) -> MotionLibrary:
         missing = [name for name in _STORED if name not in arrays]
         if missing or int(arrays["version"]) != _VERSION:
-            raise InputError(f"{file or 'arrays'}: no motion library of this version of tumble")
+            raise InputError(f"{file or 'arrays'}: not a motion library of this version of tumble")
         self = cls.__new__(cls)
         self.names = [str(name) for name in arrays["names"]]
         self.lengths = np.asarray(arrays["lengths"])

@@ -312,7 +312,7 @@ impl EvaluationJob<'_> {
             && self.keeps(target)
     }
 
-    /// Whether the input's own file can be written again.
+    /// Whether the input's file can be written again.
     fn keeps(&self, target: &ResultTarget) -> bool {
         let document = self.work.input.loaded.document.as_ref();
         !self.work.input.loaded.is_adjusted
@@ -325,7 +325,7 @@ impl EvaluationJob<'_> {
         self.arguments.output.is_rotations() && target.format().takes_motion(clips)
     }
 
-    /// Clips as a file of their own.
+    /// Clips as a separate file.
     fn motion(
         &mut self,
         name: &str,
@@ -344,7 +344,7 @@ impl EvaluationJob<'_> {
         self.written(name, clips, &times, rate, target, None)
     }
 
-    /// The input's own file, everything kept but the keys of some of its animations.
+    /// The input's file, everything kept but the keys of some of its animations.
     fn bake(
         &mut self,
         name: &str,
@@ -524,7 +524,7 @@ impl EvaluationJob<'_> {
                 })
                 .map_err(|error| Failure::evaluating(name, &error))?;
             let written = target.write_whole(&result, &found)?;
-            let method = "each channel's own method";
+            let method = "each channel's method";
             return Ok(self.evaluated(extent, method, written, order));
         };
         let interpolation = with(method);
