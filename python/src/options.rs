@@ -211,9 +211,9 @@ fn samples(
 ) -> PyResult<Option<SampleRequest>> {
     match (rate, times) {
         (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
-        (None, Some(_)) if start.is_some() || end.is_some() => Err(input(
-            "`start` and `end` need `fps`; `at` lists all times",
-        )),
+        (None, Some(_)) if start.is_some() || end.is_some() => {
+            Err(input("`start` and `end` need `fps`; `at` lists all times"))
+        }
         (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
         (None, Some(times)) => arrays::sample_times(&times).map(Some),
         (None, None) if start.is_some() || end.is_some() => {
