@@ -319,7 +319,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 let bytes = request.evaluate_bytes().unwrap();
                 let buffer = ApplicationBuffer::of(&application, &vec![0; bytes.len()]);
                 let range = buffer.range(0, bytes.len() as u64);
-                if std::ptr::eq(engine, &cpu) {
+                if std::ptr::eq(engine, &raw const cpu) {
                     return [bytes.clone(), bytes];
                 }
                 // SAFETY: the buffer is as it must be, and nobody else uses it.

@@ -51,7 +51,7 @@ fn bits(set: &TrackSet) -> Vec<(Vec<u64>, Vec<[u32; 4]>)> {
         .collect()
 }
 
-/// ByteReader from bytes, wild ones among them.
+/// Values from bytes, wild ones among them.
 struct ByteReader<'a>(&'a [u8]);
 
 impl ByteReader<'_> {

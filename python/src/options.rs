@@ -97,7 +97,7 @@ impl Request {
                 "before" => interpolation.before = option_of(&value, "before")?,
                 "after" => interpolation.after = option_of(&value, "after")?,
                 "tension" => {
-                    interpolation.tcb.tension = arrays::number(&value, "tension", "a number")?
+                    interpolation.tcb.tension = arrays::number(&value, "tension", "a number")?;
                 }
                 "continuity" => {
                     interpolation.tcb.continuity =

@@ -320,6 +320,7 @@ impl Method {
     /// Its textbook definition in f64. A method does not carry it: only programs that compare with the
     /// reference link it.
     #[must_use]
+    #[allow(clippy::missing_panics_doc)] // every method has one, or the engine does not compile
     pub fn reference(&self) -> Definition {
         reference::definition(self.name).expect("every method has one, as is checked above")
     }

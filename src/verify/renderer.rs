@@ -340,7 +340,7 @@ fn passes(
         bytemuck::cast_slice(world.as_slice()).to_vec(),
     ];
     let samples = from.sample_count();
-    let size = (from.as_quats().len() * size_of::<Quat>()) as u64;
+    let size = size_of_val(from.as_quats()) as u64;
     let step = size.next_multiple_of(256);
     let room = 5 * step + 2 * size;
     let buffer = renderer.untouched(room)?;

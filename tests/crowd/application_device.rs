@@ -61,9 +61,9 @@ fn frames_are_recorded_into_an_applications_commands() {
             }
             crowd.advance(0.1).unwrap();
             expected.advance(0.1).unwrap();
-            // SAFETY: the commands are in recording, and submitted below in this order.
             frames.push(commands.recorded(|command_buffer| {
-                unsafe { crowd.record(target, command_buffer) }.unwrap()
+                // SAFETY: the commands are in recording, and submitted below in this order.
+                unsafe { crowd.record(target, command_buffer) }.unwrap();
             }));
             let mut bytes = vec![0u8; size as usize];
             match output.is_half {
@@ -177,10 +177,11 @@ fn frames_of_visible_instances_are_recorded() {
             offset: 0,
             size,
         };
-        // SAFETY: the buffer is as it must be, and outlives the target; here and below.
+        // SAFETY: the buffer is as it must be, and outlives the target.
         let refused = unsafe { crowd.target(output, range) }.unwrap_err();
         assert!(matches!(refused, CrowdError::Buffer { .. }));
         crowd.set_visible(&[0]).unwrap();
+        // SAFETY: as above.
         let target = unsafe { crowd.target(output, range) }.unwrap();
         let commands = Commands::new(&application);
         for (frame, count) in [3, ROOM, 0, 17, 17].into_iter().enumerate() {
@@ -195,8 +196,8 @@ fn frames_of_visible_instances_are_recorded() {
             }
             crowd.advance(0.1).unwrap();
             expected.advance(0.1).unwrap();
-            // SAFETY: the commands are in recording, and submitted below.
             let recorded = commands.recorded(|command_buffer| {
+                // SAFETY: the commands are in recording, and submitted below.
                 unsafe { crowd.record(&target, command_buffer) }.unwrap();
             });
             commands.run(&[recorded]);

@@ -118,8 +118,8 @@ pub unsafe extern "C" fn tumble_crowd_get(
                 requested.instance,
                 requested.layer,
                 plays,
-            ))
-        };
+            ));
+        }
         Ok(())
     })
 }

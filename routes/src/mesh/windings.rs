@@ -43,7 +43,7 @@ pub(super) fn wind_alike(vertices: usize, faces: &mut [[u32; 3]]) -> Rewinding {
                         piece.push(twin as usize / 3);
                     }
                     Some(known) => {
-                        rewinding.is_one_sided |= known != (is_against != same_direction)
+                        rewinding.is_one_sided |= known != (is_against != same_direction);
                     }
                 }
             }

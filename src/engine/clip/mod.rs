@@ -109,13 +109,7 @@ impl Clip {
         output: &mut [u8],
     ) -> Result<(), Error> {
         check_encoding(encoding, self.quantity())?;
-        check_window(
-            &window,
-            self.track_count(),
-            timeline.len(),
-            encoding,
-            output,
-        )?;
+        check_window(window, self.track_count(), timeline.len(), encoding, output)?;
         if output.is_empty() {
             return Ok(());
         }

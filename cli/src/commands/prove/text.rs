@@ -189,7 +189,7 @@ fn bits(proof: &Proof, text: &mut String) {
     match &proof.validation {
         None => text.push_str("  validation        not asked for (--validate)\n"),
         Some(validation) if !validation.has_run => {
-            text.push_str("  validation        did not run\n")
+            text.push_str("  validation        did not run\n");
         }
         Some(validation) => {
             let _ = writeln!(

@@ -71,6 +71,7 @@ pub struct Request<'a> {
 
 /// What is evaluated.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::large_enum_variant)] // it lives on the stack of one call, and is copied
 enum RequestSource<'a> {
     Clip(&'a Clip),
     Set {
