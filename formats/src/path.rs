@@ -1,5 +1,5 @@
 //! Paths that bodies follow. A format is a file that names it in a `FORMAT`, and a line in the table
-//! [`PATHS`](crate::PATHS).
+//! [`PATHS`].
 
 pub mod csv;
 pub mod npy;

@@ -1,6 +1,6 @@
 //! Tumble for JavaScript: the WebAssembly module behind the npm package `tumble`.
 //!
-//! A call is a number ([`calls`]), a header in JSON and bytes behind it; its answer is JSON and arrays of
+//! A call is a number (`calls`), a header in JSON and bytes behind it; its answer is JSON and arrays of
 //! numbers. JavaScript writes the call where [`tumble_input`] says, and copies the answer from where it lies:
 //! five functions and no generated code. `npm/package/core.js` is the other side.
 

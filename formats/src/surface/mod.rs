@@ -1,5 +1,5 @@
 //! Files of surfaces, on which routes lie and bodies stand: meshes of polygons, and nets of control points. A
-//! format is a file that names it in a `FORMAT`, and a line in the table [`SURFACES`](crate::SURFACES).
+//! format is a file that names it in a `FORMAT`, and a line in the table [`SURFACES`].
 
 pub mod net;
 pub mod obj;
