@@ -36,21 +36,6 @@ impl ComponentType {
         }
     }
 
-    /// The number that begins with these bytes, of which there are enough.
-    fn number(self, bytes: &[u8]) -> f64 {
-        fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
-            bytes.first_chunk().copied().unwrap_or([0; N])
-        }
-        match self {
-            Self::I8 => f64::from(i8::from_le_bytes(first(bytes))),
-            Self::U8 => f64::from(u8::from_le_bytes(first(bytes))),
-            Self::I16 => f64::from(i16::from_le_bytes(first(bytes))),
-            Self::U16 => f64::from(u16::from_le_bytes(first(bytes))),
-            Self::U32 => f64::from(u32::from_le_bytes(first(bytes))),
-            Self::F32 => f64::from(f32::from_le_bytes(first(bytes))),
-        }
-    }
-
     /// The fraction that a normalised integer stands for (glTF 2.0, 3.11).
     fn fraction(self, number: f64) -> f64 {
         match self {
@@ -73,11 +58,32 @@ struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    fn numbers(&self) -> impl Iterator<Item = f64> {
-        (0..self.count).flat_map(move |element| {
-            let bytes = &self.bytes[element * self.stride..];
-            (0..self.width).map(move |i| self.component.number(&bytes[i * self.component.size()..]))
-        })
+    fn numbers(&self) -> Vec<f64> {
+        match self.component {
+            ComponentType::I8 => self.each(|bytes| f64::from(i8::from_le_bytes(bytes))),
+            ComponentType::U8 => self.each(|bytes| f64::from(u8::from_le_bytes(bytes))),
+            ComponentType::I16 => self.each(|bytes| f64::from(i16::from_le_bytes(bytes))),
+            ComponentType::U16 => self.each(|bytes| f64::from(u16::from_le_bytes(bytes))),
+            ComponentType::U32 => self.each(|bytes| f64::from(u32::from_le_bytes(bytes))),
+            ComponentType::F32 => self.each(|bytes| f64::from(f32::from_le_bytes(bytes))),
+        }
+    }
+
+    /// What `number` makes of the bytes of each component.
+    fn each<const SIZE: usize>(&self, number: impl Fn([u8; SIZE]) -> f64) -> Vec<f64> {
+        let used = self.width * SIZE;
+        let mut numbers = Vec::with_capacity(self.count * self.width);
+        let mut add = |bytes: &[u8]| {
+            numbers.extend(bytes.as_chunks().0.iter().map(|bytes| number(*bytes)));
+        };
+        if self.stride == used {
+            add(&self.bytes[..self.count * used]);
+        } else {
+            for element in self.bytes.chunks(self.stride).take(self.count) {
+                add(&element[..used]);
+            }
+        }
+        numbers
     }
 }
 
@@ -147,7 +153,7 @@ impl<'a> GltfReader<'a> {
                 let named = format!("{pointer}/bufferView");
                 let range = (view, accessor.byte_offset, accessor.count);
                 let elements = self.elements(range, (component, width), (&pointer, &named))?;
-                elements.numbers().collect()
+                elements.numbers()
             }
             None if self.fits(accessor.count) => vec![0.0; accessor.count as usize * width],
             None => {
@@ -212,7 +218,8 @@ impl<'a> GltfReader<'a> {
         let named = format!("{pointer}/bufferView");
         let range = (view, accessor.byte_offset, accessor.count);
         let elements = self.elements(range, (component, width), (&pointer, &named))?;
-        Ok(elements.numbers().map(|number| number as u32).collect())
+        let numbers = elements.numbers();
+        Ok(numbers.into_iter().map(|number| number as u32).collect())
     }
 
     /// Overwrites values by those of a sparse accessor.
@@ -249,12 +256,15 @@ impl<'a> GltfReader<'a> {
             sparse.values.byte_offset,
             sparse.count,
         );
-        let values: Vec<f64> = self
+        let values = self
             .elements(values_range, (component, width), (&values_pointer, &named))?
-            .numbers()
-            .collect();
+            .numbers();
         let mut before = None;
-        for (index, value) in indices.numbers().zip(values.chunks_exact(width)) {
+        for (index, value) in indices
+            .numbers()
+            .into_iter()
+            .zip(values.chunks_exact(width))
+        {
             let index = index as usize;
             let count = numbers.len() / width;
             if index >= count || before.is_some_and(|before| index <= before) {
