@@ -147,6 +147,36 @@ fn every_box_has_a_panel_and_every_method_a_curve() {
     }
 }
 
+/// Panels of a skeleton are called by its joints; of a long name the end is shown.
+#[test]
+fn panels_have_the_names_of_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = "a name with more characters than a panel has room for: left hand";
+    let text = format!(
+        "HIERARCHY\nROOT hips\n{{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n\
+         JOINT {}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n\
+         End Site\n{{\nOFFSET 0 1 0\n}}\n}}\n}}\n\
+         MOTION\nFrames: 2\nFrame Time: 0.5\n0 0 0 0 0 0\n90 0 0 0 45 0\n",
+        long.replace(' ', "_")
+    );
+    fs::write(folder.path().join("a.dat"), text).unwrap();
+    let hand = "…nel_has_room_for:_left_hand";
+    for show in ["speed", "error", "sphere"] {
+        let marks = plot(folder.path(), &["--show", show]);
+        assert!(marks.says("hips") && marks.says(hand), "{:?}", marks.texts);
+    }
+    let marks = plot(folder.path(), &[]);
+    assert!(
+        marks.says("hips: dimensions 1 to 4") && marks.says(&format!("{hand}: dimensions 5 to 8"))
+    );
+    let marks = plot(folder.path(), &["--dimension", "6"]);
+    assert!(
+        marks.says(&format!("dimension 6: x of {hand}")),
+        "{:?}",
+        marks.texts
+    );
+}
+
 #[test]
 fn speed_error_and_sphere_are_drawn_for_each_box() {
     let folder = sample_folder();

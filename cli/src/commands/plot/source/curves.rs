@@ -4,6 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::error_bound;
 use tumble::{Axes, Interpolation, Quantity};
+use tumble_formats::printable::printable;
 
 use crate::arguments::device::OpenedDevice;
 use crate::commands::plot::figure::{
@@ -125,6 +126,20 @@ impl PlotSource<'_> {
         legend
     }
 
+    /// The name of its track, such as a joint's; `box 1` where it has none. Of long names the end tells joints apart.
+    fn box_name(&self, index: usize) -> String {
+        /// Characters for which a panel has room.
+        const LONGEST: usize = 28;
+        let Some(name) = self.set.track(index).name.filter(|name| !name.is_empty()) else {
+            return format!("box {}", index + 1);
+        };
+        let name = printable(name);
+        match name.chars().count().checked_sub(LONGEST) {
+            Some(over @ 1..) => format!("…{}", name.chars().skip(over + 1).collect::<String>()),
+            _ => name.into_owned(),
+        }
+    }
+
     /// Components of one box: one colour each where they share a panel, else the methods'.
     fn components(
         &self,
@@ -170,13 +185,13 @@ impl PlotSource<'_> {
                 let dimension = index * 4 + one + 1;
                 let name = NAMES[*one];
                 (
-                    format!("dimension {dimension}: {name} of box {}", index + 1),
+                    format!("dimension {dimension}: {name} of {}", self.box_name(index)),
                     name,
                 )
             }
             _ => {
                 let (first, last) = (index * 4 + 1, index * 4 + 4);
-                let title = format!("box {}: dimensions {first} to {last}", index + 1);
+                let title = format!("{}: dimensions {first} to {last}", self.box_name(index));
                 (title, "component")
             }
         };
@@ -236,7 +251,7 @@ impl PlotSource<'_> {
             .iter()
             .flat_map(|curve| curve.pieces.iter().flatten());
         let high = range_of(all.map(|point| point.1).chain([0.0])).end;
-        let title = format!("box {}", index + 1);
+        let title = self.box_name(index);
         let mut panel = self.panel(title, "angular speed, rad/s", 0.0..high, curves, vec![]);
         panel.uprights = self.key_positions(index);
         Ok(panel)
@@ -275,7 +290,7 @@ impl PlotSource<'_> {
             .iter()
             .flat_map(|curve| curve.pieces.iter().flatten());
         let range = range_of(all.map(|point| point.1).chain([level, level - 3.0]));
-        let title = format!("box {}", index + 1);
+        let title = self.box_name(index);
         let mut panel = self.panel(title, "error, rad", range, curves, vec![]);
         if let PanelAxes::Plane { y, .. } = &mut panel.axes {
             y.range = y.range.start.floor()..(y.range.end + 0.3);
@@ -319,7 +334,7 @@ impl PlotSource<'_> {
             });
         }
         Ok(Panel {
-            title: format!("box {}", index + 1),
+            title: self.box_name(index),
             axes: PanelAxes::Sphere,
             curves,
             dots,
