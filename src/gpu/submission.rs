@@ -384,52 +384,46 @@ impl<'a> Commands<'a> {
     pub(crate) fn barrier_over(self, from: Access, to: Access, ranges: &[Binding]) {
         /// The most ranges; what is recorded allocates nothing.
         const MAX_RANGES: usize = 6;
-        let (source_stage, source_access) = from.scope(true);
-        let (destination_stage, destination_access) = to.scope(false);
-        let mut memory = [vk::BufferMemoryBarrier::default(); MAX_RANGES];
-        for (barrier, range) in memory.iter_mut().zip(ranges) {
+        let mut buffers = [vk::BufferMemoryBarrier::default(); MAX_RANGES];
+        for (barrier, range) in buffers.iter_mut().zip(ranges) {
             *barrier = barrier
-                .src_access_mask(source_access)
-                .dst_access_mask(destination_access)
+                .src_access_mask(from.scope(true).1)
+                .dst_access_mask(to.scope(false).1)
                 .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                 .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                 .buffer(range.buffer)
                 .offset(range.offset)
                 .size(range.size);
         }
-        let memory = &memory[..ranges.len()];
-        let none = vk::DependencyFlags::empty();
-        // SAFETY: as in `dispatch`; the ranges lie within their buffers.
-        unsafe {
-            self.device.cmd_pipeline_barrier(
-                self.raw,
-                source_stage,
-                destination_stage,
-                none,
-                &[],
-                memory,
-                &[],
-            );
-        }
+        self.order(from, to, &[], &buffers[..ranges.len()]);
     }
 
     /// Records a barrier: what `from` wrote before it is visible to `to` after it.
     pub(crate) fn barrier(self, from: Access, to: Access) {
-        let (source_stage, source_access) = from.scope(true);
-        let (destination_stage, destination_access) = to.scope(false);
-        let memory = [vk::MemoryBarrier::default()
-            .src_access_mask(source_access)
-            .dst_access_mask(destination_access)];
+        let memory = vk::MemoryBarrier::default()
+            .src_access_mask(from.scope(true).1)
+            .dst_access_mask(to.scope(false).1);
+        self.order(from, to, &[memory], &[]);
+    }
+
+    fn order(
+        self,
+        from: Access,
+        to: Access,
+        memory: &[vk::MemoryBarrier<'_>],
+        buffers: &[vk::BufferMemoryBarrier<'_>],
+    ) {
+        let (source, destination) = (from.scope(true).0, to.scope(false).0);
         let none = vk::DependencyFlags::empty();
-        // SAFETY: as in `dispatch`.
+        // SAFETY: as in `dispatch`; ranges lie within their buffers.
         unsafe {
             self.device.cmd_pipeline_barrier(
                 self.raw,
-                source_stage,
-                destination_stage,
+                source,
+                destination,
                 none,
-                &memory,
-                &[],
+                memory,
+                buffers,
                 &[],
             );
         }

@@ -342,26 +342,18 @@ fn no_name_reaches_a_terminal_as_it_is() {
             "-o",
             "ways/",
         ]);
-        lines.push(vec![
-            "route",
-            "word.obj",
-            "--start-point",
-            "0,0,0",
-            "--end-point",
-            "1,0,0",
-            "-o",
-            "w.csv",
-        ]);
-        lines.push(vec![
-            "route",
-            "word.ply",
-            "--start-point",
-            "0,0,0",
-            "--end-point",
-            "1,0,0",
-            "-o",
-            "w.csv",
-        ]);
+        for mesh in ["word.obj", "word.ply"] {
+            lines.push(vec![
+                "route",
+                mesh,
+                "--start-point",
+                "0,0,0",
+                "--end-point",
+                "1,0,0",
+                "-o",
+                "w.csv",
+            ]);
+        }
         lines.push(vec!["eval", "--files-from", "list.txt", "-o", "o/"]);
         lines.push(vec!["check", "results"]);
         lines.push(vec!["eval", "folder", "-o", "results", "--resume"]);
