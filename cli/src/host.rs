@@ -67,7 +67,7 @@ pub fn set_probe(command: Vec<OsString>) {
 }
 
 /// Loads the Vulkan drivers, and then prints a line to standard output. A driver may end the process that loads it.
-/// Therefore a child process calls this before the parent opens a device, and the line shows that loading succeeded.
+/// Therefore a child process calls this before the parent opens a device, and the line shows that no driver ended it.
 pub fn load_drivers() {
     drivers::load();
 }
