@@ -12,8 +12,8 @@ use crate::text::lines::Limits;
 /// Memory budget of every input, whatever its length, in bytes.
 pub const BASE: u64 = 64 << 20;
 
-/// Additional memory budget for each byte of an input, in bytes. A number of one byte can become an f32 key with an f64
-/// time, and compressed files unpack to several times their length.
+/// Additional memory budget for each byte of an input, in bytes. A number of one byte can become an f32 key with an
+/// f64 time, and compressed files unpack to several times their length.
 pub const FACTOR: u64 = 64;
 
 /// The memory budget of one input, and how much of it is used.

@@ -237,9 +237,9 @@ impl Loaded {
 
 /// A file that can be written again with other keys, keeping everything else.
 pub trait Document: fmt::Debug + Send + Sync {
-    /// The times, in seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the rate, and the first and the
-    /// last key time of the clip, so that its duration stays. A format that cannot store a shorter last interval
-    /// leaves out the last time.
+    /// The times, in seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the rate, and the
+    /// first and the last key time of the clip, so that its duration stays. A format that cannot store a shorter last
+    /// interval leaves out the last time.
     ///
     /// # Errors
     /// When the file's type of times cannot distinguish frames of this rate.

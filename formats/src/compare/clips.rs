@@ -133,8 +133,8 @@ impl ClipPair<'_> {
         SampleTimes::at(times)
     }
 
-    /// Compares the clips at the times `frames`, in seconds, on the clock of the first clip. With `in_world` the poses are
-    /// relative to the world, otherwise to the parents.
+    /// Compares the clips at the times `frames`, in seconds, on the clock of the first clip. With `in_world` the
+    /// poses are relative to the world, otherwise to the parents.
     ///
     /// # Errors
     /// When no track of one clip corresponds to a track of the other, when a clip cannot be sampled, or when poses in

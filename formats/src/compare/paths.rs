@@ -18,7 +18,8 @@ pub struct PathMeasure {
     pub is_absolute: bool,
     /// The step of relative errors; `None` if they are not computed.
     pub step: Option<Step>,
-    /// The longest interval between neighbouring keys of the estimate that is interpolated, in seconds; `None` for no limit.
+    /// The longest interval between neighbouring keys of the estimate that is interpolated, in seconds; `None` for no
+    /// limit.
     pub max_gap: Option<f64>,
 }
 

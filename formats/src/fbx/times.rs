@@ -14,7 +14,7 @@ pub(super) const SAME: f64 = 1e-9;
 /// How many keys an extrapolated curve may repeat, in addition to its keys.
 const REPEATED: f64 = 1e6;
 
-/// If an angle changes by more degrees than this between two keys, the curve is also evaluated between them, in at most
+/// If an angle changes by more degrees than this between two keys, the curve is also evaluated between them, in up to
 /// [`MAX_PARTS`] parts.
 const LARGEST_STEP: f64 = 120.0;
 const MAX_PARTS: f64 = 4096.0;
