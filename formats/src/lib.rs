@@ -84,8 +84,8 @@ pub use crate::text::lines::Limits;
 
 /// All formats. To add one, write a module with a `FORMAT`, and add a line here. Help, the choice of a format by a
 /// file's name, searches of directories, completions, messages, documentation and tests use this table. Every format
-/// can be read. An input's format is recognised by its first bytes, otherwise by its extension. The first format is
-/// the default for inputs, and the first of [`Format::writable`] is the default for outputs.
+/// can be read. [`Format::detect`] finds the format of an input; the first format is the default. The first of
+/// [`Format::writable`] is the default for outputs.
 pub static FORMATS: &[&Format] = &[
     &dat::FORMAT,
     &gltf::FORMAT,

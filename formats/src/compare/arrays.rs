@@ -19,7 +19,7 @@ pub struct ArrayDifference {
     pub shape: Vec<usize>,
     /// Number of elements of each array.
     pub numbers: usize,
-    /// Number of elements whose bits differ; all NaNs count as equal.
+    /// Number of elements whose bits differ; NaN values count as equal.
     pub differing: usize,
     /// Absolute differences of the elements.
     pub difference: Spread,
