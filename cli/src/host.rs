@@ -1,5 +1,4 @@
-//! The program inside another: for front ends that have no executable of their own, such as the
-//! package for Python.
+//! Runs the program inside another program: for front ends without an executable, such as the Python package.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -17,14 +16,14 @@ use crate::drivers;
 use crate::messages::exit::{self, Failure};
 use crate::messages::{signals, words};
 
-/// Why something was refused.
+/// Why a call failed.
 #[derive(Debug)]
 pub struct Refused {
-    /// In words for people.
+    /// The error in words for people.
     pub message: String,
-    /// Whether the request is at fault, rather than a device or the system.
+    /// Whether the request is wrong, rather than a device or the system.
     pub is_usage: bool,
-    /// The program's exit code.
+    /// The exit code of the program for this error.
     pub code: u8,
 }
 
@@ -38,7 +37,7 @@ impl From<Failure> for Refused {
     }
 }
 
-/// Runs the program with these arguments, the first of which is its name, and gives its exit code.
+/// Runs the program with these arguments, the first of which is its name. Returns its exit code.
 #[must_use]
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
@@ -61,22 +60,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Sets the command that loads the Vulkan drivers in a child process, instead of this executable: see
-/// [`load_drivers`]. Only the first call counts.
+/// Sets the command of the child process that loads the Vulkan drivers, instead of this executable; see
+/// [`load_drivers`]. Only the first call has an effect.
 pub fn set_probe(command: Vec<OsString>) {
     drivers::set_command(command);
 }
 
-/// Loads the Vulkan drivers. A driver may end the process that loads it, so that a child process
-/// does this before anything else opens a device, and says on standard output that it came through.
+/// Loads the Vulkan drivers, and then prints a line to standard output. A driver may end the process that loads it.
+/// Therefore a child process calls this before the parent opens a device, and the line shows that no driver ended it.
 pub fn load_drivers() {
     drivers::load();
 }
 
-/// The names of all Vulkan devices, in the order of their indices.
+/// All Vulkan devices, in the order of their indices.
 ///
 /// # Errors
-/// When there is no Vulkan, or a driver fails.
+/// When Vulkan is not available, or a driver fails.
 pub fn devices() -> Result<Vec<Device>, Refused> {
     drivers::devices().map_err(|error| Refused {
         message: error.to_string(),
@@ -85,21 +84,21 @@ pub fn devices() -> Result<Vec<Device>, Refused> {
     })
 }
 
-/// Opens the device of that name, as in `--device`: `first`, `cpu`, `vulkan`, an index, a name
-/// or part of it; `auto` is the CPU here, see [`auto`].
+/// Opens the device with this name, as the option `--device` does: `first`, `cpu`, `vulkan`, an index, a device's
+/// name or a part of it. Here, `auto` is the CPU; see [`auto`].
 ///
 /// # Errors
-/// When there is no such device, or it cannot be opened.
+/// When there is no such device, or when it cannot be opened.
 pub fn open(name: &str, options: &EngineOptions) -> Result<Engine, Refused> {
     let opened = DeviceArguments::of(name, options).open_any()?;
     Ok(opened.engine)
 }
 
-/// The device that is the fastest for calls of so many rotations; `None` where loading the drivers
-/// ends the process that tries.
+/// Opens the device that is the fastest for calls with this number of rotations. `None` if loading the drivers ends
+/// the process that loads them.
 ///
 /// # Errors
-/// When the system refuses what the CPU needs.
+/// When no device, not even the CPU, can be opened.
 pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
     if drivers::drivers().is_err() {
         return Ok(None);
@@ -112,7 +111,8 @@ pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
     Ok(Some(engine))
 }
 
-/// Where the curves of a set are less smooth than their method promises, as a warning about `name`.
+/// A warning about `name` if curves of a set are less smooth than their method promises: their angular acceleration
+/// jumps at a key. `None` if there are none.
 #[must_use]
 pub fn curve_warning(
     name: &str,
@@ -122,11 +122,11 @@ pub fn curve_warning(
     interpolation::curve_warning(name, set, interpolation)
 }
 
-/// The page of `tumble view` with some clips, which messages and titles call by `path`. `options`
-/// are those of `tumble view` but inputs and output.
+/// The HTML page of `tumble view` for some clips, which are called `path` in messages and titles. `box_length` is the
+/// length of each box of a chain. `options` are those of `tumble view` except inputs and output.
 ///
 /// # Errors
-/// When the options are wrong, or the clips cannot be shown.
+/// When the options are wrong, or when the clips cannot be displayed.
 pub fn page(
     path: &Path,
     clips: Vec<Motion>,

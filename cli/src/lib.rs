@@ -1,9 +1,8 @@
-//! The program `tumble`: keyframe tracks in, interpolated rotations out.
+//! The program `tumble`: it reads tracks of keys and writes interpolated rotations.
 //!
-//! Arguments are parsed into validated values (`arguments`), one command runs
-//! (`commands`), and what went wrong becomes a message on standard error and an exit code
-//! (`messages`). Data goes to standard output and words to standard error. A library, so
-//! that other front ends run the same program; it promises no stable interface.
+//! Arguments are parsed into validated values (`arguments`), then one command runs (`commands`). An error becomes a
+//! message on standard error and an exit code (`messages`). Data goes to standard output, and messages to standard
+//! error. The program is a library, so that other front ends can run it. Its interface is not stable.
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -59,7 +58,7 @@ pub struct Arguments {
     command: Command,
 }
 
-/// Runs the program with this process's arguments.
+/// Runs the program with the arguments of this process.
 #[must_use]
 pub fn main() -> ExitCode {
     ExitCode::from(host::run(std::env::args_os()))

@@ -1,9 +1,9 @@
-//! A library evaluated in shards, for front ends that spread them over machines: what `tumble eval
-//! --shard` and `tumble merge` do, part by part.
+//! Evaluates a library of files in shards, for front ends that distribute them over machines. These are the steps of
+//! `tumble eval --shard` and `tumble merge`.
 //!
-//! The options are those of a command line of `tumble eval`; inputs and output are passed separately,
-//! since workers may see them under other names. A [`LibraryPlan`] cuts the library, a [`Worker`] keeps
-//! a device open and evaluates shards, and [`merge`] makes one manifest of their records.
+//! Options are the words of a command line of `tumble eval`. Inputs and output are passed separately, because workers
+//! may access them by other paths. A [`LibraryPlan`] divides the library into shards, a [`Worker`] keeps a device
+//! open and evaluates shards, and [`merge`] makes one manifest of their records.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -49,30 +49,31 @@ fn parse(line: &[OsString]) -> Result<Arguments, Refused> {
 /// The inputs that a command line names.
 ///
 /// # Errors
-/// When the command line is wrong.
+/// When the command line is invalid.
 pub fn inputs(line: &[OsString]) -> Result<Vec<PathBuf>, Refused> {
     Ok(parse(line)?.inputs.named_paths().to_vec())
 }
 
-/// Of every kernel: machines that agree in it and in the version write the same bytes.
+/// The SHA-256 hash of all kernels. Machines with the same hash and the same version write the same bytes.
 #[must_use]
 pub fn kernels_sha256() -> &'static str {
     entry::kernels_sha256()
 }
 
-/// A library, cut into shards.
+/// A library divided into shards.
 pub struct LibraryPlan {
     shard_plan: ShardPlan,
     arguments: Arguments,
 }
 
 impl LibraryPlan {
-    /// Cuts the files below a directory, those that match a pattern, or one file; or `listed`, names
-    /// below `library` with their sizes, if their formats can be read. `into`: the kind of output, where
-    /// that is not `files`.
+    /// Divides a library into shards. `library` is a directory, a pattern of file names, or one file. With `listed`,
+    /// the inputs are these names below `library` with their sizes in bytes; names without the extension of a known
+    /// format are left out. `folder` is the directory of results. `shard_bytes` is the largest size of a shard's
+    /// inputs, such as `256MiB`; a single input may be larger. `into` is the kind of output, such as `files`.
     ///
     /// # Errors
-    /// When the command line is wrong, or results of two inputs would be one.
+    /// When the command line is invalid, when there are no inputs, or when two inputs would have the same result.
     pub fn new(
         line: &[OsString],
         library: &Path,
@@ -119,10 +120,10 @@ impl LibraryPlan {
         })
     }
 
-    /// Records the plan in the directory of results, and refuses to replace other files.
+    /// Records the plan in the directory of results, and checks that no other files would be replaced.
     ///
     /// # Errors
-    /// When the directory has other shards, or files under the names of results.
+    /// When the directory contains shards of another plan, or files with the names of results.
     pub fn claim(&self, folder: &Path) -> Result<(), Refused> {
         let results = &self.arguments.results;
         self.shard_plan
@@ -130,32 +131,32 @@ impl LibraryPlan {
         Ok(())
     }
 
-    /// Which plan it is: the same for the same list, sizes, options and version.
+    /// The identifier of the plan, which is equal for equal inputs, sizes, options and versions.
     #[must_use]
     pub fn id(&self) -> &str {
         &self.shard_plan.recorded.plan
     }
 
-    /// Everything that determines results besides their inputs, as in manifests.
+    /// The options that determine the results, as manifests contain them.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.shard_plan.recorded.options
     }
 
-    /// How many shards there are.
+    /// Number of shards.
     #[must_use]
     pub fn shards(&self) -> usize {
         self.shard_plan.cuts.len()
     }
 
-    /// How many inputs there are.
+    /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
         self.shard_plan.inputs.len()
     }
 
-    /// The inputs of a shard, from 1: their paths, and their paths below the library; `None` where there
-    /// is no such shard.
+    /// The inputs of a shard, from 1: for each, its path and its path below the library. `None` if there is no such
+    /// shard.
     #[must_use]
     pub fn inputs_of(&self, shard: usize) -> Option<Vec<(PathBuf, PathBuf)>> {
         let range = self.shard_plan.cuts.get(shard.checked_sub(1)?)?;
@@ -167,8 +168,8 @@ impl LibraryPlan {
         )
     }
 
-    /// The names of the results of a shard below the directory of results; an input whose result cannot
-    /// have a name there fails.
+    /// The names of the results of a shard, from 1, below the directory of results. They do not include inputs whose
+    /// result cannot have a name there; these fail. `None` if there is no such shard.
     #[must_use]
     pub fn names_of(&self, shard: usize) -> Option<Vec<String>> {
         let range = self.shard_plan.cuts.get(shard.checked_sub(1)?)?;
@@ -182,31 +183,31 @@ impl LibraryPlan {
     }
 }
 
-/// One shard, or some of its inputs.
+/// A request to evaluate one shard, or some of its inputs.
 #[derive(Debug, Clone)]
 pub struct ShardTask {
-    /// From 1.
+    /// Index of the shard, from 1.
     pub shard: usize,
-    /// How many shards there are.
+    /// Number of shards.
     pub of: usize,
-    /// [`LibraryPlan::id`].
+    /// The identifier of the plan: [`LibraryPlan::id`].
     pub plan: String,
-    /// The paths of the inputs, and their paths below the library.
+    /// For each input, its path and its path below the library.
     pub inputs: Vec<(PathBuf, PathBuf)>,
-    /// Whether the shard's file is written, rather than returned.
+    /// Whether the shard's record is written to the directory of results, rather than returned.
     pub record: bool,
 }
 
-/// The outcome of a task.
+/// The outcome of a [`ShardTask`].
 #[derive(Debug, Clone, Serialize)]
 pub struct ShardOutcome {
     made: usize,
     skipped: usize,
-    /// Rotations that were evaluated.
+    /// Number of rotations that were evaluated.
     rotations: u64,
     device: String,
     failed: Vec<RefusedInput>,
-    /// The text of the shard's file, if the caller writes it.
+    /// The text of the shard's record, if the caller writes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<String>,
 }
@@ -226,10 +227,10 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Opens the device that a command line names; `threads` of the CPU.
+    /// Opens the device that a command line names. `threads` is the number of threads on the CPU.
     ///
     /// # Errors
-    /// When the command line is wrong, or the device cannot be opened.
+    /// When the command line is invalid, or when the device cannot be opened.
     pub fn new(line: &[OsString], threads: Option<usize>) -> Result<Self, Refused> {
         let mut arguments = parse(line)?;
         arguments.device.set_threads(threads);
@@ -246,16 +247,18 @@ impl Worker {
         &self.evaluator.device.label
     }
 
-    /// Everything that determines results besides their inputs, as in manifests.
+    /// The options that determine the results, as manifests contain them.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.evaluator.request.options
     }
 
-    /// Evaluates a task's inputs into a directory whose plan is claimed, or that only the caller uses.
+    /// Evaluates the inputs of a task, and writes the results to `folder`. The plan of this directory must have been
+    /// recorded by [`LibraryPlan::claim`], unless only the caller uses the directory.
     ///
     /// # Errors
-    /// When the device fails or results cannot be written. Inputs that are refused are no error.
+    /// When the device fails, or when results cannot be written. Inputs that are refused are not errors; the outcome
+    /// contains them.
     pub fn run(&mut self, task: &ShardTask, folder: &Path) -> Result<ShardOutcome, Refused> {
         let found: Vec<FoundInput> = (task.inputs.iter())
             .map(|(path, below)| FoundInput::named(path.clone(), below.clone()))
@@ -291,8 +294,8 @@ impl Worker {
     }
 }
 
-/// A shard's file as text, for front ends that keep results where the program cannot write: what is said of
-/// the shard, and its lines of the manifest.
+/// The record of a shard, for front ends that store results in locations to which the program cannot write: a header,
+/// and the shard's lines of the manifest.
 #[derive(Debug, Clone)]
 pub struct ShardRecord {
     header: ShardHeader,
@@ -300,31 +303,31 @@ pub struct ShardRecord {
     is_whole: bool,
 }
 
-/// A file of rows that holds all results of a shard.
+/// A file of rows with all results of a shard.
 #[derive(Debug, Clone)]
 pub struct RowsFile {
-    /// Its name below the directory of results.
+    /// Name of the file below the directory of results.
     pub name: String,
-    /// Its hash.
+    /// SHA-256 hash of the file.
     pub sha256: String,
-    /// Its length.
+    /// Length of the file in bytes.
     pub bytes: u64,
-    /// The library whose inputs it holds the results of.
+    /// The library of the shard's inputs.
     pub library: String,
-    /// The hash of the hashes of these inputs.
+    /// SHA-256 hash of the hashes of these inputs.
     pub inputs_sha256: String,
-    /// Its kind, as in [`LibraryPlan::new`].
+    /// The kind of output, as `into` in [`LibraryPlan::new`].
     pub into: String,
 }
 
 impl ShardRecord {
-    /// The name of a shard's file below the directory of results.
+    /// The name of a shard's record below the directory of results.
     #[must_use]
     pub fn name_of(shard: usize) -> String {
         format!("{}/{shard:05}.jsonl", record::FOLDER)
     }
 
-    /// Reads a shard's file; `None` where the text is none.
+    /// Parses the text of a shard's record; `None` if it is not one.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let bytes = text.as_bytes();
@@ -336,7 +339,7 @@ impl ShardRecord {
         })
     }
 
-    /// The file of a shard whose results are these lines of a manifest; others are left out.
+    /// The record of a shard with these lines of a manifest as results; invalid lines are left out.
     #[must_use]
     pub fn new(shard: usize, of: usize, plan: String, inputs: usize, lines: &[String]) -> Self {
         let header = ShardHeader {
@@ -353,30 +356,30 @@ impl ShardRecord {
         }
     }
 
-    /// Whether the text had all its lines, as they were written.
+    /// Whether the parsed text was complete and unchanged.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.is_whole
     }
 
-    /// The plan that the shard is of: [`LibraryPlan::id`].
+    /// The identifier of the shard's plan: [`LibraryPlan::id`].
     #[must_use]
     pub fn plan(&self) -> &str {
         &self.header.plan
     }
 
-    /// Makes it a shard of another plan, whose results are the same.
+    /// Changes the plan of the shard to another one with the same results.
     pub fn set_plan(&mut self, plan: String) {
         self.header.plan = plan;
     }
 
-    /// Its results: the name below the directory, the hash and the length of each.
+    /// The results of the shard: for each, its name below the directory, its SHA-256 hash and its length in bytes.
     #[must_use]
     pub fn results(&self) -> Vec<(String, String, u64)> {
         results_of(&self.entries)
     }
 
-    /// Adds an input that has no result.
+    /// Adds an input without a result, with the error message.
     pub fn refuse(&mut self, input: String, message: String) {
         let code = ALL_INPUTS;
         self.header.inputs += 1;
@@ -387,8 +390,9 @@ impl ShardRecord {
         });
     }
 
-    /// Whether it has all results of inputs, and no others: made from inputs of these hashes, by the name of
-    /// each input's result without its ending, with these options, kernels and version.
+    /// Whether the record contains all results of `inputs` and no others. `inputs` maps the name of each input's
+    /// result, without extension, to the hash of the input. The results must have been made with these options, and
+    /// with the kernels and the version of this program.
     #[must_use]
     pub fn is_made_from(&self, inputs: &BTreeMap<String, String>, options: &str) -> bool {
         let mut parts: BTreeMap<String, usize> = BTreeMap::new();
@@ -406,7 +410,7 @@ impl ShardRecord {
         self.header.failed.is_empty() && made == inputs.len()
     }
 
-    /// Puts a file of rows in the place of its results; nothing where there are none.
+    /// Replaces the results by one file of rows that contains them. Without results nothing changes.
     pub fn join(&mut self, rows: RowsFile) {
         let Some(first) = self.entries.first() else {
             return;
@@ -423,7 +427,7 @@ impl ShardRecord {
         }];
     }
 
-    /// The file.
+    /// The text of the record.
     #[must_use]
     pub fn text(&self) -> String {
         record::text(&self.header, &self.entries)
@@ -447,8 +451,8 @@ fn results_of<'a>(
     entries.into_iter().map(result).collect()
 }
 
-/// What the results of an entry's input are known by: without the ending, which is the format's, except for
-/// files of rows.
+/// The name by which the results of an entry's input are identified: without its extension, which depends on the
+/// format, except for files of rows.
 fn key_of(entry: &ManifestEntry) -> String {
     let name = entry.whole().0;
     match name.ends_with(".parquet") {
@@ -457,13 +461,14 @@ fn key_of(entry: &ManifestEntry) -> String {
     }
 }
 
-/// The results that a manifest lists, the last line of each: its name, its hash and its length.
+/// The results in the text of a manifest: for each, its name, its SHA-256 hash and its length in bytes. If a result
+/// occurs several times, the last line counts.
 #[must_use]
 pub fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
     results_of(ManifestLines::parse(text.as_bytes()).entries.values())
 }
 
-/// The lines of a manifest, by the input's result that they are of, without its ending.
+/// The lines of a manifest, by the name of the input's result without its extension.
 #[must_use]
 pub fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
     let mut found: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -478,7 +483,7 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("strings and numbers")
 }
 
-/// What merging came to.
+/// The outcome of [`merge`].
 #[derive(Debug, Clone, Serialize)]
 pub struct MergeReport {
     results: usize,
@@ -495,10 +500,10 @@ impl MergeReport {
     }
 }
 
-/// Makes one manifest of a directory's shards.
+/// Makes one manifest of the shards in a directory.
 ///
 /// # Errors
-/// When shards are missing, or the manifest cannot be written.
+/// When shards are missing, or when the manifest cannot be written.
 pub fn merge(folder: &Path) -> Result<MergeReport, Refused> {
     let merged = merging::merge(folder)?;
     Ok(MergeReport {

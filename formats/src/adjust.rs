@@ -1,4 +1,4 @@
-//! Clips in other units and about other axes.
+//! Converts clips to another unit of length or another up axis.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -8,12 +8,12 @@ use tumble::{Channel, TrackError};
 use crate::format::{Loaded, Space};
 use crate::motion::{Body, Motion, Transform, carry_key_data};
 
-/// The axis that points up, of two of which one was the other before.
+/// The axis that points up after a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum UpAxis {
-    /// z was up, as in SMPL's files.
+    /// y becomes the up axis. Unless the file specifies its up axis, it was z before, as in SMPL's files.
     Y,
-    /// y was up, as in glTF and BVH.
+    /// z becomes the up axis. Unless the file specifies its up axis, it was y before, as in glTF and BVH.
     Z,
 }
 
@@ -24,7 +24,8 @@ tumble::names! {
 }
 
 impl UpAxis {
-    /// The rotation by 90° about x for [`adjust`]. By no sine: those of systems differ in the last bit.
+    /// The rotation about x by 90° that makes this axis the up axis, for [`adjust`]: from z up to y up, or from y up
+    /// to z up. Its components are constants, because the sines of different systems differ in the last bit.
     #[must_use]
     pub fn rotation(self) -> DQuat {
         let x = match self {
@@ -34,8 +35,8 @@ impl UpAxis {
         DQuat::from_xyzw(x, 0.0, 0.0, FRAC_1_SQRT_2)
     }
 
-    /// The rotation that makes this axis the one that is up: from the one that a file says, else by
-    /// [`rotation`](Self::rotation).
+    /// The rotation that makes this axis the up axis. The up axis before it is that of `space`; without `space` the
+    /// rotation is [`rotation`](Self::rotation).
     #[must_use]
     pub fn rotation_from(self, space: Option<Space>) -> DQuat {
         let axis = match self {
@@ -55,7 +56,8 @@ impl UpAxis {
     }
 }
 
-/// All clips of a file by [`adjust`], and the length of its boxes.
+/// Applies [`adjust`] to all clips of a file, scales the length of its boxes and updates [`Loaded::space`]. `up` is
+/// the up axis after the conversion; `None` keeps the axes.
 ///
 /// # Errors
 /// As [`adjust`].
@@ -79,11 +81,12 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
     Ok(())
 }
 
-/// The clip with all translations multiplied by `scale`, and with all roots rotated by `rotation`, keys
-/// and tangents alike. Computed in f64, rounded once.
+/// Multiplies all translations of a clip by `scale` and rotates all roots by `rotation`: keys, tangents and rest
+/// poses. If the clip's poses are relative to the world, every track is a root. The computation is in f64; each
+/// result is rounded to f32 once.
 ///
 /// # Errors
-/// When a translation passes the largest f32.
+/// When a translation exceeds the largest f32.
 pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, TrackError> {
     let mut adjusted = clip.without_tracks();
     let ends = adjusted
@@ -145,14 +148,14 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
     Ok(adjusted)
 }
 
-/// Says where each joint rests relative to its parent, for files that do not: bodies of SMPL, whose
-/// joints lie where their shape puts them. `numbers` are x, y, z of each joint, in the order of the
-/// tracks. Those of a body's first joint, where its pelvis is when `trans` is 0, are added to its
-/// translations: the pelvis is at both together.
+/// Sets where each joint rests relative to its parent, for files that do not contain this: motion of SMPL bodies,
+/// whose joint positions depend on the shape of the body. `numbers` are x, y, z of each joint, in the order of the
+/// tracks. For an SMPL body, the first offset is the position of the pelvis when `trans` is 0; it is added to the
+/// translations of the first track.
 ///
 /// # Errors
-/// When there are not three numbers for each joint of the clip, or joints besides roots have translations
-/// of their own; the clip is then unchanged.
+/// When there are not three numbers for each joint of the clip, or a joint with a parent has translation keys; the
+/// clip is then unchanged. When a translation with the pelvis added is not a finite f32.
 pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsError> {
     let joints = clip.skeleton.len();
     let (offsets, rest) = numbers.as_chunks::<3>();
@@ -194,29 +197,29 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
     Ok(())
 }
 
-/// Why a skeleton's joints cannot be placed.
+/// Why the offsets of joints cannot be set.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OffsetsError {
-    /// Every joint has three.
+    /// There are not three numbers for each joint.
     #[error("{numbers} numbers of offsets for {joints} joints; each joint needs three, x y z")]
     Numbers {
-        /// How many numbers there are.
+        /// Number of values that were passed.
         numbers: usize,
-        /// How many joints the clip has.
+        /// Number of joints of the clip.
         joints: usize,
     },
-    /// Translations say where a joint is.
+    /// A joint with a parent has translation keys, which already determine its position.
     #[error(
         "joint {joint} (`{name}`) has translation keys, and an offset is only for joints without them"
     )]
     Moved {
-        /// The first such joint, from 0.
+        /// Index of the first such joint, from 0.
         joint: usize,
-        /// Its name.
+        /// Name of that joint.
         name: String,
     },
-    /// Where the offsets move the body is no place.
+    /// A translation with the pelvis added is not a valid key.
     #[error(transparent)]
     Track(#[from] TrackError),
 }

@@ -1,16 +1,16 @@
-//! What a file names is opened by one function: beneath the folder of the file that names it, through
-//! no link that leads out of it, and only if it is a regular file.
+//! Opens files that other files name. Such a file must be a regular file below the folder of the file that names it,
+//! and no link may lead out of that folder.
 
 use std::fs::File;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// Opens a file that a file in `folder` names: a relative path of plain parts. Linux resolves it
-/// beneath the folder, in one step, so that nobody can put a link in its way meanwhile; elsewhere
-/// each step is looked at, and none may be a link. Neither a pipe nor a device is waited for.
+/// Opens the file `name`, a relative path that a file in `folder` contains. On Linux, one system call resolves the
+/// path below the folder, so that no other process can insert a link meanwhile. On other systems each component of
+/// the path is checked, and none may be a link. The function does not wait for pipes or devices.
 ///
 /// # Errors
-/// When the name leads out of the folder, is that of no regular file, or cannot be opened.
+/// When the name leads out of the folder or is not that of a regular file, or when the file cannot be opened.
 pub fn open_beneath(folder: &Path, name: &Path) -> io::Result<File> {
     let name = plain(name).ok_or_else(leads_out)?;
     let file = open(or_here(folder), &name)?;
@@ -21,10 +21,11 @@ pub fn open_beneath(folder: &Path, name: &Path) -> io::Result<File> {
     }
 }
 
-/// The directory, beneath `folder`, of a file that is to be written there; no step to it is a link.
+/// The directory in which the file `name` is to be written, below `folder`. No component of it is a link; components
+/// that do not exist yet are allowed.
 ///
 /// # Errors
-/// When the name leads out of the folder, or a step to it is a link or no directory.
+/// When the name leads out of the folder, or a component is a link or is not a directory.
 pub fn parent_beneath(folder: &Path, name: &Path) -> io::Result<PathBuf> {
     let name = plain(name).ok_or_else(leads_out)?;
     let mut path = folder.to_owned();
@@ -43,13 +44,15 @@ pub fn parent_beneath(folder: &Path, name: &Path) -> io::Result<PathBuf> {
     Ok(path)
 }
 
-/// Whether a name stays beneath the folder of the file that has it, as far as its letters go.
+/// Whether a name stays below the folder of the file that contains it. This is judged by the name alone; links are
+/// not looked up.
 #[must_use]
 pub fn is_beneath(name: &str) -> bool {
     plain(Path::new(name)).is_some()
 }
 
-/// Whether opening failed because the name leads elsewhere, or is that of no regular file.
+/// Whether an error of this module's functions means that the name leads out of the folder, or is not that of a
+/// regular file.
 #[must_use]
 pub fn is_refused(error: &io::Error) -> bool {
     error
@@ -73,7 +76,7 @@ fn no_file() -> io::Error {
     io::Error::other(OpenRefusal::NoFile)
 }
 
-/// The name without `.` and `..`; nothing where it is absolute, empty or leads out.
+/// The name without `.` and `..`; `None` if it is absolute, is empty or leads out of the folder.
 fn plain(name: &Path) -> Option<PathBuf> {
     let mut path = PathBuf::new();
     for part in name.components() {
@@ -125,7 +128,7 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
     open_by_steps(folder, name)
 }
 
-/// Looks at each step.
+/// Opens a file after checking each component of its path.
 fn open_by_steps(folder: &Path, name: &Path) -> io::Result<File> {
     let path = parent_beneath(folder, name)?;
     let Some(name) = name.file_name() else {

@@ -1,31 +1,31 @@
-//! How much memory reading one input may take.
+//! The memory budget of reading one input.
 //!
-//! A file of a megabyte can say that it has gigabytes: by a count in a header, by data that is packed, by
-//! parts that name one part many times. Each reader asks here before it allocates what the file decides, and
-//! what would go over the budget is refused with the number. The budget is a promise about the whole input,
-//! so that no two parts of it add up to more.
+//! A file of a megabyte can claim to contain gigabytes: by a count in a header, by compressed data, or by many
+//! references to one part. Each reader asks the budget before it allocates memory whose size the file determines. An
+//! input that would exceed the budget is refused, with the number of bytes. The budget covers the whole input, so
+//! that its parts cannot exceed it together.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::text::lines::Limits;
 
-/// Bytes that any input may take.
+/// Memory budget of every input, whatever its length, in bytes.
 pub const BASE: u64 = 64 << 20;
 
-/// Bytes that each byte of an input may take besides: numbers of one byte become keys of f32 beside their
-/// times in f64, and packed files unpack to several times their length.
+/// Additional memory budget for each byte of an input, in bytes. A number of one byte can become an f32 key with an
+/// f64 time, and compressed files unpack to several times their length.
 pub const FACTOR: u64 = 64;
 
-/// The memory of one input: what may be taken, and what is.
+/// The memory budget of one input, and how much of it is used.
 #[derive(Debug)]
 pub(crate) struct Budget {
     limit: AtomicU64,
     used: AtomicU64,
-    /// Whether it grows with the input.
+    /// Whether the budget grows when files beside the input are read.
     grows: bool,
 }
 
-/// More than the budget has.
+/// An input needs more memory than its budget.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it states more \
@@ -37,7 +37,7 @@ pub(crate) struct OverBudget {
 }
 
 impl Budget {
-    /// Of an input of so many bytes.
+    /// The budget of an input of `input` bytes.
     pub(crate) fn of(input: usize, limits: Limits) -> Self {
         let limit = match limits.memory {
             Some(limit) => limit,
@@ -50,7 +50,7 @@ impl Budget {
         }
     }
 
-    /// The input has so many bytes more: those of a file beside it.
+    /// Adds `bytes` to the length of the input: those of a file beside it.
     pub(crate) fn add_input(&self, bytes: usize) {
         if self.grows {
             let more = FACTOR.saturating_mul(bytes as u64);
@@ -58,17 +58,17 @@ impl Budget {
         }
     }
 
-    /// Bytes that are not taken.
+    /// Bytes that are not used yet.
     #[cfg(feature = "fbx")]
     pub(crate) fn left(&self) -> u64 {
         let limit = self.limit.load(Ordering::Relaxed);
         limit.saturating_sub(self.used.load(Ordering::Relaxed))
     }
 
-    /// Takes memory for `count` things of `bytes` each, for as long as the input is read.
+    /// Takes memory for `count` elements of `bytes` each, until the input has been read.
     ///
     /// # Errors
-    /// When that is more than there is.
+    /// When less than that is left.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), OverBudget> {
         let requested = (count as u64).saturating_mul(bytes as u64);
         let (used, limit) = (&self.used, self.limit.load(Ordering::Relaxed));
@@ -81,10 +81,10 @@ impl Budget {
         Err(OverBudget { needed, limit })
     }
 
-    /// Takes memory that is given back when the value is dropped.
+    /// Takes memory that is returned to the budget when the value is dropped.
     ///
     /// # Errors
-    /// When that is more than there is.
+    /// When less than that is left.
     pub(crate) fn borrow(&self, count: usize, bytes: usize) -> Result<Borrowed<'_>, OverBudget> {
         self.take(count, bytes)?;
         let bytes = (count as u64).saturating_mul(bytes as u64);
@@ -95,7 +95,7 @@ impl Budget {
     }
 }
 
-/// Memory of a budget, until it is dropped.
+/// Memory of a budget, returned when this is dropped.
 #[must_use]
 pub(crate) struct Borrowed<'a> {
     budget: &'a Budget,

@@ -1,25 +1,25 @@
-//! Meshes that the tracks of a clip carry.
+//! Meshes that move with the tracks of a clip.
 
-/// Triangles that follow the tracks of a clip.
+/// Triangles that move with the tracks of a clip (skinning).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CarriedMesh {
-    /// Of the vertices, where the mesh itself has them.
+    /// Positions of the vertices, in the coordinates of the mesh.
     pub positions: Vec<[f32; 3]>,
-    /// Three vertices each.
+    /// Three vertex indices for each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// The bones that each vertex follows, by their indices in [`bones`](Self::bones).
+    /// The four bones of each vertex, as indices into [`bones`](Self::bones).
     pub bones_of: Vec<[u16; 4]>,
-    /// How much of each it follows; together 1.
+    /// The weight of each of these bones; the four weights of a vertex sum to 1.
     pub weights: Vec<[f32; 4]>,
-    /// What vertices follow.
+    /// The bones that vertices follow.
     pub bones: Vec<Bone>,
 }
 
-/// A track that vertices follow.
+/// A bone: a track that vertices follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
-    /// The track of the clip.
+    /// Index of the track in the clip.
     pub track: usize,
-    /// What takes a vertex from the mesh to the track's joint, column after column.
+    /// The matrix from the coordinates of the mesh to those of the joint, column by column.
     pub to_joint: [f32; 16],
 }

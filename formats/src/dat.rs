@@ -5,9 +5,8 @@
 //! <time> <w> <x> <y> <z>  <w> <x> <y> <z> …
 //! ```
 //!
-//! A header, then a line for each key: a time in seconds and a quaternion for each
-//! box. Read as a stream; what is refused costs memory in proportion to what was
-//! read, never to a number that the file claims.
+//! The header is followed by a line for each key: a time in seconds, and a quaternion for each box. The file is read
+//! as a stream. Its memory grows with the lines that are read, never with a number that the file claims.
 
 pub mod write;
 
@@ -28,13 +27,13 @@ use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use tumble::{NORM_TOLERANCE, TrackSet};
 
-/// More boxes are refused.
+/// The largest number of boxes of a file.
 pub const MAX_BOXES: usize = 65_536;
 
-/// A dot product this close to 0 is a half turn within f32 rounding.
+/// Two rotations whose dot product is within this of 0 differ by 180°, up to the rounding of f32.
 const HALF_TURN_PRODUCT: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// Keyframes of boxes with shared times, as text.
+/// The `.dat` format: keyframes of boxes with shared times, as text.
 pub static FORMAT: Format = Format {
     name: "dat",
     summary: "keyframes of a chain of boxes, as text",
@@ -57,20 +56,20 @@ pub static FORMAT: Format = Format {
     options: &[FormatOption::BoxLength],
 };
 
-/// Reads a file; `-` is standard input.
+/// Reads a `.dat` file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_dat(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     Source::read_by(path, options.pipes, |name, reader| {
         read_dat(name, reader, options)
     })
 }
 
-/// Reads keyframes; `name` is what messages call the input.
+/// Reads keyframes from the text of a `.dat` file; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid; the first error is returned.
 pub fn read_dat(
     name: &str,
     reader: impl BufRead,
@@ -145,7 +144,7 @@ fn parse_boxes(token: &str) -> Result<usize, String> {
     }
 }
 
-/// A comment may say anything except what a header says.
+/// Refuses a comment that reads like a header.
 fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnostic> {
     let body = line.trim_start().trim_start_matches('#');
     let words: Vec<_> = tokens(body)
@@ -163,7 +162,7 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
 struct Row<'a, T> {
     tokens: T,
     line: &'a str,
-    /// Column and digits of the last number, and the fewest digits of those before it.
+    /// Column and digits of the last number, and the smallest number of digits of those before it.
     last: (u64, usize),
     fewest_digits: usize,
 }
@@ -178,7 +177,7 @@ impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
         }
     }
 
-    /// The next number, and its column.
+    /// Reads the next number, with its column.
     fn next<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(u64, f64), Diagnostic> {
         let Some((column, token)) = self.tokens.next() else {
             return Err(lines.refuse(self.line.len() as u64, Code::Columns, String::new()));
@@ -195,15 +194,15 @@ impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
     }
 }
 
-/// What was read so far.
+/// The keys that were read until now.
 struct DatKeys {
     times: Blocks<f64>,
     rows: Blocks<Quat>,
     /// The first blank line since the last key.
     blank: Option<u64>,
-    /// Fewest digits of any number so far.
+    /// The smallest number of digits of any number.
     fewest_digits: usize,
-    /// Keys whose first column is near 0 and last near 1.
+    /// Number of keys whose first component is near 0 and whose last one is near 1.
     w_last: u64,
     total: u64,
     previous: Vec<DQuat>,

@@ -1,12 +1,12 @@
-//! Times as decimal numbers, exact to 1e-24 s: an f64 of seconds since 1970 is exact to 0.2 µs.
+//! Times as decimal numbers, exact to 1e-24 s. An f64 of seconds since 1970 is exact only to 0.2 µs.
 
 use std::fmt;
 
-/// Steps of a second.
+/// Units of this type in a second.
 const SECOND: i128 = 10i128.pow(SECOND_DECIMALS);
 const SECOND_DECIMALS: u32 = 24;
 
-/// Seconds either way of 0 that are taken, three million years.
+/// The largest magnitude of a time, three million years.
 const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 
 /// A number of seconds, in steps of 1e-24.
@@ -14,13 +14,13 @@ const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 pub(crate) struct Decimal(i128);
 
 impl Decimal {
-    /// A number as [`parse`](crate::text::number::parse) takes it; digits after the 24th decimal
-    /// are left out. `None` beyond ±1e14.
+    /// Parses a number as [`parse`](crate::text::number::parse) does, without digits after the 24th decimal. `None`
+    /// outside ±1e14.
     pub(crate) fn parse(token: &str) -> Option<Self> {
         Self::parse_in(token, 0)
     }
 
-    /// The same of a number in a unit of `10^power` seconds: -9 for nanoseconds.
+    /// Parses a number in a unit of `10^power` seconds: -9 for nanoseconds.
     pub(crate) fn parse_in(token: &str, power: i32) -> Option<Self> {
         let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
         let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
@@ -56,7 +56,7 @@ impl Decimal {
         Self::parse_in(&number.to_string(), power)
     }
 
-    /// Whole seconds and the shortest decimals of a time behind them; `None` beyond ±1e14.
+    /// The sum of whole seconds and a time with its shortest decimals; `None` outside ±1e14.
     pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
         // Seconds behind the first of all times may be twice as many as a time has.
         let digits = time.to_string();
@@ -84,7 +84,7 @@ impl Decimal {
         self.0.div_euclid(SECOND) as i64
     }
 
-    /// Seconds behind a whole second, correctly rounded.
+    /// Seconds after a whole second, correctly rounded.
     pub(crate) fn since(self, whole: i64) -> f64 {
         match self.0.checked_sub(i128::from(whole) * SECOND) {
             // Digits and a point.
@@ -98,7 +98,7 @@ impl Decimal {
     }
 }
 
-/// With at least as many decimals as `{:.9}` asks for.
+/// Displays at least as many decimals as `{:.9}` requests.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (sign, steps) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());

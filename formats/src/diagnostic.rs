@@ -1,31 +1,31 @@
-//! What is wrong with an input, where, and what to do: every message that a file
-//! can cause, each with a code that is documented here.
+//! Errors and warnings about inputs: where the problem is, what it is and how to solve it. Every message that a file
+//! can cause has a code, which is documented here.
 
 use std::fmt;
 
 use crate::printable::printable;
 
-/// Whether an input is refused, or read with a reservation.
+/// Whether an input is refused, or read with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Severity {
     /// The input is refused.
     Error,
-    /// The input is read; something about it is probably not meant.
+    /// The input is read, but something in it is probably not intended.
     Warning,
 }
 
-/// Where in an input a fault is.
+/// The location of a problem in an input.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Location {
-    /// In text: both count from 1, columns in characters.
+    /// In text: line and column, both from 1.
     Text {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// The column.
+        /// Number of the column, in characters.
         column: u64,
     },
-    /// In what has no lines: a JSON pointer such as `/animations/0`, the name of an archive's
-    /// member, or a table's column and row.
+    /// In a file without lines: a JSON pointer such as `/animations/0`, the name of an archive's member, or a table's
+    /// column and row.
     Inside(String),
 }
 
@@ -38,21 +38,21 @@ impl fmt::Display for Location {
     }
 }
 
-/// One thing to say about an input.
+/// One error or warning about an input.
 ///
-/// Displayed as `FILE:PLACE: error[CODE]: what is wrong, the value, the fix`, on one line, without what a
-/// terminal would obey ([`printable`]).
+/// It is displayed on one line as `FILE:LOCATION: error[CODE]: what is wrong, the value, the fix`. Characters that a
+/// terminal would execute are escaped ([`printable`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// The input's name, as it was given.
+    /// The input's name, as the caller passed it.
     pub file: String,
-    /// Where the fault is, unless it is the input as a whole.
+    /// The location of the problem; `None` for the input as a whole.
     pub location: Option<Location>,
-    /// Which fault.
+    /// The code of the problem.
     pub code: Code,
     /// What is wrong, in words.
     pub message: String,
-    /// How often it occurs; the location is that of the first time.
+    /// How often the problem occurs; the location is that of the first time.
     pub count: u64,
 }
 
@@ -82,7 +82,7 @@ impl fmt::Display for Diagnostic {
 impl std::error::Error for Diagnostic {}
 
 impl Diagnostic {
-    /// A fault of an input as a whole.
+    /// A diagnostic about an input as a whole.
     pub fn new(file: impl Into<String>, code: Code, message: impl Into<String>) -> Self {
         Self {
             file: file.into(),
@@ -93,7 +93,7 @@ impl Diagnostic {
         }
     }
 
-    /// The same fault, inside the input: at a JSON pointer, a member, a column.
+    /// The same diagnostic with a location in a file without lines: a JSON pointer, a member, a column.
     #[must_use]
     pub fn inside(mut self, pointer: impl Into<String>) -> Self {
         self.location = Some(Location::Inside(pointer.into()));
@@ -101,14 +101,14 @@ impl Diagnostic {
     }
 }
 
-/// The codes: `Name = "CODE", "title", "explanation";`. `elsewhere` behind a code says that no file in the tables
-/// of cases shows it, because it takes a fault of the system, an option, a size or the writing of a file; a test
-/// does.
+/// The codes: `Name = "CODE", "title", "explanation";`. After a code, `elsewhere` means that no file in the tables of
+/// cases causes it, because the cause is an error of the system, an option, a size or the writing of a file; another
+/// test does.
 macro_rules! codes {
     (@has_case) => { true };
     (@has_case elsewhere) => { false };
     ($($variant:ident = $code:literal $($elsewhere:ident)?, $title:literal, $explanation:literal;)+) => {
-        /// Every fault of an input. Codes starting with `W` are warnings.
+        /// The codes of all errors and warnings about inputs. Codes of warnings start with `W`.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[non_exhaustive]
         pub enum Code {
@@ -124,18 +124,18 @@ macro_rules! codes {
                 match self { $(Self::$variant => $code,)+ }
             }
 
-            /// What it stands for, in a few words.
+            /// A short title.
             pub fn title(self) -> &'static str {
                 match self { $(Self::$variant => $title,)+ }
             }
 
-            /// Whether a file alone shows it, and has a case in the tests; else it takes a fault of the system,
-            /// an option, a size or the writing of a file.
+            /// Whether a file alone can cause it, so that the tests have a case of it. Otherwise the cause is an
+            /// error of the system, an option, a size or the writing of a file.
             pub fn has_case(self) -> bool {
                 match self { $(Self::$variant => codes!(@has_case $($elsewhere)?),)+ }
             }
 
-            /// Why it is refused or warned of, and what to do.
+            /// Why the input is refused or the warning is issued, and what to do.
             pub fn explanation(self) -> &'static str {
                 match self { $(Self::$variant => $explanation,)+ }
             }
@@ -322,7 +322,7 @@ codes! {
 }
 
 impl Code {
-    /// The code with that name, in any case.
+    /// The code with this name; case is ignored.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL
@@ -331,7 +331,7 @@ impl Code {
             .find(|code| code.name().eq_ignore_ascii_case(name))
     }
 
-    /// Whether it refuses the input.
+    /// Whether the code is that of an error or of a warning.
     #[must_use]
     pub fn severity(self) -> Severity {
         if self.name().starts_with('W') {

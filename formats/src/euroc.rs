@@ -1,6 +1,6 @@
-//! Trajectories as the `EuRoC` MAV data sets have them: CSV of `timestamp x y z qw qx qy qz`, times in whole
-//! nanoseconds, w first, under a heading that says so. Files of ground truth have velocities and biases behind
-//! each pose.
+//! Trajectories in the format of the `EuRoC` MAV data sets: CSV of `timestamp x y z qw qx qy qz` after a heading.
+//! Times are whole nanoseconds; w is the first component. Files of ground truth have velocities and biases after each
+//! pose, which are not read.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Write};
@@ -17,7 +17,7 @@ use crate::motion::SampledClip;
 use crate::source::Source;
 use crate::tum::{PoseLine, Trajectory, read_lines};
 
-/// A path of one body.
+/// The `EuRoC` format: the path of one body.
 pub static FORMAT: Format = Format {
     name: "euroc",
     summary: "a trajectory, CSV of nanoseconds, `x y z` and `qw qx qy qz`",
@@ -81,12 +81,12 @@ fn open_euroc(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
     })
 }
 
-/// Reads poses; `name` is what messages call the input. The one track is named `body`. Times are nanoseconds
-/// unless the options say otherwise, and count from the whole second at or before the first, which is the
+/// Reads poses; `name` is the input's name in messages. The only track is named `body`. Times are nanoseconds unless
+/// the options specify another unit. They count from the whole second at or before the first time, which is the
 /// clip's [`time_offset`](crate::motion::Motion::time_offset).
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid; the first error is returned.
 pub fn read_euroc(
     name: &str,
     reader: impl BufRead,
@@ -95,8 +95,8 @@ pub fn read_euroc(
     read_lines(name, reader, options, &LINE)
 }
 
-/// Writes one clip of one track. Times are rounded to nanoseconds; the other numbers have the fewest digits that
-/// read back as the same f32, about an origin where there is one.
+/// Writes one clip of one track. Times are rounded to nanoseconds. Other numbers have the fewest digits that are read
+/// back as the same f32, relative to an origin if there is one.
 fn write_motion(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,

@@ -1,46 +1,47 @@
-//! What clips may hold beside rotations at times. Each format lists what it has room for; the documents
-//! show that table, and [`Format::write_clips`](crate::format::Format::write_clips) warns of the rest.
+//! The data that clips may contain in addition to rotations at times. Each format lists the features that it can
+//! store; the documentation has a table of them. [`Format::write_clips`](crate::format::Format::write_clips) warns of
+//! features that a format cannot store.
 
-/// What a clip may hold beside rotations at times.
+/// Data that a clip may contain in addition to rotations at times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Feature {
-    /// More than one track; a format without room refuses them.
+    /// More than one track. A format without this feature refuses them.
     SeveralTracks,
-    /// Rotations as quaternions, all bits of f32; a format without room has angles or matrices.
+    /// Rotations as quaternions with all bits of f32. A format without this feature stores angles or matrices.
     Quaternions,
     /// Names of the tracks.
     TrackNames,
-    /// A name of the clip.
+    /// The name of the clip.
     ClipName,
-    /// The parents of joints, and where each rests.
+    /// The parents of joints, and the position at which each rests.
     Skeleton,
-    /// Rotations in which joints rest: without them joints rest unturned.
+    /// The rotations of joints at rest. In a format without this feature, joints rest without rotation.
     RestRotations,
-    /// Positions, at rest or moving.
+    /// Positions, constant or animated.
     Translations,
     /// Scales.
     Scales,
-    /// Channels that hold each key until the next one.
+    /// Channels that keep the value of each key until the next one.
     Steps,
-    /// The order of channels and the End Sites that BVH has.
+    /// The order of channels and the End Sites of BVH.
     Bvh,
-    /// Poses are relative to the world, not to the parents; a format without room for that gets them
-    /// relative to the parents.
+    /// Poses relative to the world. For a format without this feature they are converted to poses relative to the
+    /// parents.
     World,
     /// The length of the boxes of a chain.
     BoxLength,
-    /// Several clips in one file; a format without room gets a file for each.
+    /// Several clips in one file. For a format without this feature, each clip is written to a separate file.
     SeveralClips,
-    /// Keys of each channel at times of its own; a format without room refuses such keys.
+    /// Separate key times for each channel. A format without this feature refuses such keys.
     TimesPerChannel,
-    /// Times that are not frames of a rate; a format without room refuses them.
+    /// Times that are not frames of a rate. A format without this feature refuses them.
     UnevenTimes,
-    /// Times since 1970, or any other start than 0.
+    /// Times that start elsewhere than at 0, for example times since 1970.
     Start,
 }
 
 impl Feature {
-    /// All of them.
+    /// All features.
     pub const ALL: [Self; 16] = [
         Self::SeveralTracks,
         Self::Quaternions,
@@ -60,7 +61,7 @@ impl Feature {
         Self::Start,
     ];
 
-    /// What tables of many clips hold.
+    /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
     pub(crate) const OF_TABLES: [Self; 11] = [
         Self::SeveralTracks,
@@ -76,7 +77,7 @@ impl Feature {
         Self::Start,
     ];
 
-    /// What it is, in a few words.
+    /// A short description.
     #[must_use]
     pub fn summary(self) -> &'static str {
         match self {

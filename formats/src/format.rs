@@ -1,5 +1,5 @@
-//! What a file format is: how it is recognised, read and written, and what it has room for. The formats
-//! themselves build on this; [`FORMATS`](crate::FORMATS) names them all.
+//! File formats: how each is recognised, read and written, and which features it can store.
+//! [`FORMATS`](crate::FORMATS) lists all formats.
 
 pub mod registry;
 mod write_clips;
@@ -27,37 +27,38 @@ use crate::times::FrameTimes;
 
 /// A file format.
 pub struct Format {
-    /// The name by which programs call it, and the extension of its files.
+    /// Name of the format in options and messages, which is also the extension of its files.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// A short description.
     pub summary: &'static str,
     /// Other extensions of its files.
     pub extensions: &'static [&'static str],
-    /// Whether a file that begins with these bytes (up to 512) is one.
+    /// Whether a file that begins with these bytes (up to 512) is in this format.
     pub probe: fn(&[u8]) -> bool,
-    /// How many numbers each of its lines has, where files of nothing but numbers are known by that.
+    /// How many numbers each line has, for formats that are recognised by this; their files contain nothing but
+    /// numbers.
     pub numbers_in_line: Option<usize>,
-    /// Whether all its files are lines of text, in which numbers keep every digit; results in it have a line
-    /// for each frame. Text takes no more memory than its length allows, and is read without a budget.
+    /// Whether all files are lines of text with every digit of each number. Results have a line for each frame.
+    /// Reading text needs no memory budget, because its memory is limited by its length.
     pub is_text: bool,
-    /// Whether a second track of a name is written with its number behind the name, because each name
-    /// stands once in a file. Writers that do otherwise say so themselves.
+    /// Whether names of tracks must be unique in a file. A repeated name is then written with the track's number
+    /// after it, and a warning is returned. For writers that warn themselves this is `false`.
     pub numbers_repeated_names: bool,
-    /// Reads keyframes from a file; `-` is standard input.
+    /// Reads clips from a file; `-` is standard input.
     pub read: ReadKeys,
-    /// Reads keyframes from the bytes of a file; files beside it are not read.
+    /// Reads clips from the bytes of a file. Other files that it names are not read.
     pub read_bytes: ReadBytes,
-    /// How rotations are written as they come.
+    /// Writes the rotations of a result in parts, while they are computed; `None` if the format cannot store them so.
     pub write: Option<WriteResults>,
     /// How sampled clips are written: see [`Format::write_clips`].
     pub(crate) write_motion: Option<WriteMotion>,
-    /// What its clips may hold beside rotations at times.
+    /// The features that the format can store.
     pub features: &'static [Feature],
-    /// The options that its reader and its writers take.
+    /// The options that its reader and its writers support.
     pub options: &'static [FormatOption],
 }
 
-/// Options that not every format takes: programs refuse them for the others.
+/// Options that only some formats support. Programs refuse them for other formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FormatOption {
     /// [`ReadOptions::raw_times`].
@@ -91,7 +92,7 @@ pub enum FormatOption {
 }
 
 impl FormatOption {
-    /// The options for reading tables and arrays, whose meaning is not fixed.
+    /// The options of readers of tables and arrays, whose columns have no fixed meaning.
     pub(crate) const OF_ARRAYS: [Self; 5] = [
         Self::RawTimes,
         Self::Duplicates,
@@ -100,7 +101,7 @@ impl FormatOption {
         Self::TimeUnit,
     ];
 
-    /// The same, keys that are missing, and the order of the columns that are written.
+    /// The same options, and those for missing keys and for the order of written columns.
     pub(crate) const OF_TABLES: [Self; 7] = [
         Self::RawTimes,
         Self::Duplicates,
@@ -112,41 +113,40 @@ impl FormatOption {
     ];
 }
 
-/// Reads the keyframes of a file.
+/// A function that reads the clips of a file.
 pub type ReadKeys = fn(&Path, &ReadOptions) -> Result<Loaded, Diagnostic>;
 
-/// Reads the keyframes of the bytes of a file; the text is what messages call it.
+/// A function that reads clips from the bytes of a file; the text is the input's name in messages.
 pub type ReadBytes = fn(&str, Vec<u8>, &ReadOptions) -> Result<Loaded, Diagnostic>;
 
-/// How inputs are read.
+/// Options for reading inputs.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
-    /// How much is read at most.
+    /// The largest sizes of inputs that are read.
     pub limits: Limits,
-    /// Named pipes are read too.
+    /// Whether named pipes are read.
     pub pipes: bool,
-    /// Times stay as the file has them, instead of on the frames that they were rounded from.
+    /// Whether times stay as stored, instead of being restored to the frames from which they were rounded.
     pub raw_times: bool,
-    /// What becomes of two different keys at one time.
+    /// What is done with two different keys at the same time.
     pub duplicates: Duplicates,
-    /// The rate of the keys, for files that do not say it.
+    /// The rate of the keys, for files that do not contain it.
     pub source_rate: Option<FrameRate>,
-    /// The times of the poses, for files that do not say them and whose format has them in a file of their own
-    /// (KITTI).
+    /// The times of the poses, for formats that store them in a separate file (KITTI).
     pub frame_times: Option<Arc<FrameTimes>>,
-    /// Which of a file's columns or arrays are what, for files that do not say it:
-    /// `rotations=keys:wxyz,time=t`.
+    /// The meaning of a file's columns or arrays, for files that do not specify it: `rotations=keys:wxyz,time=t`; see
+    /// [`map`](crate::map).
     pub map: Option<String>,
     /// The unit of times that are whole numbers: `s`, `ms`, `us` or `ns`.
     pub time_unit: Option<TimeUnit>,
-    /// Keys of a track some of whose numbers are missing (blank cells, nulls, NaN) are left out, so that it is
-    /// interpolated from those beside them; else they refuse the file.
+    /// Whether keys with missing numbers (blank cells, nulls, NaN) are left out, so that their track is interpolated
+    /// across them. Otherwise missing numbers are an error.
     pub bridge_gaps: bool,
-    /// Of a file whose curves are of another kind than a clip's (FBX) the keys at its key times alone, and as
-    /// many more as its turns take; else as many as it takes to follow the curves.
+    /// Whether the curves of an FBX file become keys only at their key times, plus the keys that large rotations
+    /// need. Otherwise as many keys are added as are needed to follow the curves.
     pub keyframes: bool,
-    /// A model of the body is going to say where joints are
-    /// ([`body_offsets`](crate::npz::body_offsets)): the shape in the file is not left out.
+    /// Whether a body model will supply the positions of joints ([`body_offsets`](crate::npz::body_offsets)), so that
+    /// the shape in the file is used, and no warning is returned for it.
     pub has_body_model: bool,
 }
 
@@ -172,7 +172,7 @@ tumble::names! {
 }
 
 impl TimeUnit {
-    /// The power of ten that it is of a second.
+    /// The power of ten of this unit in seconds.
     pub(crate) fn power(self) -> i32 {
         match self {
             Self::Seconds => 0,
@@ -182,7 +182,7 @@ impl TimeUnit {
         }
     }
 
-    /// How many of them a second has.
+    /// Number of these units in a second.
     #[must_use]
     pub fn per_second(self) -> u64 {
         match self {
@@ -194,37 +194,37 @@ impl TimeUnit {
     }
 }
 
-/// What was read.
+/// The contents of a file.
 #[derive(Debug, Clone, Default)]
 pub struct Loaded {
-    /// The clips of the file that could be read.
+    /// The clips that could be read, each complete.
     pub clips: Vec<Motion>,
-    /// Why the others could not; those that could are whole.
+    /// The errors of the clips that could not be read.
     pub refused: Vec<Diagnostic>,
-    /// The length of each box of a chain (a length, not a duration), where the file is about such.
+    /// The length of each box of a chain (in space, not in time), if the file contains it.
     pub box_length: Option<f64>,
-    /// What is remarkable, one entry for each kind.
+    /// Warnings about the file, one for each kind.
     pub warnings: Vec<Diagnostic>,
-    /// The file itself, where it can be written again with other keys and everything else kept.
+    /// The file itself, if it can be written again with other keys and everything else kept.
     pub document: Option<Arc<dyn Document>>,
-    /// The clips are in other units or about other axes than the file: whatever else it holds does not
-    /// go with them, so that it is not written again.
+    /// Whether the clips were converted to another unit or up axis ([`adjust_all`](crate::adjust::adjust_all)). The
+    /// rest of the file was not converted, so that `document` is not written again.
     pub is_adjusted: bool,
-    /// The unit and the axes of the clips, where the file says them.
+    /// The unit and the up axis of the clips, if the file specifies them.
     pub space: Option<Space>,
 }
 
-/// The unit of lengths, and the axis that is up.
+/// The unit of length and the up axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Space {
-    /// Up, a unit vector along an axis.
+    /// The up direction, a unit vector along an axis.
     pub up: DVec3,
-    /// A unit of length, metres.
+    /// The unit of length, in metres.
     pub metres: f64,
 }
 
 impl Loaded {
-    /// A file of one clip.
+    /// The contents of a file with one clip.
     #[must_use]
     pub fn of(clip: Motion, warnings: Vec<Diagnostic>) -> Self {
         Self {
@@ -235,36 +235,37 @@ impl Loaded {
     }
 }
 
-/// A file that keeps what it holds beside animations.
+/// A file that can be written again with other keys, keeping everything else.
 pub trait Document: fmt::Debug + Send + Sync {
-    /// The times, seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the
-    /// rate, and the clip's first and last time themselves, so that its length stays.
+    /// The times, in seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the rate, and the
+    /// first and the last key time of the clip, so that its duration stays. A format that cannot store a shorter last
+    /// interval leaves out the last time.
     ///
     /// # Errors
-    /// When the file's type of times cannot tell frames of this rate apart.
+    /// When the file's type of times cannot distinguish frames of this rate.
     fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic>;
 
-    /// Whether the file can be written again in that format.
+    /// Whether the file can be written again in `format`.
     fn writes(&self, format: &Format) -> bool;
 
-    /// What the file holds that no clip holds, by names that its format has for it (`meshes`).
+    /// The contents of the file that no clip contains, by their names in its format (`meshes`).
     fn other_contents(&self) -> Vec<String>;
 
-    /// The meshes that tracks of one of its clips carry, where the format has meshes.
+    /// The meshes that move with the tracks of `clip`; `None` if there are none.
     ///
     /// # Errors
-    /// When a mesh is broken, or is stored in a way that is not known.
+    /// When a mesh is invalid or is stored in an unknown form.
     fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
         let _ = clip;
         Ok(None)
     }
 
-    /// Writes the file, as the one that `path` names, with the samples of some of its clips, each
-    /// with the clip's index, instead of their keys; without any, everything stays as it is. Gives
+    /// Writes the file with samples of some of its clips instead of their keys. `clips` contains the index and the
+    /// samples of each; without any, the file is written unchanged. `path` is the path of the new file. Returns
     /// warnings.
     ///
     /// # Errors
-    /// When writing fails, or what was read cannot be written in this way.
+    /// When writing fails, or when the file cannot be written with these samples, in this format or to this path.
     fn write(
         &self,
         clips: &[(usize, SampledClip<'_>)],
@@ -274,41 +275,40 @@ pub trait Document: fmt::Debug + Send + Sync {
     ) -> Result<Vec<Diagnostic>, WriteError>;
 }
 
-/// Writes sampled clips; gives warnings of what becomes another thing.
+/// Writes sampled clips; returns warnings about data that is changed.
 pub(crate) type WriteMotion =
     fn(&[SampledClip<'_>], &MotionOptions, &mut dyn Write) -> Result<Vec<Diagnostic>, WriteError>;
 
-/// How sampled clips are written.
+/// Options for writing sampled clips.
 #[derive(Debug, Clone, Default)]
 pub struct MotionOptions {
-    /// What messages call the output.
+    /// The output's name in messages.
     pub name: String,
-    /// By which of the format's name and extensions it was asked for, where they differ: `gltf` is
-    /// text, `glb` is binary.
+    /// The name or extension by which the format was requested, where these differ: `gltf` is text, `glb` is binary.
     pub format: String,
-    /// The axes of the angles, for formats that have angles (BVH) [default: ZXY].
+    /// The order of the axes of Euler angles, for formats with angles (BVH) [default: ZXY].
     pub sequence: Option<EulerSequence>,
-    /// Arrays of a [`Document`] that hold a number a frame, of which the format does not know what
-    /// they are (`dmpls`): they are interpolated linearly instead of being left out.
+    /// Arrays of a [`Document`] with numbers for each frame whose meaning the format does not define (`dmpls`). The
+    /// listed ones are interpolated linearly; others are left out.
     pub linear: Vec<String>,
     /// The order of a quaternion's columns, for tables [default: CSV w x y z, the others x y z w].
     pub order: Option<ComponentOrder>,
     /// The length of each box, for chains of boxes [default: 1].
     pub box_length: Option<f64>,
-    /// The times are written into a file of their own ([`write_frame_times`](crate::kitti::write_frame_times)),
-    /// for formats that have none (KITTI).
+    /// Whether the times are written to a separate file ([`write_frame_times`](crate::kitti::write_frame_times)), for
+    /// formats without times (KITTI).
     pub times_apart: bool,
-    /// Rotations have few bits instead of f32 (glTF); those of cubics with tangents stay f32. A filter needs
-    /// [`meshopt`](Self::meshopt).
+    /// The quantization of rotations (glTF); `None` for f32. Rotations of cubics with tangents stay f32.
+    /// [`Quantization::Filtered`] needs [`meshopt`](Self::meshopt).
     pub quantize: Option<Quantization>,
-    /// A new file is compressed by `EXT_meshopt_compression` (glTF).
+    /// Whether a new file is compressed by `EXT_meshopt_compression` (glTF).
     pub meshopt: bool,
 }
 
 /// Why samples could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The system's reason.
+    /// The system's error.
     #[error(transparent)]
     Io(#[from] io::Error),
     /// The format cannot hold these samples.
@@ -316,15 +316,15 @@ pub enum WriteError {
     Refused(#[from] Diagnostic),
 }
 
-/// How a format holds results.
+/// How a format stores results.
 pub struct WriteResults {
-    /// The order of a quaternion's components where none is asked for.
+    /// The order of a quaternion's components unless another order is requested.
     pub order: ComponentOrder,
-    /// The only layout that it has, if it has but one.
+    /// The only layout of the format; `None` if it has both.
     pub layout: Option<Layout>,
-    /// The fewest bytes that a rotation takes.
+    /// The smallest number of bytes of a rotation.
     pub rotation_bytes: fn(Encoding) -> f64,
-    /// Begins a file of rotations, with its header.
+    /// Begins a file of rotations by writing its header.
     pub(crate) rotations:
         for<'a> fn(&'a mut dyn Write, &ResultShape<'a>) -> io::Result<Box<dyn ResultWriter + 'a>>,
     /// Writes poses.
@@ -332,8 +332,8 @@ pub struct WriteResults {
 }
 
 impl WriteResults {
-    /// Begins a file of rotations, with its header. Each quaternion gets the sign that continues the
-    /// one before it in its track.
+    /// Begins a file of rotations by writing its header. Signs of quaternions continue: each is negated if that makes
+    /// it nearer to the one before in its track.
     ///
     /// # Errors
     /// When writing fails.
@@ -355,7 +355,7 @@ impl WriteResults {
     }
 }
 
-/// Quaternions on their way into a file, with signs that continue.
+/// A writer of rotations that continues their signs.
 struct ContinuedSigns<'a> {
     writer: Box<dyn ResultWriter + 'a>,
     signs: Signs,
@@ -371,43 +371,44 @@ impl ResultWriter for ContinuedSigns<'_> {
     }
 }
 
-/// Takes the rotations of a result as they come.
+/// Writes the rotations of a result, which arrive in parts.
 pub trait ResultWriter {
     /// Writes the next rotations, in the order of the result's layout.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) there are more than the shape has.
+    /// When writing fails, or (`InvalidInput`) when there are more rotations than the shape has.
     fn write(&mut self, rotations: &[Quat]) -> io::Result<()>;
 
     /// Ends the file.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) rotations are missing.
+    /// When writing fails, or (`InvalidInput`) when rotations are missing.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-/// What is written: a set's rotations at the samples of a timeline.
+/// A result to be written: a set's rotations at the samples of a timeline.
 #[derive(Debug, Clone, Copy)]
 pub struct ResultShape<'a> {
-    /// What messages call the input.
+    /// The input's name in messages.
     pub name: &'a str,
-    /// The tracks.
+    /// The set of tracks.
     pub set: &'a TrackSet,
-    /// The samples.
+    /// The sample times.
     pub timeline: &'a Timeline,
     /// The order of tracks and samples.
     pub layout: Layout,
     /// The order of a quaternion's components [default: CSV w x y z, the others x y z w].
     pub order: Option<ComponentOrder>,
-    /// What a rotation is written as.
+    /// How a rotation is written.
     pub encoding: Encoding,
-    /// What made them, for formats that have room for it: `("method", "slerp")`.
+    /// How the result was made, for formats that can store it: `("method", "slerp")`.
     pub notes: &'a [(&'a str, String)],
 }
 
 impl Format {
-    /// Whether these clips, sampled, are written in it as clips, rather than the rotations of one
-    /// alone: of a format that holds nothing else, or of clips that are more than rotations.
+    /// Whether these clips, once sampled, are written as clips in this format; otherwise the rotations of one clip
+    /// are written as a result. Clips are written if the format stores nothing else, if there are several, or if one
+    /// has a skeleton, translations or scales.
     #[must_use]
     pub fn takes_motion(&self, clips: &[&Motion]) -> bool {
         let is_more = |clip: &&Motion| !clip.skeleton.is_empty() || clip.has_vectors();
@@ -415,25 +416,25 @@ impl Format {
             && (self.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
     }
 
-    /// Whether clips are written in it.
+    /// Whether the format can store clips.
     #[must_use]
     pub fn writes_clips(&self) -> bool {
         self.write_motion.is_some()
     }
 
-    /// Whether its files have room for that.
+    /// Whether the format can store `feature`.
     #[must_use]
     pub fn supports(&self, feature: Feature) -> bool {
         self.features.contains(&feature)
     }
 
-    /// Whether it takes this option.
+    /// Whether the format supports `option`.
     #[must_use]
     pub fn takes(&self, option: FormatOption) -> bool {
         self.options.contains(&option)
     }
 
-    /// Whether results are written in it.
+    /// Whether the format can store results or clips.
     #[must_use]
     pub fn is_writable(&self) -> bool {
         self.write.is_some() || self.write_motion.is_some()
@@ -442,7 +443,7 @@ impl Format {
     /// Reads a file in this format.
     ///
     /// # Errors
-    /// The first fault that refuses the file.
+    /// When the file cannot be opened or is invalid; the first error is returned.
     pub fn open(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
         (self.read)(path, options)
     }

@@ -1,8 +1,7 @@
-//! Keyframes like those of a linked pendulum: smooth, deterministic, of any size.
+//! Generated keyframes like those of a linked pendulum: smooth, deterministic, for any number of boxes and keys.
 //!
-//! Each box swings about an axis that drifts, by a sum of slow sines with
-//! frequencies and phases of its own, relative to its parent. The same seed gives
-//! the same file on every machine.
+//! Each box swings relative to its parent about an axis that drifts. The angle is a sum of slow sines with random
+//! frequencies and phases. The same seed makes the same file on every machine.
 
 use std::f64::consts::TAU;
 use std::io::{self, Write};
@@ -17,27 +16,27 @@ use crate::format::ReadOptions;
 /// How key times are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum KeySpacing {
-    /// Evenly.
+    /// At equal intervals.
     #[default]
     Uniform,
-    /// By steps of 1/4 to 7/4 of the mean.
+    /// At random intervals, from 1/4 to 7/4 of the mean.
     Random,
 }
 
-/// What to generate.
+/// A request for generated keyframes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generate {
     /// Number of boxes, 1 to 65 536.
     pub box_count: usize,
     /// Number of keys, at least 1.
     pub key_count: usize,
-    /// Time from the first key to the last, seconds.
+    /// Time from the first key to the last, in seconds.
     pub seconds: f64,
-    /// How keys are spaced.
+    /// The spacing of key times.
     pub spacing: KeySpacing,
-    /// Length of a box.
+    /// The length of each box.
     pub length: f64,
-    /// Which motion.
+    /// The seed of the motion.
     pub seed: u64,
 }
 
@@ -54,33 +53,33 @@ impl Default for Generate {
     }
 }
 
-/// Why nothing can be generated.
+/// Why keyframes cannot be generated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GenerateError {
-    /// The number of boxes.
+    /// The number of boxes is out of range.
     #[error("{boxes} boxes; there may be 1 to {MAX_BOXES}")]
     Boxes {
-        /// Boxes asked for.
+        /// Requested number of boxes.
         boxes: usize,
     },
-    /// The number of keys.
+    /// The number of keys is 0.
     #[error("0 keys; there is at least one")]
     Keys,
-    /// The length of the boxes.
+    /// The length of the boxes is not positive and finite.
     #[error("a box length of {length}; lengths are positive and finite")]
     Length {
-        /// Length asked for.
+        /// Requested length.
         length: f64,
     },
-    /// The times would not increase in a file's six decimals.
+    /// The time is not finite or exceeds 1e12 s, or it is too short for key times of six decimals to increase.
     #[error(
         "{keys} keys in {seconds} s; times have six decimals and must increase, so allow at least 4e-6 s a key"
     )]
     Seconds {
-        /// Keys asked for.
+        /// Requested number of keys.
         keys: usize,
-        /// Seconds asked for.
+        /// Requested time, in seconds.
         seconds: f64,
     },
 }
@@ -89,7 +88,7 @@ impl Generate {
     /// Checks the request.
     ///
     /// # Errors
-    /// What cannot be generated.
+    /// When the request is out of range.
     pub fn check(&self) -> Result<(), GenerateError> {
         let &Self {
             box_count: boxes,
@@ -114,11 +113,10 @@ impl Generate {
         Ok(())
     }
 
-    /// Writes a `.dat` file, a line at a time, in memory for one line.
+    /// Writes a `.dat` file line by line; the memory does not depend on the number of keys.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) the request does not pass
-    /// [`Generate::check`].
+    /// When writing fails, or (`InvalidInput`) when the request does not pass [`Generate::check`].
     pub fn write(&self, writer: &mut impl Write) -> io::Result<()> {
         self.check()
             .map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
@@ -140,13 +138,13 @@ impl Generate {
         Ok(())
     }
 
-    /// The set that reading the written file gives.
+    /// The set of tracks that reading the written file makes.
     ///
     /// # Errors
     /// When the request does not pass [`Generate::check`].
     ///
     /// # Panics
-    /// Never: memory takes what is written, and a test reads what is generated back.
+    /// Never: writing to memory does not fail, and a test reads generated files.
     pub fn track_set(&self) -> Result<TrackSet, GenerateError> {
         self.check()?;
         let mut file = Vec::new();
@@ -160,8 +158,8 @@ impl Generate {
     }
 }
 
-/// Key times without a list of them: the total of random steps is known only at
-/// their end, so they are drawn twice.
+/// Key times without a list of them. The sum of random steps is known only after the last one, so that they are
+/// generated twice.
 struct KeyTimes {
     seconds: f64,
     keys: usize,

@@ -1,4 +1,4 @@
-//! Other crates' decoders, whose panics on broken bytes become refusals of the input.
+//! Runs decoders of other crates, whose panics on damaged input become errors.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,14 +8,13 @@ thread_local! {
     static DEPTH: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Whether a panic of this thread, now, becomes a refusal of an input. A panic hook has nothing to say of
-/// such.
+/// Whether a panic of this thread would now become an error about an input. A panic hook prints nothing in this case.
 #[must_use]
 pub fn is_guarded() -> bool {
     DEPTH.get() > 0
 }
 
-/// What `work` gives, or its panic. Nothing that it has touched may be used after that.
+/// The result of `work`, or its panic. After a panic, data that `work` has modified must not be used.
 #[cfg_attr(
     not(any(feature = "parquet", test)),
     expect(dead_code, reason = "the tables' decoders alone assert")

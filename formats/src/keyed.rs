@@ -1,4 +1,4 @@
-//! The keys of a clip as samples: for formats that hold all joints at the same times.
+//! The keys of a clip as samples, for formats that store all joints at the same times.
 
 use glam::{Quat, Vec3};
 use tumble::{Channel, Device, Engine, Error};
@@ -9,7 +9,7 @@ use crate::motion::{ChannelInterpolation, Motion};
 use crate::sample::Samples;
 use crate::signs::continue_signs;
 
-/// Why the keys of a clip are no samples.
+/// Why the keys of a clip cannot serve as samples.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeyedError {
@@ -19,20 +19,20 @@ pub enum KeyedError {
          together with `tumble eval --fps`"
     )]
     TimesDiffer {
-        /// The first track whose times differ, from 0.
+        /// Index of the first track whose times differ, from 0.
         track: usize,
-        /// Its name.
+        /// Name of that track.
         name: String,
     },
-    /// Keys are meant for cubics with given tangents, which would be lost.
+    /// A channel is a cubic spline with tangents, which samples do not contain.
     #[error(
         "track {track} (`{name}`) is a cubic spline with tangents, which keys alone do not contain; \
          sample it with `tumble eval --fps`"
     )]
     Cubic {
-        /// The first such track, from 0.
+        /// Index of the first such track, from 0.
         track: usize,
-        /// Its name.
+        /// Name of that track.
         name: String,
     },
 }
@@ -41,7 +41,7 @@ pub enum KeyedError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeysError {
-    /// The format holds all channels at the same times.
+    /// The format stores all channels at the same times, and the keys of the clip are not samples.
     #[error(transparent)]
     Keyed(#[from] KeyedError),
     /// The first and the last sample could not be evaluated.
@@ -49,12 +49,15 @@ pub enum KeysError {
     Evaluating(#[from] Error),
 }
 
-/// The keys of a clip as a file of that format takes them, and whether it takes each channel's from the clip itself
-/// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)): at its own times, where channels
-/// differ or `is_kept`, the input's file with other keys.
+/// The keys of a clip as a file of `format` stores them, as samples with a flag. If the flag is `true`, the format
+/// takes the keys of each channel from the clip, at their separate times
+/// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)), and the samples are only those at the first
+/// and the last key. This is so in a format with separate key times, if the keys are not samples ([`keyed`]) or if
+/// `is_kept`: the input's file is written again with other keys.
 ///
 /// # Errors
-/// When the format has no room for channels that have their own times.
+/// When the keys are not samples, and the format has no separate key times or the poses are relative to the world;
+/// when the samples cannot be evaluated.
 pub fn keys_for(
     clip: &Motion,
     format: &Format,
@@ -68,11 +71,11 @@ pub fn keys_for(
     }
 }
 
-/// The keys of all tracks at their common times, with signs that continue. Channels with one key, and
-/// those at rest, hold.
+/// The keys of all tracks at their common times, with continued signs. A channel that has one key or none is
+/// constant.
 ///
 /// # Errors
-/// When the times of channels differ, or one is a cubic with tangents.
+/// When the key times of channels differ, or a channel is a cubic spline with tangents.
 pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
     let set = &clip.set;
     let tracks = set.track_count();
@@ -132,7 +135,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
     Ok(samples)
 }
 
-/// The key at a sample, or the last one.
+/// The key of a sample, or the last one.
 fn at<T: Copy>(keys: &[T], sample: usize) -> Option<T> {
     keys.get(sample).or(keys.last()).copied()
 }

@@ -1,4 +1,4 @@
-//! Keys as files have them, made into keys as sets take them: unit quaternions at increasing times.
+//! Converts the keys of files to keys of sets: unit quaternions at increasing times.
 
 use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
@@ -7,30 +7,31 @@ use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::quaternion::{dot, nearest_unit, rounded};
 use crate::warnings::Warnings;
 
-/// What becomes of two keys at one time whose values differ.
+/// What is done with two different keys at the same time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Duplicates {
     /// The input is refused.
     #[default]
     Refuse,
-    /// The first of them stays.
+    /// The first key is kept.
     First,
-    /// The last of them stays.
+    /// The last key is kept.
     Last,
-    /// Both stay, and the value jumps: the first is moved to the f32 before its time (6e-8 s at 1 s), or
-    /// half-way to the key before it where that is nearer. Of three or more, the first and the last.
+    /// Both keys are kept, and the value jumps. The first key is moved to the f32 before its time (6e-8 s earlier at
+    /// 1 s), or halfway to the key before it if that is nearer. Of three or more keys, the first and the last are
+    /// kept.
     Both,
 }
 
-/// Norms within this of 1 are normalised without a word: six printed digits.
+/// Norms that differ from 1 by no more than this are normalised without a warning: six printed digits.
 pub(crate) const QUIET_NORM: f64 = 0.0077;
 
-/// Quaternions of a smaller norm say nothing about a rotation.
+/// Quaternions with a smaller norm do not define a rotation.
 const LEAST_NORM: f64 = 1e-6;
 
-/// Where the keys of one channel come from, for messages.
+/// The source of the keys of one channel, for messages.
 pub(crate) struct Origin<'a> {
-    /// What messages call the input.
+    /// The input's name in messages.
     pub(crate) file: &'a str,
     /// Where key `i` is.
     pub(crate) location: &'a dyn Fn(usize) -> Location,
@@ -45,10 +46,10 @@ impl Origin<'_> {
         }
     }
 
-    /// Unit quaternions in f32; signs stay as they are.
+    /// Unit quaternions in f32, with unchanged signs.
     ///
     /// # Errors
-    /// A key that is not finite, or whose norm is under 1e-6.
+    /// When a key is not finite, or its norm is less than 1e-6.
     pub(crate) fn unit(
         &self,
         keys: impl IntoIterator<Item = DQuat>,
@@ -75,13 +76,11 @@ impl Origin<'_> {
         keys.into_iter().enumerate().map(unit).collect()
     }
 
-    /// Which keys stay, so that times increase strictly; `None` if all do. The times of some are moved for
-    /// [`Duplicates::Both`]. `equal(i, j)` says
-    /// whether the values of two keys are the same.
+    /// The keys to keep so that times increase strictly; `None` for all. With [`Duplicates::Both`], some times are
+    /// moved. `equal(i, j)` is whether the values of two keys are the same.
     ///
     /// # Errors
-    /// Times that are not finite or decrease, and equal times with values that differ where
-    /// [`Duplicates::Refuse`] is asked for.
+    /// When times are not finite or decrease, and when values at equal times differ with [`Duplicates::Refuse`].
     pub(crate) fn increasing(
         &self,
         times: &mut [f64],
@@ -150,8 +149,8 @@ impl Origin<'_> {
     }
 }
 
-/// The key that [`Origin::unit`] makes of it without a word, or NaN where there is something to be
-/// said: whoever has many keys looks for that first, and for where it is only then.
+/// The result of [`Origin::unit`] for a key that needs no warning; otherwise NaN. Callers with many keys first look
+/// for NaN, and determine locations only if there is one.
 #[inline(always)]
 pub(crate) fn quiet_unit(key: DQuat) -> Quat {
     let near = rounded(key);
@@ -164,7 +163,7 @@ pub(crate) fn quiet_unit(key: DQuat) -> Quat {
     }
 }
 
-/// The same of a key in f32.
+/// The same for a key in f32.
 #[inline(always)]
 pub(crate) fn quiet_unit_f32(key: Quat) -> Quat {
     let exact = key.as_dquat();
@@ -174,13 +173,14 @@ pub(crate) fn quiet_unit_f32(key: Quat) -> Quat {
     }
 }
 
-/// Whether a key counts as unit for certain: |n² - 1| is about twice |n - 1|.
+/// Whether a key is certainly a unit quaternion: |n² - 1| is about twice |n - 1|.
 #[inline(always)]
 fn is_unit(key: DQuat) -> bool {
     (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
 }
 
-/// A time a step of f32 before another, after an earlier one.
+/// The f32 before `time`, or the middle between `earlier` and `time` if that is nearer; `None` if there is no such
+/// time.
 pub(crate) fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
     let step = f64::from((time as f32).next_down());
     let Some(earlier) = earlier else {
@@ -194,7 +194,7 @@ pub(crate) fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
     (earlier < moved && moved < time).then_some(moved)
 }
 
-/// The entries of a list whose keys stay.
+/// Keeps the entries of a list whose keys are kept.
 pub(crate) fn select<T: Copy>(list: &mut Vec<T>, kept: Option<&[usize]>) {
     if let Some(kept) = kept {
         *list = kept.iter().map(|&key| list[key]).collect();

@@ -1,6 +1,6 @@
-//! Trajectories as the KITTI odometry benchmark has them: twelve numbers a line, the rows of a
-//! rotation matrix with a translation, `r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz`, one line a frame. When
-//! the frames are stands in a file of its own, a number of seconds a line.
+//! Trajectories in the format of the KITTI odometry benchmark: twelve numbers on each line, the rows of a rotation
+//! matrix with a translation, `r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz`, and one line for each frame. The times
+//! of the frames are in a separate file, in seconds, one on each line.
 
 use std::fmt::Write as _;
 use std::io::{self, BufRead, Write};
@@ -21,7 +21,7 @@ use crate::text::number;
 use crate::times::FrameTimes;
 use crate::tum::{Trajectory, TrajectoryPoses, decimal_count};
 
-/// A path of one body, without times.
+/// The KITTI format: the path of one body, without times.
 pub static FORMAT: Format = Format {
     name: "kitti",
     summary: "a trajectory, a matrix on each line; times are in another file",
@@ -43,20 +43,20 @@ pub static FORMAT: Format = Format {
     ],
 };
 
-/// Reads the times of frames: numbers of seconds, a line each; `-` is standard input.
+/// Reads the times of frames, in seconds, one on each line; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_frame_times(path: &Path, limits: Limits) -> Result<FrameTimes, Diagnostic> {
     Source::read_by(path, true, |name, reader| {
         read_frame_times(name, reader, limits)
     })
 }
 
-/// Reads the times of frames; `name` is what messages call the input.
+/// Reads the times of frames, in seconds; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid or contains no time; the first error is returned.
 pub fn read_frame_times(
     name: &str,
     reader: impl BufRead,
@@ -94,11 +94,12 @@ fn open_kitti(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
     })
 }
 
-/// Reads poses, one a frame of the rate that the options say or at the times that they name; the one track is
-/// named `body`.
+/// Reads poses, one for each line. Their times are the options' `frame_times`; without these, poses are frames of the
+/// options' `source_rate`. The only track is named `body`.
 ///
 /// # Errors
-/// The first fault that refuses the input; options with neither a rate nor times are one.
+/// When the input is invalid, when the options contain neither times nor a rate, or when the number of times is not
+/// that of the poses; the first error is returned.
 pub fn read_kitti(
     name: &str,
     reader: impl BufRead,
@@ -163,10 +164,10 @@ pub fn read_kitti(
 /// The numbers of a line: the rows of a matrix.
 const NUMBERS: usize = 12;
 
-/// The fourth row of a matrix, which says nothing.
+/// The fourth row of a matrix, which is constant.
 const FOURTH_ROW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Reads a line. `columns`: how many numbers the lines before it had.
+/// Reads a line. `columns` is the number of numbers on the lines before it.
 fn read_rows<R: BufRead>(
     lines: &mut Lines<R>,
     line: &str,
@@ -214,14 +215,14 @@ fn read_rows<R: BufRead>(
     Ok(rows)
 }
 
-/// How far a time may be from its frame, in frames.
+/// The largest distance of a time from its frame, in frames.
 const OFF_FRAME: f64 = 0.01;
 
 /// Decimals of a matrix' numbers: read back, they are the same rotation in f32.
 const DECIMALS: usize = 12;
 
-/// Writes the poses of one clip of one track. Their times go into a file of their own
-/// ([`write_frame_times`]), where there is one; else they are frames of a rate, which is said.
+/// Writes the poses of one clip of one track. Their times go to a separate file ([`write_frame_times`]) if there is
+/// one. Otherwise they must be frames of a rate, which a warning contains.
 fn write_motion(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,
@@ -263,17 +264,17 @@ fn write_motion(
     Ok(warnings)
 }
 
-/// A number of a matrix, without zeros at its end.
+/// A number of a matrix as text, without trailing zeros.
 fn decimals(number: f64) -> String {
     let text = format!("{number:.DECIMALS$}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0" } else { text }.to_owned()
 }
 
-/// Writes the times of a clip's samples, a line each.
+/// Writes the times of a clip's samples, in seconds, one on each line.
 ///
 /// # Errors
-/// When writing fails, or (`InvalidInput`) a time is out of range.
+/// When writing fails, or (`InvalidInput`) when a time is out of range.
 pub fn write_frame_times(sampled: &SampledClip<'_>, out: &mut dyn Write) -> io::Result<()> {
     for sample in 0..sampled.times.len() {
         let Some(digits) = sampled.time_digits(sample) else {

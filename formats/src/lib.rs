@@ -1,21 +1,19 @@
-//! The files that Tumble reads and writes, one file or folder a format, and the table of them
-//! ([`FORMATS`]); what is wrong with an input ([`Diagnostic`]); clips of motion files
-//! ([`Motion`](motion::Motion)), and how they are sampled ([`sample`]); and sets of any size to play
-//! with ([`generate`](mod@generate)).
+//! Reads and writes the file formats of Tumble. Each format is one module; the table [`FORMATS`] lists them. Errors
+//! and warnings about inputs are of type [`Diagnostic`]. A clip of a motion file is a [`Motion`](motion::Motion);
+//! [`sample`] evaluates it. [`generate`](mod@generate) makes sets of any size for tests.
 //!
-//! From the bottom to the top, where code uses what lies below it:
+//! The modules from the bottom up; each may use those before it:
 //!
-//! - inputs and their faults: [`diagnostic`], [`budget`], [`beneath`], and the private modules `source` and `text`;
-//! - what files hold: [`motion`], [`feature`], [`carried_mesh`], [`poses`];
-//! - [`format`](mod@format): what a format is, and the options of reading and writing;
-//! - the formats: [`dat`], [`bvh`], [`gltf`] and the others; CSV, Parquet and Arrow share the private module `table`;
-//! - [`FORMATS`], the table of all formats, and [`format::registry`]: which of them a file is in.
+//! - inputs and errors in them: [`diagnostic`], [`budget`], [`beneath`], and the private modules `source` and `text`;
+//! - the contents of files: [`motion`], [`feature`], [`carried_mesh`], [`poses`];
+//! - [`format`](mod@format): the description of a format, and the options of reading and writing;
+//! - the formats: [`dat`], [`bvh`], [`gltf`] and others; CSV, Parquet and Arrow share the private module `table`;
+//! - [`FORMATS`], the table of all formats, and [`format::registry`], which searches it.
 //!
-//! Files that hold no clips have tables of the same kind: [`SURFACES`] (meshes and nets of control points:
-//! [`surface`]) and [`PATHS`] ([`path`]).
+//! Formats of other files have tables of the same kind: [`SURFACES`] for meshes and nets of control points
+//! ([`surface`]), and [`PATHS`] for paths ([`path`]).
 //!
-//! Beside them stands what is made of clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim),
-//! [`adjust`](mod@adjust), [`compare`].
+//! Operations on clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`].
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -84,10 +82,10 @@ use crate::path::PathFormat;
 use crate::surface::SurfaceFormat;
 pub use crate::text::lines::Limits;
 
-/// Every format; a format is a file that names it in a `FORMAT`, and one line here. All of them are read. Help,
-/// the choice by a file's name, walks over directories, completions, messages, documents and tests walk
-/// this table. Inputs are known by their first bytes, then by the ending of their name; the first format is that
-/// of inputs which tell neither way, the first of [`Format::writable`] that of such outputs.
+/// All formats. To add one, write a module with a `FORMAT`, and add a line here. Help, the choice of a format by a
+/// file's name, searches of directories, completions, messages, documentation and tests use this table. Every format
+/// can be read. [`Format::detect`] finds the format of an input; the first format is the default. The first of
+/// [`Format::writable`] is the default for outputs.
 pub static FORMATS: &[&Format] = &[
     &dat::FORMAT,
     &gltf::FORMAT,
@@ -108,7 +106,7 @@ pub static FORMATS: &[&Format] = &[
     &mcap::FORMAT,
 ];
 
-/// Every format of surfaces, of which files are known by the ending of their name.
+/// All formats of surfaces. A file's format is recognised by its extension.
 pub static SURFACES: &[&SurfaceFormat] = &[
     &surface::obj::FORMAT,
     &surface::ply::FORMAT,
@@ -116,6 +114,5 @@ pub static SURFACES: &[&SurfaceFormat] = &[
     &surface::net::FORMAT,
 ];
 
-/// Every format of paths, of which files are known by their first bytes; the first is that of inputs which do not
-/// tell.
+/// All formats of paths. A file's format is recognised by its first bytes; the first format is the default.
 pub static PATHS: &[&PathFormat] = &[&path::csv::FORMAT, &path::npy::FORMAT];

@@ -1,12 +1,15 @@
-//! What a person says of a file's arrays or columns, for files that do not say it themselves:
+//! The meaning of a file's arrays or columns, as a user specifies it for files that do not:
 //! `rotations=keys:wxyz,time=t`.
 //!
-//! Entries are separated by commas. Each is `name=source`, then perhaps some of the source's last
-//! axis (`[3:7]` from 3 and before 7, `[0]` one alone), then perhaps what its numbers are: `:xyzw` or `:wxyz`, the
-//! order of a quaternion, `:rotvec`, a rotation vector, `:matrix`, the rows of a matrix, or angles about axes such as
-//! `:ZXY` (about turned axes; `:zxy`: about fixed ones), with `:deg` in degrees; and `:track` or `:frame`, the axis
-//! that comes first. A bracket behind a blank belongs
-//! to the source's name: `time=#timestamp [ns]`.
+//! Entries are separated by commas. Each is `name=source`, followed by any of these:
+//!
+//! - the range of the source's last axis: `[3:7]` for indices 3 to 6, `[0]` for index 0;
+//! - the form of a rotation: `:xyzw` or `:wxyz` for a quaternion, `:rotvec` for a rotation vector, `:matrix` for the
+//!   rows of a matrix, or the axes of Euler angles, `:ZXY` (rotating axes) or `:zxy` (fixed axes); `:deg` makes
+//!   rotation vectors and angles degrees;
+//! - the first axis of the array: `:track` or `:frame`.
+//!
+//! A bracket after a blank belongs to the name of the source: `time=#timestamp [ns]`.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -16,62 +19,62 @@ use tumble::Layout;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
-/// What each of some names is made of.
+/// The meaning of arrays or columns: an entry for each name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Map {
-    /// In the order in which they were given; no name comes twice.
+    /// The entries in the order of the text; no name occurs twice.
     pub entries: Vec<Entry>,
 }
 
-/// `name=source[3:7]:order`.
+/// One entry of a map, such as `name=source[3:7]:order`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// What the source is: `rotations`, `time`, or the name of a track.
+    /// The meaning of the source: `rotations`, `time`, or the name of a track.
     pub name: String,
     /// The array or column in the file.
     pub source: String,
-    /// Which numbers of the source's last axis are meant; all of them, if nothing is said.
+    /// The range of the source's last axis; `None` for all of it.
     pub columns: Option<Range<usize>>,
-    /// The order of a quaternion's components, if it is said.
+    /// The order of a quaternion's components, if it is specified.
     pub order: Option<ComponentOrder>,
-    /// What the numbers of a rotation are, if they are no quaternion.
+    /// The form of a rotation, if it is specified and not a quaternion.
     pub form: Option<RotationForm>,
-    /// Whether tracks or frames come first, if it is said.
+    /// Whether tracks or frames are the first axis, if it is specified.
     pub layout: Option<Layout>,
 }
 
-/// Why a text is no map.
+/// Why a text is not a map.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
     /// An entry lacks its name or its source.
     #[error("`{entry}` is not `name=source`; give entries such as `rotations=keys:wxyz`")]
     Entry {
-        /// The entry as given.
+        /// Text of the entry.
         entry: String,
     },
-    /// The columns are no range.
+    /// The range of columns is invalid.
     #[error(
         "`{columns}` in `{entry}` is not a range of columns; give one such as `[3:7]` or `[0]`"
     )]
     Columns {
-        /// The entry as given.
+        /// Text of the entry.
         entry: String,
-        /// What stands for the columns.
+        /// Text of the range.
         columns: String,
     },
-    /// A word behind the source is neither a form of rotations nor a layout.
+    /// A word after the source is neither a form of rotations nor a layout.
     #[error(
         "`{word}` in `{entry}` is neither a form of rotations (xyzw, wxyz, rotvec, matrix, axes such as ZXY, of \
          which rotvec and axes take deg) nor a layout (track, frame)"
     )]
     Word {
-        /// The entry as given.
+        /// Text of the entry.
         entry: String,
         /// The word.
         word: String,
     },
-    /// Two entries have one name.
+    /// Two entries have the same name.
     #[error("`{name}` is given twice; give each name once")]
     Twice {
         /// The name.
@@ -80,7 +83,7 @@ pub enum MapError {
 }
 
 impl Map {
-    /// The map of a source that holds rotations.
+    /// The map of a source that contains rotations.
     pub(crate) fn of_rotations(source: &str) -> Self {
         let entry = Entry {
             name: "rotations".to_owned(),
@@ -95,7 +98,7 @@ impl Map {
         }
     }
 
-    /// The entry of that name.
+    /// The entry with this name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.name == name)
@@ -193,7 +196,7 @@ impl FromStr for Entry {
 }
 
 impl Entry {
-    /// What the numbers of a rotation are; a quaternion unless something else is said.
+    /// The form of a rotation; a quaternion unless another form is specified.
     #[must_use]
     pub fn form(&self) -> RotationForm {
         let quaternion = || RotationForm::Quaternion(self.order.unwrap_or_default());
@@ -201,7 +204,7 @@ impl Entry {
     }
 }
 
-/// `[3:7]` or `[0]`.
+/// Parses `[3:7]` or `[0]`.
 fn columns(bracketed: &str) -> Option<Range<usize>> {
     let inner = bracketed.strip_prefix('[')?.strip_suffix(']')?;
     let number = |text: &str| text.trim().parse::<usize>().ok();

@@ -1,4 +1,4 @@
-//! What motion files hold: clips of keyed joints over a skeleton.
+//! Clips of motion files: keys of joints over a skeleton.
 
 mod dense;
 pub(crate) mod grid;
@@ -16,41 +16,41 @@ use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
 ///
-/// `skeleton` and `channels` have an entry for each track of `set`, or none at all. A joint whose
-/// channel has no keys rests: its track has one key, the rest rotation, and its `skeleton` entry
-/// has the rest translation and scale.
+/// `skeleton` and `channels` have an entry for each track of `set`, or are empty. A joint is at rest in a channel
+/// without keys: its track then has one key, the rest rotation, and its entry of `skeleton` has the rest translation
+/// and scale.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
-    /// The clip's name, if the file gives it one.
+    /// The clip's name, if the file contains one.
     pub name: Option<String>,
-    /// Its index among the file's clips, from 0, those that cannot be read included.
+    /// Index of the clip in the file, from 0; clips that cannot be read count too.
     pub index: usize,
-    /// Keys of rotations, one track a joint, and the keys of translations and scales beside them.
+    /// The keys of rotations, one track for each joint, and the keys of translations and scales.
     pub set: TrackSet,
-    /// The parents and rest transforms of the tracks; empty for tracks that are not joints of a skeleton.
+    /// The parents and rest transforms of the tracks; empty if the tracks are not joints of a skeleton.
     pub skeleton: Vec<Joint>,
-    /// How each track is keyed; empty where rotations are keyed and the file names no method.
+    /// How each track's channels are interpolated; empty if rotations have keys and the file specifies no method.
     pub channels: Vec<Channels>,
-    /// The rate on whose frames all times lie, if there is one.
+    /// The rate of which all key times are frames, if there is one.
     pub rate: Option<FrameRate>,
-    /// Rotations and translations are relative to the world instead of the parent.
+    /// Whether rotations and translations are relative to the world instead of the parent.
     pub is_world: bool,
-    /// Whole seconds that every time of the set is to be moved by. Clocks that count from 1970
-    /// would leave f64 only 0.2 µs; times that count from near their first lose nothing.
+    /// The seconds to add to every time of the set to get the time in the file. In f64, times since 1970 are exact
+    /// only to 0.2 µs; times relative to a second near the first one lose nothing.
     pub time_offset: i64,
-    /// What each track's translations, at rest and moving, are to be moved by, as positions of maps would
-    /// leave f32 only 0.5 m; empty where they count from 0.
+    /// The vector to add to each track's translations, at rest and animated; empty if all are 0. In f32, positions of
+    /// maps would be exact only to 0.5 m.
     pub origins: Vec<DVec3>,
-    /// Why poses in the world cannot be computed, where they cannot.
+    /// Why poses in the world cannot be computed; `None` if they can.
     pub no_world: Option<String>,
-    /// How BVH writes each track down; empty for clips of which no file says it.
+    /// How BVH stores each track; empty if the file does not contain it.
     pub bvh: Vec<BvhJoint>,
-    /// What is to be known of a body of SMPL.
+    /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
 }
 
 impl Motion {
-    /// The clip without its tracks: what is made of it gets others.
+    /// The clip without its tracks, for a clip with other tracks.
     pub(crate) fn without_tracks(&self) -> Self {
         Self {
             name: self.name.clone(),
@@ -65,20 +65,20 @@ impl Motion {
         }
     }
 
-    /// Whether a joint has a parent, or rests elsewhere than at 0.
+    /// Whether a joint has a parent, or a rest translation other than 0.
     #[must_use]
     pub fn has_hierarchy(&self) -> bool {
         let moves = |joint: &Joint| joint.parent.is_some() || joint.rest.translation != Vec3::ZERO;
         self.skeleton.iter().any(moves)
     }
 
-    /// How a track is keyed; nothing where the file says nothing of it.
+    /// How the channels of a track are interpolated; `None` for each if the file does not specify it.
     #[must_use]
     pub fn channel(&self, track: usize) -> Channels {
         self.channels.get(track).copied().unwrap_or_default()
     }
 
-    /// Where a track rests that has no keys of its translation or scale.
+    /// The translation or scale at which a track rests without keys for it.
     #[must_use]
     pub fn rest(&self, channel: Channel, track: usize) -> Vec3 {
         let rest = self
@@ -100,13 +100,13 @@ impl Motion {
         (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
     }
 
-    /// What a track's translations are to be moved by.
+    /// The vector to add to a track's translations ([`origins`](Self::origins)).
     #[must_use]
     pub fn origin(&self, track: usize) -> DVec3 {
         self.origins.get(track).copied().unwrap_or_default()
     }
 
-    /// Says what a track's translations are to be moved by.
+    /// Sets the vector to add to a track's translations.
     pub fn set_origin(&mut self, track: usize, origin: DVec3) {
         if origin == DVec3::ZERO && self.origins.is_empty() {
             return;
@@ -116,8 +116,8 @@ impl Motion {
         self.origins[track] = origin;
     }
 
-    /// Where a track rests, about an [origin](Self::origins) where it needs one; keys of translation have theirs
-    /// already.
+    /// The rest translation of a track at `position`, relative to an [origin](Self::origins) if it needs one. With
+    /// keys of translation it is relative to their origin.
     pub(crate) fn resting_at(
         &mut self,
         track: usize,
@@ -131,8 +131,8 @@ impl Motion {
         (position - self.origin(track)).as_vec3()
     }
 
-    /// Gives a track translation keys without tangents, about an [origin](Self::origins) where they
-    /// need one.
+    /// Sets translation keys of a track, without tangents. They are stored relative to an [origin](Self::origins) if
+    /// they need one.
     ///
     /// # Errors
     /// As [`TrackSet::set_translations`].
@@ -149,49 +149,48 @@ impl Motion {
     }
 }
 
-/// A body of SMPL, whose joints lie where its shape puts them.
+/// An SMPL body. The shape of the body determines where its joints are.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Body {
-    /// Where the shape puts the pelvis when `trans` is 0, in the clip's units and about its axes: it is
-    /// part of the translations of the first track, and no part of the file's `trans`. 0 as long as
-    /// no offsets are given.
+    /// The position of the pelvis when `trans` is 0, in the clip's units and axes. It is included in the translations
+    /// of the first track, but not in the file's `trans`. It is 0 until [`set_offsets`](crate::adjust::set_offsets)
+    /// sets it.
     pub pelvis: Vec3,
-    /// What the file says of the shape.
+    /// The shape, as the file specifies it.
     pub shape: Shape,
 }
 
-/// The shape of a body of SMPL.
+/// The shape of an SMPL body.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Shape {
-    /// How far it goes in each direction of the model; empty for the mean shape.
+    /// The coefficients of the model's shape directions; empty for the mean shape.
     pub betas: Vec<f64>,
-    /// `male`, `female`, `neutral`, or empty where the file does not say it.
+    /// `male`, `female`, `neutral`, or empty if the file does not contain it.
     pub gender: String,
 }
 
 /// A joint of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint {
-    /// The track of the parent joint; a root has none. Parents may come after their
-    /// children.
+    /// Index of the parent's track; `None` for a root. A parent may come after its children.
     pub parent: Option<usize>,
-    /// Its transform, relative to the parent, where nothing moves it.
+    /// The rest transform, relative to the parent.
     pub rest: Transform,
 }
 
-/// A scale, then a rotation, then a translation.
+/// A transform: first the scale, then the rotation, then the translation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transform {
-    /// Where the origin goes, in the file's units.
+    /// The translation, in the file's unit of length.
     pub translation: Vec3,
-    /// A unit quaternion.
+    /// The rotation, a unit quaternion.
     pub rotation: Quat,
-    /// Along the axes.
+    /// The scale along each axis.
     pub scale: Vec3,
 }
 
 impl Default for Transform {
-    /// Nothing moves.
+    /// The identity.
     fn default() -> Self {
         Self {
             translation: Vec3::ZERO,
@@ -201,19 +200,19 @@ impl Default for Transform {
     }
 }
 
-/// How the channels of one track are interpolated; `None` for a channel without keys, which rests.
+/// How the channels of one track are interpolated; `None` for a channel without keys, which is at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Channels {
-    /// Of the rotation.
+    /// Interpolation of the rotation.
     pub rotation: Option<ChannelInterpolation>,
-    /// Of the translation.
+    /// Interpolation of the translation.
     pub translation: Option<ChannelInterpolation>,
-    /// Of the scale.
+    /// Interpolation of the scale.
     pub scale: Option<ChannelInterpolation>,
 }
 
 impl Channels {
-    /// The sampler of a translation or scale.
+    /// The interpolation of the translation or the scale.
     #[must_use]
     pub fn of(&self, channel: Channel) -> Option<ChannelInterpolation> {
         match channel {
@@ -222,7 +221,7 @@ impl Channels {
         }
     }
 
-    /// Whether any of them has that sampler.
+    /// Whether any channel has this interpolation.
     #[must_use]
     pub fn has(self, sampler: ChannelInterpolation) -> bool {
         [self.rotation, self.translation, self.scale].contains(&Some(sampler))
@@ -235,16 +234,16 @@ impl Channels {
 )]
 #[serde(rename_all = "lowercase")]
 pub enum ChannelInterpolation {
-    /// The key at or before the time.
+    /// The value of the key at or before the time.
     Step,
-    /// Straight lines; the shorter arc for rotations.
+    /// Straight lines, or the shorter arcs for rotations.
     Linear,
-    /// Hermite cubics with given tangents; rotations are normalised.
+    /// Cubic Hermite splines with stored tangents; rotations are normalised.
     Cubic,
 }
 
 impl ChannelInterpolation {
-    /// Its name in glTF.
+    /// The name in glTF.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -255,10 +254,10 @@ impl ChannelInterpolation {
     }
 }
 
-/// Gives a track what some keys of another have beside their values: tangents, velocities and tensions.
+/// Copies the tangents, velocities and tensions of some keys of one track to another track.
 ///
 /// # Errors
-/// When the track does not have as many keys.
+/// When the track does not have the same number of keys.
 pub(crate) fn carry_key_data(
     set: &mut TrackSet,
     track: usize,
@@ -277,35 +276,35 @@ pub(crate) fn carry_key_data(
     Ok(())
 }
 
-/// What a clip is at each of its samples, ready to be written.
+/// The samples of a clip, ready to be written.
 ///
-/// Lists are in the order `[sample][track]`.
+/// The lists of rotations, translations and scales are in the order `[sample][track]`.
 #[derive(Debug, Clone)]
 pub struct SampledClip<'a> {
     /// The clip.
     pub clip: &'a Motion,
-    /// Times of the samples, seconds, increasing.
+    /// Sample times, in seconds, increasing.
     pub times: &'a [f64],
-    /// The rate, where the times are whole frames of one.
+    /// The rate, if all times are frames of one.
     pub rate: Option<FrameRate>,
-    /// Unit quaternions, each with the sign that continues the one before it.
+    /// Unit quaternions with continued signs: each is nearer to the one before in its track than its negative.
     pub rotations: &'a [Quat],
     /// Translations of all tracks; empty where no track has any.
     pub translations: &'a [Vec3],
     /// Scales of all tracks; empty where no track has any.
     pub scales: &'a [Vec3],
-    /// What made them, for formats that have room for it: `("method", "slerp")`.
+    /// How the samples were made, for formats that can store it: `("method", "slerp")`.
     pub notes: &'a [(&'a str, String)],
-    /// The samples are those of the clip's own keys: a format that has keys of each channel at times of
-    /// their own (glTF) writes these instead, unless the clip is in the world.
+    /// Whether the samples are those of the clip's keys. A format with separate key times for each channel (glTF)
+    /// then writes the keys instead, unless the poses are relative to the world.
     pub is_at_keys: bool,
 }
 
 impl SampledClip<'_> {
-    /// How many samples of all tracks there are.
+    /// Number of samples of all tracks together.
     ///
     /// # Errors
-    /// `InvalidInput` for a list that is shorter or longer than the times and the tracks say.
+    /// `InvalidInput` if the length of a list does not fit the times and the tracks.
     pub(crate) fn checked_len(&self) -> io::Result<usize> {
         let tracks = self.clip.set.track_count();
         let all = tracks.saturating_mul(self.times.len());
@@ -326,8 +325,8 @@ impl SampledClip<'_> {
         Ok(all)
     }
 
-    /// The digits of a sample's time in text. Where samples are not frames of a rate there are at least
-    /// nine behind the point, which tell readers that nothing was rounded to fewer. `None` out of range.
+    /// The time of a sample as text; `None` if it is out of range. If the samples are not frames of a rate, it has at
+    /// least nine decimals, so that readers do not take it for a rounded time.
     pub(crate) fn time_digits(&self, sample: usize) -> Option<String> {
         let time = Decimal::of(self.clip.time_offset, self.times[sample])?;
         Some(match self.rate {
@@ -337,7 +336,7 @@ impl SampledClip<'_> {
         })
     }
 
-    /// Whether the translations of any track are to be moved.
+    /// Whether any track has an origin other than 0.
     #[must_use]
     pub fn has_origins(&self) -> bool {
         self.clip
@@ -346,8 +345,8 @@ impl SampledClip<'_> {
             .any(|&origin| origin != DVec3::ZERO)
     }
 
-    /// Where a track is relative to its [origin](Motion::origins): of its
-    /// [`translations`](Self::translations) or, where there are none, at rest.
+    /// The translation of a track, relative to its [origin](Motion::origins): from
+    /// [`translations`](Self::translations), or the rest translation if that is empty.
     #[must_use]
     pub fn translation(&self, sample: usize, track: usize) -> Vec3 {
         let index = sample * self.clip.set.track_count() + track;
@@ -355,13 +354,13 @@ impl SampledClip<'_> {
         sampled.unwrap_or_else(|| self.clip.rest(Channel::Translation, track))
     }
 
-    /// Where a track is.
+    /// The position of a track: its translation plus its origin.
     #[must_use]
     pub fn position(&self, sample: usize, track: usize) -> DVec3 {
         self.clip.origin(track) + self.translation(sample, track).as_dvec3()
     }
 
-    /// The digits of where a track is.
+    /// The position of a track as text.
     pub(crate) fn coordinates(&self, sample: usize, track: usize) -> [String; 3] {
         let (origin, relative) = (self.clip.origin(track), self.translation(sample, track));
         [0, 1, 2].map(|axis| coordinate(origin[axis], relative[axis]))

@@ -1,15 +1,15 @@
-//! Names of joints that any program can read, and that are unique.
+//! Names of joints that are unique and that all programs can read.
 
 use std::collections::HashSet;
 
 use tumble::TrackSet;
 
-/// What the one track of a trajectory is called.
+/// The name of the only track of a trajectory.
 pub(crate) const TRAJECTORY_TRACK: &str = "body";
 
-/// The name of joint `index` (from 0) in a file whose names are all that is on a line before a brace,
-/// and differ: braces and control characters become `_`, a joint without a name is `joint7`, and a name
-/// that is taken gets the joint's number behind it, `hand#12`. `taken` collects what was given.
+/// The name of joint `index` (from 0) for a file in which a name is followed by a brace on the same line and must be
+/// unique. Braces and control characters become `_`, a joint without a name is `joint7`, and a name in `used` gets
+/// the joint's number after it: `hand#12`. The new name is added to `used`.
 pub(crate) fn line_name(name: &str, index: usize, used: &mut HashSet<String>) -> String {
     let is_odd = |c: char| c.is_control() && c != '\t' || c == '{' || c == '}';
     let mut usable = name.trim().replace(is_odd, "_");
@@ -19,7 +19,7 @@ pub(crate) fn line_name(name: &str, index: usize, used: &mut HashSet<String>) ->
     unique_name(usable, index, used)
 }
 
-/// The name itself; one that is taken gets the number behind it, and as many `_` as it takes.
+/// The name; if it is in `used`, the number and as many `_` as needed are appended.
 pub(crate) fn unique_name(mut name: String, index: usize, used: &mut HashSet<String>) -> String {
     if used.contains(&name) {
         name = format!("{name}#{index}");
@@ -31,7 +31,7 @@ pub(crate) fn unique_name(mut name: String, index: usize, used: &mut HashSet<Str
     name
 }
 
-/// The names of a set's tracks, made unique: a repeated name gets the track's number after it.
+/// The unique names of a set's tracks: a repeated name gets the track's number after it.
 pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
     let mut used = HashSet::new();
     let names =

@@ -1,5 +1,5 @@
-//! NPY: float32 (or float16, or int16), C order, shape `(tracks, frames, …)` or
-//! `(frames, tracks, …)`, four numbers a rotation or as its encoding has it.
+//! NPY arrays in C order, of shape `(tracks, frames, …)` or `(frames, tracks, …)`. They are float32, float16 or
+//! int16, with four numbers for a quaternion or the numbers of another encoding.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -15,7 +15,7 @@ use crate::npz::header::{ArrayHeader, Element};
 use crate::npz::{NumberArray, open_npy, read_npy};
 use crate::quaternion::ComponentOrder;
 
-/// `NumPy`'s array files.
+/// The NPY format: array files of `NumPy`.
 pub static FORMAT: Format = Format {
     name: "npy",
     summary: "a NumPy array, float32",
@@ -38,12 +38,12 @@ pub static FORMAT: Format = Format {
     options: &FormatOption::OF_ARRAYS,
 };
 
-/// Reads an array whose meaning its reader knows: points of paths, nets of control points. It is of floats
-/// (f2, f4 or f8, of either byte order, in C's or Fortran's order); `file` is what messages call it. `is_right` judges its shape before a number is read, and says in words what
-/// is wrong.
+/// Reads an array whose meaning the caller knows, such as points of paths or nets of control points. Its elements are
+/// floats (f2, f4 or f8, in either byte order, in C or Fortran order). `file` is the input's name in messages.
+/// `is_right` checks the shape before any number is read; it returns the error as text.
 ///
 /// # Errors
-/// When the bytes are no such array, or the shape is wrong.
+/// When the bytes are not such an array, or `is_right` refuses the shape.
 pub fn read_numbers(
     file: &str,
     bytes: &[u8],
@@ -78,13 +78,12 @@ pub fn read_numbers(
     })
 }
 
-/// The shape of the array that some bytes begin with; `None` where they are none, or its header is not
-/// whole.
+/// The shape of the array at the beginning of some bytes; `None` if there is no complete header.
 pub(crate) fn shape_of(start: &[u8]) -> Option<Vec<usize>> {
     ArrayHeader::parse(start).ok().map(|header| header.shape)
 }
 
-/// Rotations written at once, so that a signal is noticed soon: 4 MB.
+/// How many rotations are written at once, so that a signal is noticed soon: 4 MB.
 const PIECE: usize = 1 << 18;
 
 impl<W: Write> ResultWriter for NpyWriter<W> {
@@ -98,7 +97,7 @@ impl<W: Write> ResultWriter for NpyWriter<W> {
     }
 }
 
-/// Writes rotations as they come, some at a time.
+/// Writes rotations as an NPY array, in parts.
 pub struct NpyWriter<W> {
     writer: W,
     order: ComponentOrder,
@@ -123,12 +122,11 @@ impl<W: Write> NpyWriter<W> {
         )
     }
 
-    /// Writes the header for `rows × columns` rotations; [`Encoding::Snorm16`] is
-    /// int16, to be divided by 32767. The order is that of quaternions; nothing else has
-    /// one.
+    /// Writes the header of an array of `rows × columns` rotations. With [`Encoding::Snorm16`], numbers are int16, to
+    /// be divided by 32767. `order` is that of quaternions; other encodings have only one.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) no file could hold so many.
+    /// When writing fails, or (`InvalidInput`) when a file cannot store so many rotations.
     pub fn new(
         mut writer: W,
         rows: usize,
@@ -157,10 +155,10 @@ impl<W: Write> NpyWriter<W> {
         })
     }
 
-    /// Writes the next rotations.
+    /// Writes the next rotations, in the order of the array.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) there are more than the shape has.
+    /// When writing fails, or (`InvalidInput`) when there are more rotations than the shape has.
     pub fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
         let Some(missing) = self.missing.checked_sub(rotations.len()) else {
             return Err(io::Error::new(
@@ -195,11 +193,10 @@ impl<W: Write> NpyWriter<W> {
         Ok(())
     }
 
-    /// Flushes and gives the writer back.
+    /// Flushes the output and returns the writer.
     ///
     /// # Errors
-    /// When flushing fails, or (`InvalidInput`) there are fewer rotations than the
-    /// shape has.
+    /// When flushing fails, or (`InvalidInput`) when there are fewer rotations than the shape has.
     pub fn finish(mut self) -> io::Result<W> {
         if self.missing > 0 {
             let message = format!("{} rotations of the shape are missing", self.missing);

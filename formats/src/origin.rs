@@ -1,12 +1,12 @@
-//! Origins: positions far from 0, such as those of maps (UTM) and of the Earth (ECEF), keep all their
-//! digits, because kernels get f32 relative to a point near them, and writers add it again in f64.
+//! Origins keep the digits of positions at a large distance from 0, such as those of maps (UTM) and of the Earth
+//! (ECEF). Kernels get f32 positions relative to an origin near them; writers add the origin in f64.
 
 use glam::{DVec3, Vec3};
 
 /// Coordinates that stay below this have no origin: f32 rounds them by 1.2e-4 at most.
 pub(crate) const SMALL: f64 = 2048.0;
 
-/// Coordinates below this have none beside others that have one.
+/// If one coordinate needs an origin, the others get one too, except those below this.
 const SMALL_BESIDE: f64 = 16.0;
 
 /// Beyond this a coordinate is no position, and f64 holds no whole numbers of its size any more.
@@ -35,8 +35,8 @@ impl Bounds {
     }
 }
 
-/// The origin for some points. Each of its coordinates is a whole number, so that f64 takes it off and
-/// adds it exactly; 0 where f32 is about as fine without it.
+/// The origin for some points. Each of its coordinates is a whole number, so that f64 subtracts and adds it exactly.
+/// A coordinate of the origin is 0 where f32 is about as exact without it.
 #[must_use]
 pub fn origin_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
     let Some(Bounds { low, high }) = Bounds::of(points) else {
@@ -59,8 +59,8 @@ pub fn origin_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
     DVec3::new(axis(0), axis(1), axis(2))
 }
 
-/// The origin for a track that rests at a position. Most joints rest near their parents: one that hangs on another
-/// has an origin only where f32 alone would lose digits.
+/// The origin for a track that rests at a position. Most joints rest near their parents: a joint with a parent has an
+/// origin only if f32 alone would lose digits.
 pub(crate) fn origin_at_rest(parent: Option<usize>, position: DVec3) -> DVec3 {
     match parent {
         Some(_) if position.as_vec3().as_dvec3() == position => DVec3::ZERO,
@@ -76,8 +76,8 @@ pub fn relative(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
     (origin, points.collect())
 }
 
-/// A coordinate in the fewest decimals that tell it from its neighbours in f32 about its origin.
-/// Subnormal numbers are 0, as when they are read.
+/// The text of a coordinate, the sum of `origin` and `relative`, with the fewest decimals that distinguish it from
+/// the neighbouring f32 values of `relative`. Subnormal numbers are written as 0, as they are also read.
 #[must_use]
 pub fn coordinate(origin: f64, relative: f32) -> String {
     /// More decimals than f64 has for coordinates that need an origin.

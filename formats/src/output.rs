@@ -1,11 +1,9 @@
-//! Files are written whole or not at all: without a name, or under a temporary one, in
-//! their own directory, and get their names at the end. Standard output is the exception,
-//! for pipes.
+//! Writes files completely or not at all. A file that is being written has no name or a temporary one, in the
+//! directory of the output; it gets its name at the end. Standard output is the exception, for pipes.
 //!
-//! On Linux a file that is being written has no name (`O_TMPFILE`), so that whatever ends
-//! its writer leaves nothing behind. Where the file system knows no such files it is called
-//! `.tumble-….part`, and locked: what is not locked has no writer any more, and is removed by
-//! the next one.
+//! On Linux, a file that is being written has no name (`O_TMPFILE`), so that nothing remains if its writer is ended.
+//! If the file system does not support this, the file is called `.tumble-….part` and locked. A file without a lock
+//! has no writer any more, and the next writer removes it.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -19,60 +17,59 @@ use tempfile::NamedTempFile;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// It is there already.
+    /// The output exists already.
     #[error("{}: exists; give --overwrite to replace it", path.display())]
     Exists {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
     },
-    /// It is a directory.
+    /// The output is a directory.
     #[error("{}: is a directory; give a file in it", path.display())]
     Directory {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
     },
-    /// It is a device, a pipe or a socket.
+    /// The output is a device, a pipe or a socket.
     #[error("{}: is not a file; give a file, or `-` for standard output", path.display())]
     NotAFile {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
     },
-    /// Its directory is not there.
+    /// The directory of the output does not exist.
     #[error("{}: its directory {} does not exist; create it first", path.display(), parent.display())]
     NoDirectory {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
-        /// The directory.
+        /// Path of the directory.
         parent: PathBuf,
     },
-    /// It is one of the inputs, perhaps by another name.
+    /// The output is one of the inputs, perhaps by another name.
     #[error("{}: is the input {}; give another output", path.display(), input.display())]
     IsInput {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
-        /// The input.
+        /// Path of the input.
         input: PathBuf,
     },
-    /// Writing failed; what was there before is untouched.
+    /// Writing failed; an existing file is unchanged.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
 }
 
 impl OutputError {
-    /// Whether the reader of a pipe went away.
+    /// Whether the error is that of a pipe whose reader has ended.
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
     }
 }
 
-/// An output being written. Dropped before [`Output::commit`], it leaves nothing
-/// behind.
+/// An output that is being written. If it is dropped before [`Output::commit`], no file remains.
 pub struct Output {
     path: PathBuf,
     writer: OutputSink,
@@ -88,11 +85,11 @@ enum OutputSink {
 
 const BUFFER: usize = 1 << 18;
 
-/// Names of temporary files begin and end so.
+/// The prefix and the suffix of the names of temporary files.
 const PREFIX: &str = ".tumble-";
 const SUFFIX: &str = ".part";
 
-/// So many letters and digits at random end their names; a mark ends in `-`.
+/// Number of random letters and digits before the suffix. A mark before them ends in `-`.
 const RANDOM: usize = 6;
 
 /// The temporary files that this process is writing.
@@ -102,7 +99,7 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The entry of a temporary file in [`UNFINISHED`].
+/// The entry of a temporary file in [`UNFINISHED`], removed when this is dropped.
 struct UnfinishedEntry(PathBuf);
 
 impl Drop for UnfinishedEntry {
@@ -111,13 +108,12 @@ impl Drop for UnfinishedEntry {
     }
 }
 
-/// While it lives, this process creates no temporary file.
+/// A guard: while it lives, this process creates no temporary file.
 pub struct NoMoreOutputs {
     _unfinished: MutexGuard<'static, BTreeSet<PathBuf>>,
 }
 
-/// Removes all temporary files of this process, which is about to end: what is returned is to live
-/// until then.
+/// Removes all temporary files of this process, which is about to end. The returned guard must live until then.
 #[must_use]
 pub fn remove_unfinished() -> NoMoreOutputs {
     let unfinished = unfinished();
@@ -129,8 +125,8 @@ pub fn remove_unfinished() -> NoMoreOutputs {
     }
 }
 
-/// Removes the temporary files in a directory whose writers were killed; those that are
-/// being written are locked, and stay.
+/// Removes the temporary files in a directory whose writers were killed. Files that are being written are locked, and
+/// remain.
 pub fn remove_abandoned(directory: &Path) {
     for path in temporary_files(directory, |_| true) {
         if File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
@@ -139,16 +135,16 @@ pub fn remove_abandoned(directory: &Path) {
     }
 }
 
-/// Removes the temporary files in a directory that were created with that mark, whether or not they
-/// are locked: locks do not reach other machines.
+/// Removes the temporary files in a directory that were created with `mark`, whether or not they are locked: locks
+/// have no effect on other machines.
 pub fn remove_marked(directory: &Path, mark: &str) {
     for path in temporary_files(directory, |name| name.starts_with(mark)) {
         let _ = fs::remove_file(path); // the next run tries again
     }
 }
 
-/// The files in a directory that are called as temporary files are, and whose mark is a good one.
-/// Links, pipes and directories are nobody's output.
+/// The files in a directory with names of temporary files and with a mark for which `is_good` is true. Links, pipes
+/// and directories are left out.
 fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let temporary = entries.filter(|entry| {
@@ -172,20 +168,19 @@ fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<Path
 }
 
 impl Output {
-    /// Opens a temporary file beside `path`, after every check that can be made
-    /// before any work; `-` is standard output.
+    /// Checks whether the output can be written, and opens a temporary file in its directory; `-` is standard output.
+    /// The output must not be one of `inputs`.
     ///
     /// # Errors
-    /// An [`OutputError`]; nothing has been touched then.
+    /// An [`OutputError`]; no file has been changed then.
     pub fn create(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
         Self::create_marked(path, overwrite, inputs, "")
     }
 
-    /// As [`Output::create`], with a mark in the temporary file's name that [`remove_marked`] knows
-    /// it by.
+    /// As [`Output::create`], with a mark in the name of the temporary file, by which [`remove_marked`] finds it.
     ///
     /// # Errors
-    /// An [`OutputError`]; nothing has been touched then.
+    /// An [`OutputError`]; no file has been changed then.
     pub fn create_marked(
         path: &Path,
         overwrite: bool,
@@ -213,11 +208,11 @@ impl Output {
         })
     }
 
-    /// Hands everything to the system and gives the buffer's memory back, for files that wait for
-    /// others before they get their names.
+    /// Passes everything to the system and frees the buffer, for files that get their names later, together with
+    /// others.
     ///
     /// # Errors
-    /// When the system refuses what was still in the buffer.
+    /// When the system cannot write the rest of the buffer.
     pub fn settle(self) -> Result<Self, OutputError> {
         let Self { path, writer } = self;
         let writer = match writer {
@@ -239,15 +234,15 @@ impl Output {
         Ok(Self { path, writer })
     }
 
-    /// Writes out everything and gives the file its name.
+    /// Writes everything to the disk and names the file.
     ///
     /// # Errors
-    /// When the system cannot; the old file, if any, is intact then.
+    /// When the system cannot; an existing file is unchanged then.
     pub fn commit(self) -> Result<(), OutputError> {
         self.commit_open().map(drop)
     }
 
-    /// As [`Output::commit`]; gives the file, which is still open. Nothing for standard output.
+    /// As [`Output::commit`]; returns the file, which is still open, or `None` for standard output.
     ///
     /// # Errors
     /// As [`Output::commit`].
@@ -276,12 +271,12 @@ impl Output {
     }
 }
 
-/// A file without its name.
+/// A file that does not have its final name.
 enum Temporary {
-    /// It has none.
+    /// A file without a name.
     #[cfg(target_os = "linux")]
     Unnamed { file: File, mark: String },
-    /// Dropped before it is forgotten.
+    /// A file with a temporary name. It is removed before its entry.
     Named(NamedTempFile, UnfinishedEntry),
 }
 
@@ -354,8 +349,8 @@ fn builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
     builder
 }
 
-/// A file without a name; nothing where the file system has no such files, and of what else is wrong
-/// with the directory the named file tells.
+/// A file without a name; `None` if the file system does not support this, or if the directory has another fault,
+/// which the creation of a named file then reports.
 #[cfg(target_os = "linux")]
 fn unnamed_in(parent: &Path) -> Option<File> {
     use rustix::fs::{Mode, OFlags, open};
@@ -368,14 +363,14 @@ fn unnamed_in(parent: &Path) -> Option<File> {
         .then_some(file)
 }
 
-/// What leads to an open file.
+/// The path of an open file's descriptor.
 #[cfg(target_os = "linux")]
 fn descriptor(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd;
     PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
 }
 
-/// Gives a file a name, if nothing has it.
+/// Names a file, if no other file has the name.
 #[cfg(target_os = "linux")]
 fn link(file: &File, path: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
@@ -383,8 +378,8 @@ fn link(file: &File, path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A file with a temporary name, locked: who holds the lock is still writing; see `remove_abandoned`.
-/// A file system without locks has no such files removed.
+/// A locked file with a temporary name: a process with the lock is still writing; see `remove_abandoned`. On a file
+/// system without locks, such files are not removed.
 fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
     let prefix = format!("{PREFIX}{mark}");
     #[cfg_attr(not(unix), expect(unused_mut, reason = "Unix alone has permissions"))]
@@ -414,8 +409,8 @@ fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
     }
 }
 
-/// Looks once for what killed writers left, in a directory that is not too large to be looked through
-/// for each of many results.
+/// Removes the files of killed writers in a directory, once for each directory, unless it has too many files to read
+/// it for each of many results.
 fn remove_abandoned_once(parent: &Path) {
     static SEEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     const MAX_ENTRIES: usize = 4096;
@@ -454,7 +449,7 @@ impl Write for Output {
     }
 }
 
-/// Every check that needs no writing.
+/// Checks, without writing, whether an output can be written.
 ///
 /// # Errors
 /// An [`OutputError`].

@@ -1,5 +1,5 @@
-//! Paths that bodies follow. A format is a file that names it in a `FORMAT`, and a line in the table
-//! [`PATHS`].
+//! Paths that bodies follow, and their file formats. To add a format, write a module with a `FORMAT`, and add it to
+//! the table [`PATHS`].
 
 pub mod csv;
 pub mod npy;
@@ -19,20 +19,20 @@ use crate::source::Source;
 
 /// A file format of paths.
 pub struct PathFormat {
-    /// The name by which programs call it, and the extension of its files.
+    /// Name of the format in options and messages, which is also the extension of its files.
     pub name: &'static str,
-    /// What is read of it, in a few words.
+    /// A short description of the contents that are read.
     pub summary: &'static str,
-    /// Whether a file that begins with these bytes is one, whatever it holds.
+    /// Whether a file that begins with these bytes is in this format, with whatever contents.
     pub probe: fn(&[u8]) -> bool,
-    /// Whether a file of the format that begins with these bytes is one of paths.
+    /// Whether a file of this format that begins with these bytes contains paths.
     pub is_of_paths: fn(&[u8]) -> bool,
-    /// Reads the paths of the bytes of a file; the text is what messages call it.
+    /// Reads the paths of the bytes of a file; the text is the input's name in messages.
     pub read_bytes: fn(&str, &[u8]) -> Result<Vec<PathPoints>, Diagnostic>,
 }
 
 impl PathFormat {
-    /// The format of a file that begins with these bytes: the first of the table where they tell nothing.
+    /// The format of a file that begins with these bytes; the first of [`PATHS`] if no format recognises them.
     #[must_use]
     pub fn detect(start: &[u8]) -> &'static Self {
         let mut all = PATHS.iter().copied();
@@ -46,32 +46,33 @@ impl std::fmt::Debug for PathFormat {
     }
 }
 
-/// The duration of paths whose file has no times.
+/// The speed or the duration of paths whose file contains no times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// From the first point to the last, seconds. Each point is passed when this part of the way
-    /// along the straight lines between the points is covered.
+    /// The time from the first point to the last, in seconds. The time of each point is proportional to its distance
+    /// from the first point along the straight lines between points.
     Seconds(f64),
-    /// The way along these lines that is covered in a second.
+    /// The distance along these lines in a second.
     Rate(f64),
 }
 
 /// The points of one path.
 #[derive(Debug, Clone, Default)]
 pub struct PathPoints {
-    /// Seconds, increasing; empty if there are none.
+    /// The times of the points in seconds, increasing; empty if there are none.
     pub times: Vec<f64>,
-    /// The points, one for each time.
+    /// The points.
     pub points: Vec<DVec3>,
     /// Upward directions, one for each point; empty if there are none.
     pub ups: Vec<Option<Vec3>>,
 }
 
-/// Reads the paths of a file, a track each, named `name`; `-` is standard input. All have one
-/// [origin](Motion::origins), if any, so that one can look at another.
+/// Reads the paths of a file as a clip with one track for each; `-` is standard input. A single track is named
+/// `name`, and several are named `name` with their index. All tracks have the same [origin](Motion::origins), if any,
+/// so that one can be the target of another.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_paths(
     path: &Path,
     name: &str,
@@ -83,7 +84,7 @@ pub fn open_paths(
     read_paths(&file, name, &source.into_bytes(options.limits.file)?, pace)
 }
 
-/// Whether a file looks like one of paths. What cannot be read looks like none.
+/// Whether a file seems to contain paths; `false` if it cannot be read.
 #[must_use]
 pub fn looks_like_paths(path: &Path) -> bool {
     let mut start = Vec::new();
@@ -95,13 +96,14 @@ pub fn looks_like_paths(path: &Path) -> bool {
     read.is_ok() && (PathFormat::detect(&start).is_of_paths)(&start)
 }
 
-/// More than the header of an array or the first line of a table needs.
+/// Number of first bytes that are read: more than the header of an array or the first line of a table needs.
 const MAX_HEADER: u64 = 4096;
 
-/// Reads the bytes of a file; `file` is what messages call it, `name` what the tracks are called.
+/// Reads the paths of the bytes of a file as [`open_paths`] does. `file` is the input's name in messages, and `name`
+/// is the name of tracks.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the input is invalid; the first error is returned.
 pub fn read_paths(
     file: &str,
     name: &str,
@@ -112,10 +114,10 @@ pub fn read_paths(
     paths_of(file, name, paths, pace)
 }
 
-/// Paths of points, a track each; otherwise as [`open_paths`].
+/// Makes a clip of paths, with one track for each, as [`open_paths`] does.
 ///
 /// # Errors
-/// When a path has neither times nor a pace, or the set refuses its points.
+/// When a path has neither times nor a pace, when it has both, or when its points are not valid keys.
 pub fn paths_of(
     file: &str,
     name: &str,
@@ -148,8 +150,7 @@ pub fn paths_of(
 }
 
 impl PathPoints {
-    /// Gives points without times the times at which a body passes them. Of points that repeat the
-    /// one before, that one stays.
+    /// Computes times for points without times. Points that repeat the one before are removed.
     fn set_times(&mut self, file: &str, pace: Option<Pace>) -> Result<(), Diagnostic> {
         let refuse = |message: &str| Err(Diagnostic::new(file, Code::PathTimes, message));
         let has_times = !self.times.is_empty();

@@ -1,4 +1,4 @@
-//! Poses as files: so many numbers for every track at every frame, `[frame][track]`.
+//! Writes poses to files: several numbers for each track at each frame, in the order `[frame][track]`.
 
 use std::io::{self, Write};
 
@@ -9,36 +9,35 @@ use crate::npz::header::{ArrayHeader, Element};
 use crate::origin::coordinate;
 use crate::text::cell::text_cell;
 
-/// What the numbers of a local transform are called: moved, turned, scaled.
+/// Names of the components of a local transform: translation, rotation, scale.
 pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "sy", "sz"];
 
-/// What the numbers of a pose in the world are called.
+/// Names of the components of a pose in the world: position, rotation.
 pub const WORLD: [&str; 7] = ["px", "py", "pz", "x", "y", "z", "w"];
 
-/// Numbers of all tracks at all frames, and what each is called.
+/// The numbers of all tracks at all frames, with the names of their components.
 #[derive(Debug, Clone, Copy)]
 pub struct Poses<'a> {
-    /// The set whose tracks they are.
+    /// The set of the tracks.
     pub set: &'a TrackSet,
-    /// Their frames.
+    /// The times of the frames.
     pub timeline: &'a Timeline,
-    /// What the numbers of one track at one frame are called.
+    /// The names of the components of one track at one frame.
     pub components: &'a [&'a str],
-    /// `[frame][track][component]`.
+    /// The numbers, in the order `[frame][track][component]`.
     pub numbers: &'a [f32],
-    /// What the first three numbers of each track, which are its position, are to be moved by; empty
-    /// where they count from 0.
+    /// The vector to add to the first three components of each track, which are its position; empty if all are 0.
     pub origins: &'a [DVec3],
 }
 
 impl Poses<'_> {
-    /// Whether the positions of any track are to be moved.
+    /// Whether any track has an origin other than 0.
     #[must_use]
     pub fn has_origins(&self) -> bool {
         self.origins.iter().any(|&origin| origin != DVec3::ZERO)
     }
 
-    /// What the positions of a track are to be moved by.
+    /// The vector to add to the positions of a track.
     #[must_use]
     pub fn origin(&self, track: usize) -> DVec3 {
         self.origins.get(track).copied().unwrap_or_default()
@@ -51,11 +50,12 @@ impl Poses<'_> {
         numbers.map(move |(index, &number)| (index / width % tracks, index % width, number))
     }
 
-    /// Writes NPY of shape (frames, tracks, components): float32, or float64 where positions count from
-    /// an origin, which is added.
+    /// Writes an NPY array of shape (frames, tracks, components). It is float32; with origins it is float64, and they
+    /// are added to the positions.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) there are not as many numbers.
+    /// When writing fails, or (`InvalidInput`) when the number of values does not fit the frames, tracks and
+    /// components.
     pub fn write_npy(&self, writer: &mut impl Write) -> io::Result<()> {
         self.check()?;
         let shape = [
@@ -82,7 +82,8 @@ impl Poses<'_> {
         numbers.try_for_each(|number| writer.write_all(&number.to_le_bytes()))
     }
 
-    /// Writes CSV: `frame,time,<track>.<component>,…`, a line a frame.
+    /// Writes CSV with the columns `frame,time,<track>.<component>,…`, one line for each frame. Origins are added to
+    /// the positions.
     ///
     /// # Errors
     /// As [`Poses::write_npy`].

@@ -1,16 +1,15 @@
-//! Text that others wrote, as it may be shown to people: names, paths, headers, lists.
+//! Escapes texts of other programs before they are displayed: names, paths, headers, lists.
 //!
-//! A terminal obeys what it is sent: an escape sequence in the name of a joint moves the cursor, a line
-//! end in a file's name begins a line that looks like a verdict, and a mark of direction turns the words
-//! behind it round. Such characters are shown as what they are, `\u{1b}`.
+//! A terminal executes control characters: an escape sequence in the name of a joint moves the cursor, a line end in
+//! a file's name begins a line that looks like a verdict, and a direction mark reverses the words after it. Such
+//! characters are displayed as escapes, for example `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Whether a character does something instead of being seen: controls (C0, DEL, C1), ends of lines, marks
-/// that change the direction of writing or are not seen at all. Joiners, which words of many languages
-/// need, stay.
+/// Whether a character has an effect instead of a shape: controls (C0, DEL, C1), line ends, and marks that change the
+/// direction of writing or are invisible. Joiners, which words of many languages need, are not among them.
 fn is_active(character: char) -> bool {
     character.is_control()
         || matches!(character,
@@ -18,20 +17,20 @@ fn is_active(character: char) -> bool {
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The text with every such character written out: `\n`, `\t`, `\u{1b}`. Of most texts, the text itself.
+/// The text with such characters escaped: `\n`, `\t`, `\u{1b}`. Most texts are returned unchanged.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |_| false)
 }
 
-/// As [`printable`], of several lines.
+/// As [`printable`], for several lines: line feeds are kept.
 #[must_use]
 pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |character| character == '\n')
 }
 
-/// A path: bytes that are not UTF-8 are written out too, `\xff`, so that two paths never look the same
-/// because of them.
+/// A path as printable text. Bytes that are not UTF-8 are escaped too (`\xff`), so that paths that differ in them
+/// look different.
 #[must_use]
 pub fn printable_path(path: &Path) -> String {
     let mut shown = String::new();

@@ -1,4 +1,4 @@
-//! Quaternions on the way from numbers in f64 to keys.
+//! Converts quaternions in f64 to keys.
 
 use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
@@ -37,8 +37,8 @@ pub(crate) fn unit(q: DQuat) -> Quat {
     Quat::from_array(q.to_array().map(|component| (component / norm) as f32))
 }
 
-/// A quaternion that is unit once rounded to f32 is kept digit for digit, so that
-/// writing and reading a set is exact; others are normalised in f64.
+/// The unit quaternion of `key`, in f32. If the key rounded to f32 is a unit quaternion, it is only rounded, so that
+/// writing and reading a set is exact. Otherwise it is normalised in f64.
 #[must_use]
 pub fn nearest_unit(key: DQuat) -> Quat {
     let near = rounded(key);

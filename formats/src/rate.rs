@@ -1,13 +1,13 @@
-//! The rate of a file's keys, decided in one place from how its numbers were written: [`of`]. Times are
-//! seldom whole frames: they were rounded to f32, to some decimals, or multiplied from a period that
-//! was. What a rounding can have moved is known, so every rate is tried, and none is listed here but
-//! to choose between several that a few digits leave open.
+//! Finds the rate of a file's keys from its times as they are written: [`of`]. Times are seldom whole frames: they
+//! were rounded to f32 or to some decimals, or are multiples of a rounded period. The largest error of each rounding
+//! is known. Therefore all rates are tested, and a list of common rates only decides between several that a few
+//! digits leave open.
 //!
-//! The table in `docs/formats.md` is its test.
+//! The table in `docs/formats.md` is the test of this module.
 
 use tumble::FrameRate;
 
-/// How a number was kept, from which follows by how much it may be off.
+/// How a number was stored, which determines its largest rounding error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Precision {
     /// IEEE 754 single precision.
@@ -18,8 +18,8 @@ pub(crate) enum Precision {
     Decimals(u32),
 }
 
-/// A power with a whole exponent, by squaring: the same bits everywhere, which `f64::powi` does not
-/// promise. They decide which rate is found.
+/// A power with an integer exponent, by squaring. It has the same bits everywhere, which `f64::powi` does not
+/// promise; these bits determine the rate that is found.
 fn whole_power(base: f64, exponent: i32) -> f64 {
     let (mut rest, mut square, mut power) = (exponent.unsigned_abs(), base, 1.0);
     while rest > 0 {
@@ -45,7 +45,7 @@ impl Precision {
         }
     }
 
-    /// By how much a time may be off: it was rounded, and may be a multiple of a period that was.
+    /// The largest error of a time: it was rounded, and may be a multiple of a period that was rounded.
     pub(crate) fn rounding(self, time: f64) -> f64 {
         match self {
             Self::F32 => 0.5 * self.ulp(time) + time.abs() * f64::from(f32::EPSILON) * 0.500_1,
@@ -55,7 +55,7 @@ impl Precision {
     }
 }
 
-/// What a file says of its rate.
+/// The information about its rate in a file.
 pub(crate) enum RateSource<'a> {
     /// The times of its keys, seconds: a list for each track or channel.
     Times(&'a [Vec<f64>], Precision),
@@ -65,14 +65,14 @@ pub(crate) enum RateSource<'a> {
     Number(f64),
 }
 
-/// What follows from it.
+/// The result: the frames on which keys lie.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameGrid {
-    /// The rate of the frames that all keys lie on.
+    /// The rate of the frames of all keys.
     pub(crate) grid: FrameRate,
-    /// When one of these frames is, seconds.
+    /// The time of one of these frames in seconds.
     pub(crate) phase: f64,
-    /// Whether there are keys on neighbouring frames: the rate is that of the keys, too.
+    /// Whether some keys are on neighbouring frames, so that this is also the rate of the keys.
     pub(crate) is_rate: bool,
 }
 
@@ -91,7 +91,7 @@ impl FrameGrid {
     }
 }
 
-/// Decides what rate was meant.
+/// Finds the rate that was intended.
 pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     match *written {
         RateSource::Times(lists, precision) => of_times(lists, precision),
@@ -100,20 +100,20 @@ pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     }
 }
 
-/// The rates that people use. One of them is taken where a few digits leave several rates open.
+/// Common rates, one of which is chosen if few digits leave several rates open.
 const COMMON_RATES: [u64; 32] = [
     10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150, 165, 180,
     200, 240, 250, 300, 360, 400, 480, 500, 600, 1000,
 ];
 
-/// Rates that are whole, or whole by 1.001, are looked for up to this.
+/// The largest integer rate, and the largest integer rate divided by 1.001, that are searched.
 const MAX_RATE: f64 = 1000.0;
 
 /// The largest numerator and denominator of a rate: those that f64 holds exactly.
 const LARGEST: u128 = 1 << f64::MANTISSA_DIGITS;
 
-/// One of the rates from `low` to `high` that fit: the only whole one, or the only usual one of
-/// several; else likewise one that is whole but for 1.001 (NTSC).
+/// One of the rates from `low` to `high` for which `fits` is true: the only integer, or the only common rate of
+/// several integers; otherwise likewise for integers divided by 1.001 (NTSC).
 fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<FrameRate> {
     for (frames, seconds) in [(1, 1), (1000, 1001)] {
         let scale = seconds as f64 / frames as f64;
@@ -140,7 +140,7 @@ fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<Frame
     None
 }
 
-/// The rate of times that are all one after another in equal steps as they are written.
+/// The rate of times that increase by equal steps as they are written.
 fn as_written(seconds: f64) -> Option<FrameRate> {
     let whole = (1.0 / seconds).round();
     let is_whole =
@@ -157,12 +157,12 @@ fn is_whole(rate: FrameRate) -> bool {
 
 // ---- a number of frames a second
 
-/// A number this near to a usual rate, as a part of it, is that rate: AMASS has 120.00004577, and
-/// 29.97 is short for 30000/1001.
+/// A number within this of a common rate, relatively, is that rate: AMASS has 120.00004577, and 29.97 stands for
+/// 30000/1001.
 const NEAR: f64 = 2e-6;
 
-/// The rate that a number stands for: a whole number, one by 1.001, or the simplest fraction that is the
-/// number in f64. `None` for what is no rate.
+/// The rate of a number: an integer, an integer divided by 1.001, or the simplest fraction that is this number in
+/// f64. `None` if the number is not a rate.
 fn of_number(number: f64) -> Option<FrameRate> {
     let is_near = |rate: f64| (number - rate).abs() <= NEAR * rate;
     let whole = number.round();
@@ -181,10 +181,10 @@ fn of_number(number: f64) -> Option<FrameRate> {
 
 // ---- a frame's time
 
-/// The rate of a frame time of these digits: the whole number of frames whose time is written so, or
-/// times 1000/1001, or the number itself. Of few digits, as 0.017, several are open: the usual one
-/// is taken, if there is only one, else the number itself. Some programs print the digits of an f32, so
-/// it may also be a time rounded to f32 that is so near. `None` for times beyond 1e-9 s to 1e9 s.
+/// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number
+/// times 1000/1001, or the number itself. With few digits, such as 0.017, several rates are possible: the common one
+/// is chosen if there is only one, otherwise the number itself. Some programs print the digits of an f32, so that the
+/// time may also have been rounded to f32. `None` for times outside 1e-9 s to 1e9 s.
 fn of_period(digits: &str) -> Option<FrameRate> {
     let period: f64 = digits.parse().ok()?;
     if !(1e-9..=1e9).contains(&period) {
@@ -209,7 +209,7 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     choose(1.0 / (period + margin), high, fits).or(written)
 }
 
-/// The power of ten that the last digit of a number counts.
+/// The power of ten of a number's last digit.
 pub(crate) fn last_digit_power(token: &str) -> i32 {
     let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
     let decimals = mantissa
@@ -219,15 +219,15 @@ pub(crate) fn last_digit_power(token: &str) -> i32 {
     exponent.saturating_sub(decimals as i32)
 }
 
-/// The rate whose period is the simplest fraction that is this number in f64. So a rate comes back from
-/// the shortest digits of its period.
+/// The rate whose period is the simplest fraction that is this number in f64, so that a rate is found again from the
+/// shortest digits of its period.
 pub(crate) fn itself(period: f64) -> Option<FrameRate> {
     let (seconds, frames) = ratio(period)?;
     FrameRate::new(frames, seconds).ok()
 }
 
-/// The simplest fraction that is this number in f64: the first of its continued fraction's convergents
-/// that rounds to it. `None` for numbers beyond 1e-9 to 1e9.
+/// The simplest fraction that is this number in f64: the first convergent of its continued fraction that is rounded
+/// to it. `None` for numbers outside 1e-9 to 1e9.
 fn ratio(number: f64) -> Option<(u64, u64)> {
     if !(1e-9..=1e9).contains(&number) {
         return None;
@@ -258,7 +258,7 @@ fn ratio(number: f64) -> Option<(u64, u64)> {
 
 // ---- the times of keys
 
-/// A frame that some times stand for: when it can be, from what they may have been rounded by.
+/// The interval of time in which a frame can be, from the rounding errors of some times.
 #[derive(Debug, Clone, Copy)]
 struct TimeWindow {
     from: f64,
@@ -376,12 +376,12 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
         .or_else(some_grid)
 }
 
-/// Whether somebody may have written a period of so many digits: 0.03333333333333333 is a quotient.
+/// Whether a period has so few digits that a program may have used it: 0.03333333333333333 is a quotient.
 fn is_short(period: f64) -> bool {
     period.to_string().len() <= 14
 }
 
-/// A number of as few decimals as there are near another.
+/// The number with the fewest decimals within `near` of another.
 fn shortest(number: f64, near: f64) -> f64 {
     let decimals = (0..17).map(|digits| {
         let text = format!("{number:.digits$}");
@@ -391,7 +391,7 @@ fn shortest(number: f64, near: f64) -> f64 {
     decimals.into_iter().find(is_near).unwrap_or(number)
 }
 
-/// The frames that times stand for; `None` if they cannot be distinguished.
+/// The frames of times; `None` if they cannot be distinguished.
 fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
     let mut all: Vec<TimeWindow> = Vec::new();
     for &time in times {
@@ -408,17 +408,17 @@ fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
     (all.len() > 1).then_some(all)
 }
 
-/// Rates at which the smallest step between times is one frame, and all others are whole numbers of
-/// them: those from `low` to `high`.
+/// The rates at which the smallest step between times is one frame and all others are whole numbers of frames: those
+/// from `low` to `high`.
 struct StepRates {
     low: f64,
     high: f64,
-    /// The number of each window's frame.
+    /// The frame number of each window.
     counts: Vec<f64>,
 }
 
 impl StepRates {
-    /// Frames count from the first window.
+    /// With frames that count from the first window.
     fn of(windows: &[TimeWindow]) -> Option<Self> {
         let widest = windows
             .iter()
@@ -448,7 +448,7 @@ impl StepRates {
         Some(all)
     }
 
-    /// The same where frames count from time 0.
+    /// The same with frames that count from time 0.
     fn on_zero(&self, windows: &[TimeWindow]) -> Option<Self> {
         let mut all = Self {
             counts: Vec::with_capacity(windows.len()),
@@ -475,13 +475,13 @@ impl StepRates {
         increase.then_some(all)
     }
 
-    /// The number of frames in some seconds, if all the rates agree on it.
+    /// The number of frames in some seconds, if it is the same for all of the rates.
     fn count(&self, seconds: f64) -> Option<f64> {
         let is_sure = (self.high - self.low) * seconds.abs() <= 1.0;
         is_sure.then(|| (0.5 * (self.low + self.high) * seconds).round())
     }
 
-    /// Keeps the rates that have a number of frames in a time from `least` to `most`.
+    /// Keeps the rates with `count` frames in a time from `least` to `longest`.
     fn narrow(&mut self, count: f64, least: f64, longest: f64) -> Option<()> {
         if count < 1.0 || least <= 0.0 {
             return None;
@@ -490,7 +490,7 @@ impl StepRates {
         (self.low <= self.high).then_some(())
     }
 
-    /// Whether some phase puts a frame of the rate into each window.
+    /// Whether the frames of the rate can be shifted so that each window contains one.
     fn fit(&self, windows: &[TimeWindow], rate: FrameRate) -> bool {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for (window, count) in windows.iter().zip(&self.counts) {
@@ -510,7 +510,7 @@ impl StepRates {
         choose(low, high, |rate| is_within(rate) && fits(rate)).filter(|_| is_sure)
     }
 
-    /// A rate far simpler than those between two chance numbers are.
+    /// A rate that is much simpler than those between two random numbers.
     fn simple(&self) -> Option<FrameRate> {
         let (frames, seconds) = simplest(self.low, self.high)?;
         let width = (self.high - self.low).max(self.high * f64::EPSILON);
@@ -519,7 +519,7 @@ impl StepRates {
     }
 }
 
-/// The fraction of the smallest numbers from `low` to `high`.
+/// The fraction with the smallest numbers from `low` to `high`.
 fn simplest(low: f64, high: f64) -> Option<(u64, u64)> {
     // By the tree of Stern and Brocot, a run at a time.
     let (mut low, mut high) = (low, high);
@@ -549,11 +549,11 @@ fn simplest(low: f64, high: f64) -> Option<(u64, u64)> {
     None
 }
 
-/// The chance below which times do not lie on frames by accident.
+/// The probability below which it is not an accident that all times are frames of a rate.
 const ACCIDENT: f64 = 1e-3;
 
-/// A rate on whose frames, counted from 0, all times lie, though none on neighbouring ones: the lowest
-/// usual one, else the lowest.
+/// The lowest common rate such that all times are frames of it, counted from 0, though none are neighbours; otherwise
+/// the lowest such rate.
 fn on_some_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
     let whole = || (1..=MAX_RATE as u64).map(|rate| (rate, 1));
     let ntsc = || {
@@ -564,13 +564,13 @@ fn on_some_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
     on_common_grid(windows).or_else(|| on_one_of(windows, whole().chain(ntsc())))
 }
 
-/// The lowest usual rate on whose frames all times lie.
+/// The lowest common rate such that all times are frames of it.
 fn on_common_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
     let common = COMMON_RATES.iter().filter(|&&rate| rate >= 24);
     on_one_of(windows, common.map(|&rate| (rate, 1)))
 }
 
-/// The first of some rates on whose frames all times lie, if that is no accident.
+/// The first of some rates such that all times are frames of it, unless this may be an accident.
 fn on_one_of(
     windows: &[TimeWindow],
     rates: impl Iterator<Item = (u64, u64)> + Clone,
@@ -606,7 +606,7 @@ fn on_one_of(
     all.find(fits)
 }
 
-/// Whether all times are frames of the rate, one of which is at `phase`, but for their rounding.
+/// Whether all times are frames of the rate, of which one is at `phase`, up to rounding.
 pub(crate) fn on_frames(
     mut times: impl Iterator<Item = f64>,
     rate: FrameRate,

@@ -1,4 +1,4 @@
-//! How the numbers of a file say rotations.
+//! The forms in which files represent rotations by numbers.
 
 use glam::{DQuat, DVec3};
 use tumble::EulerSequence;
@@ -6,29 +6,29 @@ use tumble::EulerSequence;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_matrix::of_matrix;
 
-/// What the numbers of a rotation are.
+/// The form in which numbers represent a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RotationForm {
-    /// A quaternion, in this order.
+    /// A quaternion with components in this order.
     Quaternion(ComponentOrder),
-    /// An axis, as long as the angle.
+    /// A rotation vector: its direction is the axis, and its length is the angle.
     Vector {
-        /// In degrees instead of radians.
+        /// Whether the angle is in degrees instead of radians.
         degrees: bool,
     },
-    /// The rows of a matrix that turns column vectors.
+    /// A 3 × 3 matrix that rotates column vectors, row by row.
     Matrix,
-    /// Angles about axes.
+    /// Euler angles.
     Euler {
-        /// The axes.
+        /// The sequence of axes.
         sequence: EulerSequence,
-        /// In degrees instead of radians.
+        /// Whether the angles are in degrees instead of radians.
         degrees: bool,
     },
 }
 
 impl RotationForm {
-    /// How many numbers a rotation takes.
+    /// How many numbers represent a rotation.
     #[must_use]
     pub fn width(self) -> usize {
         match self {
@@ -38,7 +38,7 @@ impl RotationForm {
         }
     }
 
-    /// The rotation of so many numbers, as a quaternion of any norm; nothing where they are none.
+    /// The rotation that the numbers represent, as a quaternion of any norm; `None` if they do not represent one.
     pub(crate) fn rotation(self, numbers: &[f64]) -> Option<DQuat> {
         let angle = |degrees: bool| {
             if degrees {

@@ -1,11 +1,11 @@
-//! Rotations from matrices of numbers as files have them.
+//! Converts rotation matrices of files to quaternions.
 
 use glam::DQuat;
 
-/// How far lengths and products of the rows may be from those of a rotation: three printed digits.
+/// How much lengths and products of the rows may differ from those of a rotation: three printed digits.
 const TOLERANCE: f64 = 5e-3;
 
-/// The rotation of a matrix that turns column vectors, row after row; nothing if it is none.
+/// The rotation of a matrix that rotates column vectors, row by row; `None` if the matrix is not a rotation.
 pub(crate) fn of_matrix(rows: [[f64; 3]; 3]) -> Option<DQuat> {
     let [a, b, c] = rows;
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -1,4 +1,4 @@
-//! The one rule of signs, [`continue_signs`], for rotations that come some at a time.
+//! The rule for the signs of quaternions, [`continue_signs`], and its application to rotations that arrive in parts.
 
 use std::borrow::Cow;
 
@@ -8,19 +8,19 @@ use tumble::{Layout, signs_differ};
 pub use tumble::continue_signs;
 pub(crate) use tumble::signs_jump;
 
-/// Continues the signs of rotations that come some at a time, in the order of a layout.
+/// Continues the signs of rotations that arrive in parts, in the order of a layout.
 #[derive(Debug)]
 pub(crate) struct Signs {
     layout: Layout,
     samples: usize,
-    /// The rotations before the next ones, each with the sign that it was given: of every track in
-    /// turn where all tracks of a sample come together, else of the track that comes.
+    /// The last rotations, with the signs that they got: of every track if the layout is frame by frame, otherwise of
+    /// the current track.
     before: Vec<Quat>,
     index: usize,
 }
 
 impl Signs {
-    /// For so many tracks and samples.
+    /// For this number of tracks and samples.
     pub(crate) fn new(layout: Layout, tracks: usize, samples: usize) -> Self {
         let tracks = match layout {
             Layout::TrackMajor => 1,
@@ -34,7 +34,7 @@ impl Signs {
         }
     }
 
-    /// The next rotations; nothing is copied where no sign changes.
+    /// The next rotations with continued signs; they are copied only if a sign changes.
     pub(crate) fn next<'a>(&mut self, rotations: &'a [Quat]) -> Cow<'a, [Quat]> {
         if self.layout == Layout::TrackMajor && self.go_on(rotations) {
             return Cow::Borrowed(rotations);
@@ -57,8 +57,7 @@ impl Signs {
         all
     }
 
-    /// Whether no sign of some samples of tracks, one after another, is to be changed; if so, they have been
-    /// taken.
+    /// Whether no sign changes in some samples of tracks, one track after another. If so, they are processed.
     fn go_on(&mut self, mut rotations: &[Quat]) -> bool {
         let [mut before] = self.before[..] else {
             return false;

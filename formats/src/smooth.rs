@@ -1,4 +1,4 @@
-//! Clips without their noise: samples of all channels at even times, smoothed.
+//! Smooths clips: rotations and translations at samples with equal intervals.
 
 use tumble::{
     Channel, Engine, Error, FrameRate, Layout, Rotations, SampleTimes, Smoothing, SmoothingError,
@@ -8,55 +8,57 @@ use tumble::{
 use crate::motion::{ChannelInterpolation, Motion};
 use crate::sample::{ChannelMethods, Samples};
 
-/// Why a clip cannot be smoothed as asked.
+/// Why a clip cannot be smoothed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SmoothMotionError {
-    /// Kernels go over even samples, and the keys are none.
+    /// The keys have different intervals, or tracks have different key times. Smoothing needs samples with equal
+    /// intervals.
     #[error("the keys are not evenly spaced, or not at the same times in all tracks")]
     Uneven,
-    /// No kernel keeps what is slower than this frequency at the rate of the samples.
+    /// No kernel is a low-pass filter of this frequency at the rate of the samples.
     #[error("{hz} Hz: {reason}")]
     LowPass {
-        /// The frequency.
+        /// The frequency, in hertz.
         hz: f64,
-        /// Why not.
+        /// The error of the kernel.
         reason: SmoothingError,
     },
-    /// The samples are no rotations of the engine's.
+    /// The sample times are invalid, or the samples could not be evaluated.
     #[error(transparent)]
     Evaluating(#[from] Error),
 }
 
-/// The smoothing of one clip: which samples, and by which kernel.
+/// The smoothing of one clip: at which samples, and by which kernel.
 #[derive(Debug, Clone)]
 pub struct SmoothJob {
-    /// The samples.
+    /// The sample times.
     pub frames: SampleTimes,
-    /// The rate that they are frames of.
+    /// The rate of which the samples are frames, if there is one.
     pub rate: Option<FrameRate>,
-    /// The kernel is that of the frequency, where one was asked for.
+    /// The kernel and its options. If a frequency was requested, the kernel is that of the frequency.
     pub smoothing: Smoothing,
 }
 
-/// The samples of a clip as they were, and smoothed.
+/// The samples of a clip, before and after smoothing.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
-    /// As they were.
+    /// The samples before.
     pub before: Samples,
-    /// Smoothed.
+    /// The samples after.
     pub after: Samples,
 }
 
-/// How far steps of time may differ, as a part of a step.
+/// How much intervals may differ, relative to an interval.
 const EVEN: f64 = 1e-3;
 
 impl SmoothJob {
-    /// The smoothing of a clip's frames at a rate or, without one, of its keys. `low_pass`, Hz, takes the
-    /// place of the kernel: what is slower is kept, whatever the rate of the samples.
+    /// The smoothing of a clip at the frames of `rate`, or at its keys if there is no rate. `low_pass`, in hertz,
+    /// replaces the kernel of `smoothing`: lower frequencies are kept, whatever the rate of the samples.
     ///
     /// # Errors
-    /// When there is no rate and the keys are not even, or the frequency is too high or too low for the samples.
+    /// When there is no rate and the keys do not have equal intervals, or when the frequency is too high or too low
+    /// for the samples.
     pub fn new(
         clip: &Motion,
         smoothing: Smoothing,
@@ -91,7 +93,7 @@ impl SmoothJob {
         Ok(job)
     }
 
-    /// Samples the clip and smooths rotations and translations.
+    /// Samples the clip, and smooths rotations and translations. Scales are sampled only.
     ///
     /// # Errors
     /// As [`Engine::smooth`].
@@ -110,10 +112,11 @@ impl SmoothJob {
         Ok(Smoothed { before, after })
     }
 
-    /// The clip with its smoothed samples as keys; all else stays, and steps stay as they were.
+    /// The clip with its smoothed samples as keys. Channels with steps get the samples before smoothing; all else
+    /// stays.
     ///
     /// # Errors
-    /// When a sample is no key.
+    /// When a sample is not a valid key.
     pub fn clip(&self, clip: &Motion, smoothed: &Smoothed) -> Result<Motion, TrackError> {
         let tracks = clip.set.track_count();
         let mut keys = smoothed.after.clone();
@@ -138,7 +141,7 @@ impl SmoothJob {
     }
 }
 
-/// The times of the keys, if all tracks have the same and these are evenly spaced.
+/// The key times, if all tracks have the same ones at equal intervals.
 fn even_times(clip: &Motion) -> Option<Vec<f64>> {
     let longest = clip.set.tracks().max_by_key(|track| track.times.len())?;
     let times = longest.times;

@@ -1,4 +1,4 @@
-//! Opening an input: what the name stands for, before a byte of it is read.
+//! Opens inputs, and checks what a path is before a byte is read.
 
 use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};
@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::beneath::{is_refused, open_beneath};
 use crate::diagnostic::{Code, Diagnostic};
 
-/// An open input. What it was at the start is compared with what it is at the end.
+/// An open input. Its length and modification time are compared at the start and at the end.
 pub(super) struct Source {
     pub(super) name: String,
     pub(super) reader: BufReader<Box<dyn Read>>,
@@ -15,7 +15,7 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// `-` is standard input; a named pipe is opened only when `pipes` says so.
+    /// Opens an input; `-` is standard input. A named pipe is opened only if `pipes` is set.
     pub(super) fn open(path: &Path, pipes: bool) -> Result<Self, Diagnostic> {
         let name = path.display().to_string();
         let refuse = |code, message: String| Diagnostic::new(&name, code, message);
@@ -44,8 +44,8 @@ impl Source {
         Self::of_file(file, name.clone()).map_err(unreadable)
     }
 
-    /// Opens a file, has it read by a function that gets its name for messages, and refuses it if it was
-    /// written to meanwhile.
+    /// Opens a file and reads it by a function, which gets the name for messages. Refuses the file if it was changed
+    /// meanwhile.
     pub(super) fn read_by<T>(
         path: &Path,
         pipes: bool,
@@ -57,7 +57,7 @@ impl Source {
         Ok(found)
     }
 
-    /// A file that a file in `folder` names; see [`open_beneath`].
+    /// Opens a file that a file in `folder` names; see [`open_beneath`].
     pub(super) fn open_beneath(folder: &Path, named: &Path) -> Result<Self, Diagnostic> {
         let name = folder.join(named).display().to_string();
         let unreadable = |error: io::Error| match is_refused(&error) {
@@ -79,8 +79,8 @@ impl Source {
         })
     }
 
-    /// The first bytes of a file, up to 512; none of what is no file or cannot be read, whose fault
-    /// shows when it is opened. Standard input keeps them for its reader: they lie in its buffer.
+    /// The first bytes of a file, up to 512; none if it is not a file or cannot be read, which opening it reports.
+    /// The first bytes of standard input stay in its buffer for the reader.
     pub(super) fn start(path: &Path) -> Vec<u8> {
         if path.as_os_str() == "-" {
             let mut input = io::stdin().lock();
@@ -98,10 +98,10 @@ impl Source {
         start
     }
 
-    /// All bytes of a file that is at most so long.
+    /// All bytes of a file that is not longer than `limit`.
     ///
     /// # Errors
-    /// When reading fails, or the file is longer or changes meanwhile.
+    /// When reading fails, when the file is longer, or when it changes meanwhile.
     pub(super) fn into_bytes(mut self, limit: u64) -> Result<Vec<u8>, Diagnostic> {
         let known = self.file.as_ref().map_or(0, |(_, metadata)| metadata.len());
         let refuse = |code, message: String| Diagnostic::new(&self.name, code, message);
@@ -130,7 +130,7 @@ impl Source {
         Ok(bytes)
     }
 
-    /// Refuses a file that was written to while it was read.
+    /// Refuses a file that was changed while it was read.
     pub(super) fn check_unchanged(&self) -> Result<(), Diagnostic> {
         let Some((file, before)) = &self.file else {
             return Ok(());
@@ -147,13 +147,13 @@ impl Source {
     }
 }
 
-/// As many of the first bytes as tell a format.
+/// How many first bytes are enough to recognise a format.
 pub(super) const START: usize = 512;
 
-/// Large enough that reading is not a matter of system calls.
+/// Size of the buffer, large enough for the cost of system calls not to matter.
 const BUFFER: usize = 1 << 18;
 
-/// An input longer than this is refused unless the caller raises the limit.
+/// The length above which an input is refused, unless the caller raises the limit.
 pub(super) const MAX_BYTES: u64 = 16 << 30;
 
 #[cfg(unix)]

@@ -1,5 +1,4 @@
-//! A list of times: numbers of seconds separated by blanks, commas or line ends,
-//! with `#` comments.
+//! Lists of times: numbers of seconds, separated by blanks, commas or line ends, with `#` comments.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -10,26 +9,26 @@ use crate::source::Source;
 use crate::text::lines::{Limits, Lines, tokens};
 use crate::text::number;
 
-/// The times of frames, as a file has them.
+/// The times of frames with the digits of their file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameTimes {
     pub(crate) times: Vec<Decimal>,
-    /// The most decimals of one.
+    /// The largest number of decimals of a time.
     pub(crate) decimals: u32,
 }
 
-/// Reads a file; `-` is standard input.
+/// Reads the times in a file, in seconds; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_times(path: &Path) -> Result<Vec<f64>, Diagnostic> {
     Source::read_by(path, true, |name, reader| read_times(name, reader))
 }
 
-/// Reads times; `name` is what messages call the input.
+/// Reads times, in seconds; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the input; also when it holds no time.
+/// When the input is invalid or contains no time; the first error is returned.
 pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnostic> {
     let mut lines = Lines::new(name, reader, Limits::default())?;
     let mut times = Vec::new();

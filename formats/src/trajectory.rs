@@ -1,31 +1,31 @@
-//! How far an estimated path of one body is from a reference, as benchmarks of odometry and SLAM say it: after
-//! an alignment, pose by pose (absolute), or over steps of some seconds or metres (relative). The numbers are
-//! those of `evo`.
+//! Errors of an estimated path of one body against a reference, as benchmarks of odometry and SLAM define them: after
+//! an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The results are those of
+//! `evo`.
 
 use glam::{DQuat, DVec3};
 
-/// Where a body is, and how it is turned.
+/// The position and rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// In the world.
+    /// The position in the world.
     pub position: DVec3,
-    /// A unit quaternion.
+    /// The rotation, a unit quaternion.
     pub rotation: DQuat,
 }
 
-/// What is free when an estimate is laid over its reference by least squares of the positions.
+/// The degrees of freedom of an alignment. An estimate is aligned to its reference by least squares of the positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
-    /// Nothing: both are in one frame.
+    /// No alignment: both paths have the same frame.
     #[default]
     None,
-    /// Where it is.
+    /// Translation.
     Position,
-    /// Where it is, and its turn about z.
+    /// Translation, and rotation about z.
     Yaw,
-    /// Where it is and how it is turned (Horn 1987, the rotation of Umeyama 1991).
+    /// Translation and rotation (Horn 1987, the rotation of Umeyama 1991).
     Se3,
-    /// The same and its scale (Umeyama 1991), for a single camera's.
+    /// Translation, rotation and scale (Umeyama 1991), for estimates of a single camera.
     Sim3,
 }
 
@@ -38,32 +38,32 @@ tumble::names! {
     Sim3 => "sim3",
 }
 
-/// What lays an estimate over its reference: `scale`, then `rotation`, then `translation`.
+/// The transform that aligns an estimate to its reference: first `scale`, then `rotation`, then `translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// 1 but for [`Align::Sim3`].
+    /// Scale; 1 except for [`Align::Sim3`].
     pub scale: f64,
-    /// Of the whole path.
+    /// Rotation of the whole path.
     pub rotation: DQuat,
-    /// Of the whole path.
+    /// Translation of the whole path.
     pub translation: DVec3,
 }
 
-/// The step of relative errors.
+/// The length of a step for relative errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Step {
-    /// Of time.
+    /// Duration, in seconds.
     Seconds(f64),
-    /// Along the estimate.
+    /// Distance along the estimate, in metres.
     Metres(f64),
 }
 
-/// A text is no step.
+/// A text is not a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("not a step over 0, such as 1s or 0.5m")]
 pub struct StepError;
 
-/// `1s` or `0.5m`.
+/// Parses `1s` or `0.5m`.
 impl std::str::FromStr for Step {
     type Err = StepError;
 
@@ -80,35 +80,35 @@ impl std::str::FromStr for Step {
     }
 }
 
-/// The errors of some poses, or of the steps between some.
+/// The errors of poses, or of steps between poses.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Errors {
-    /// Lengths.
+    /// Distances, in the unit of the positions.
     pub distances: Vec<f64>,
-    /// Radians.
+    /// Angles, in radians.
     pub angles: Vec<f64>,
 }
 
-/// What some errors come to.
+/// Statistics of errors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Statistics {
-    /// The root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
-    /// The mean.
+    /// Mean.
     pub mean: f64,
-    /// The middle one, or the mean of the middle two.
+    /// Median: the middle error, or the mean of the middle two.
     pub median: f64,
-    /// The deviation from the mean, of all (not of a sample).
+    /// Standard deviation of these errors (not an estimate from a sample).
     pub deviation: f64,
-    /// The smallest.
+    /// Smallest error.
     pub smallest: f64,
-    /// The largest.
+    /// Largest error.
     pub largest: f64,
 }
 
 impl Alignment {
-    /// The best one for two paths of the same poses. Where the positions leave a rotation open, as those of a
-    /// straight line do, it is one of the best.
+    /// The best alignment of two paths with the same poses. If the positions do not determine a rotation, as on a
+    /// straight line, it is one of the best.
     #[must_use]
     pub fn of(reference: &[Pose], estimate: &[Pose], align: Align) -> Self {
         let nothing = Self {
@@ -160,13 +160,13 @@ impl Alignment {
         }
     }
 
-    /// By how much it turns, radians.
+    /// The angle of the rotation, in radians.
     #[must_use]
     pub fn angle(&self) -> f64 {
         angle(self.rotation)
     }
 
-    /// Where a pose of the estimate lies then.
+    /// The aligned pose of a pose of the estimate.
     #[must_use]
     pub fn apply(&self, pose: Pose) -> Pose {
         Pose {
@@ -176,13 +176,13 @@ impl Alignment {
     }
 }
 
-/// Of a rotation, radians.
+/// The angle of a rotation, in radians.
 fn angle(rotation: DQuat) -> f64 {
     2.0 * libm::atan2(rotation.xyz().length(), rotation.w.abs())
 }
 
-/// The rotation that lays the second vectors over the first, by least squares: the eigenvector of the largest
-/// eigenvalue of Horn's matrix.
+/// The rotation from the second vectors to the first by least squares: the eigenvector of the largest eigenvalue of
+/// Horn's matrix.
 fn best_rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DQuat {
     let mut s = [[0.0; 3]; 3];
     for (a, b) in pairs {
@@ -207,7 +207,7 @@ fn best_rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DQuat {
     }
 }
 
-/// Of a symmetric matrix, by Jacobi's rotations.
+/// The eigenvector of the largest eigenvalue of a symmetric matrix, by Jacobi rotations.
 fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
     let mut vectors = [[0.0; 4]; 4];
     for (index, row) in vectors.iter_mut().enumerate() {
@@ -258,7 +258,7 @@ impl Errors {
         self.angles.push(angle(between));
     }
 
-    /// Of each pose of an estimate that is aligned already.
+    /// The absolute errors of an aligned estimate, for each pose.
     #[must_use]
     pub fn absolute(reference: &[Pose], estimate: &[Pose]) -> Self {
         let mut errors = Self::default();
@@ -271,7 +271,8 @@ impl Errors {
         errors
     }
 
-    /// Of steps one after another, each from a pose to the first one that is so far behind it.
+    /// The relative errors of an estimate, for consecutive steps. A step is from one pose to the first later pose at
+    /// a distance or duration of `step` or more. `times` are the times of the poses, in seconds.
     #[must_use]
     pub fn relative(reference: &[Pose], estimate: &[Pose], times: &[f64], step: Step) -> Self {
         let mut errors = Self::default();
@@ -303,7 +304,7 @@ impl Errors {
 }
 
 impl Statistics {
-    /// `None` of nothing.
+    /// The statistics of `errors`; `None` if there are none.
     #[must_use]
     pub fn of(errors: &[f64]) -> Option<Self> {
         let mut sorted = errors.to_vec();

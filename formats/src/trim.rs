@@ -1,4 +1,4 @@
-//! A part of a clip, from one time to another.
+//! Cuts a part out of a clip, from one time to another.
 
 use glam::Vec3;
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet, signs_differ};
@@ -11,46 +11,47 @@ use crate::sample::ChannelMethods;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrimError {
-    /// Nothing of the clip lies there.
+    /// The part does not overlap the clip.
     #[error("nothing lies from {start} to {end} s: keys lie from {first} to {last} s")]
     Empty {
-        /// Where the part starts, seconds.
+        /// Start of the part, in seconds.
         start: f64,
-        /// Where it ends.
+        /// End of the part, in seconds.
         end: f64,
-        /// The first key of the clip.
+        /// First key time of the clip, in seconds.
         first: f64,
-        /// The last.
+        /// Last key time of the clip, in seconds.
         last: f64,
     },
-    /// A key at the cut would need what the clip gives its keys beside their values.
+    /// A new key at a cut would need the tangents, velocities or tensions that the other keys have.
     #[error(
         "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and none lies at \
          {time} s: cut at one of its keys, or sample it (`tumble eval --start --end`)"
     )]
     NoKeyAtCut {
-        /// The first such track, from 0.
+        /// Index of the first such track, from 0.
         track: usize,
-        /// Its name.
+        /// Name of that track.
         name: String,
-        /// Where the cut is, seconds.
+        /// Time of the cut, in seconds.
         time: f64,
     },
     /// A key at the cut could not be evaluated.
     #[error(transparent)]
     Evaluating(#[from] Error),
-    /// What was evaluated is no key.
+    /// An evaluated key is not valid.
     #[error(transparent)]
     Track(#[from] TrackError),
 }
 
-/// The keys of a clip from `start` to `end`, seconds, at their own times. Where a channel goes over a
-/// cut and has no key there it gets one, evaluated by its own sampler; so what is interpolated
-/// between two keys (steps, lines and arcs) stays the same curve. A curve that depends on keys
-/// beyond the cut changes in the intervals beside it.
+/// Cuts out the part of a clip from `start` to `end`, in seconds. Keys keep their times. A channel with keys on both
+/// sides of a cut, but none at it, gets a key there, evaluated by the interpolation of the channel. Curves that
+/// depend only on the two keys of an interval (steps, lines and arcs) stay the same. Curves that depend on keys
+/// outside the part change in the intervals next to the cuts.
 ///
 /// # Errors
-/// When nothing lies there, a cut would need a tangent that no key has, or `engine` fails.
+/// When the part does not overlap the clip or `start` is after `end`, when a new key would need tangents, velocities
+/// or tensions, or when `engine` fails.
 pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Motion, TrimError> {
     let set = &clip.set;
     let (first, last) = set.time_span().unwrap_or_default();
@@ -133,15 +134,15 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
     })
 }
 
-/// What of a channel's keys lies between the cuts, and where keys are to be made.
+/// The keys of a channel between the cuts, and where new keys are needed.
 struct TrimmedKeys {
     /// The keys that stay.
     kept: std::ops::Range<usize>,
     start: f64,
     end: f64,
-    /// A key is made at the start.
+    /// Whether a new key is needed at the start.
     before: bool,
-    /// A key is made at the end.
+    /// Whether a new key is needed at the end.
     after: bool,
 }
 
@@ -173,7 +174,7 @@ impl TrimmedKeys {
         }
     }
 
-    /// The time of a key that is made.
+    /// The time of a new key.
     fn made(&self) -> Option<f64> {
         match (self.before, self.after) {
             (true, _) => Some(self.start),
@@ -182,7 +183,7 @@ impl TrimmedKeys {
         }
     }
 
-    /// Whether the new key at this index is made by sampling.
+    /// Whether the key at this index is new.
     fn is_made(&self, index: usize) -> bool {
         let behind = usize::from(self.before) + self.kept.len();
         self.before && index == 0 || self.after && index == behind

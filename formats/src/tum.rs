@@ -1,5 +1,5 @@
-//! Trajectories as the TUM RGB-D benchmark has them: `t x y z qx qy qz qw` a line, separated by
-//! blanks or commas, with `#` comments. Times are often seconds since 1970.
+//! Trajectories in the format of the TUM RGB-D benchmark: `t x y z qx qy qz qw` on each line, separated by blanks or
+//! commas, with `#` comments. Times are often seconds since 1970.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Write};
@@ -24,13 +24,13 @@ use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use crate::warnings::Warnings;
 
-/// How a trajectory's line has a pose.
+/// The pose on a line of a trajectory.
 pub(crate) struct PoseLine {
-    /// Its numbers, for messages.
+    /// The numbers of a line, for messages.
     pub(crate) numbers: &'static str,
-    /// w comes before the other components of the quaternion.
+    /// Whether w is the first component of the quaternion.
     pub(crate) is_w_first: bool,
-    /// The unit of the times, where the format says it.
+    /// The unit of the times, if the format defines it.
     pub(crate) unit: Option<TimeUnit>,
 }
 
@@ -40,7 +40,7 @@ const LINE: PoseLine = PoseLine {
     unit: None,
 };
 
-/// A path of one body.
+/// The TUM format: the path of one body.
 pub static FORMAT: Format = Format {
     name: "tum",
     summary: "a trajectory, `t x y z qx qy qz qw` on each line",
@@ -74,22 +74,21 @@ pub static FORMAT: Format = Format {
     ],
 };
 
-/// Reads a file; `-` is standard input.
+/// Reads a TUM file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_tum(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     Source::read_by(path, options.pipes, |name, reader| {
         read_tum(name, reader, options)
     })
 }
 
-/// Reads poses; `name` is what messages call the input. The one track is named `body`. Times count
-/// from the whole second at or before the first, which is the clip's
-/// [`time_offset`](Motion::time_offset).
+/// Reads poses; `name` is the input's name in messages. The only track is named `body`. Times count from the whole
+/// second at or before the first time, which is the clip's [`time_offset`](Motion::time_offset).
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid; the first error is returned.
 pub fn read_tum(
     name: &str,
     reader: impl BufRead,
@@ -98,7 +97,7 @@ pub fn read_tum(
     read_lines(name, reader, options, &LINE)
 }
 
-/// Reads poses, one a line.
+/// Reads poses, one on each line.
 pub(crate) fn read_lines(
     name: &str,
     reader: impl BufRead,
@@ -124,27 +123,27 @@ pub(crate) fn read_lines(
     poses.into_clip(name, lines.warnings, options)
 }
 
-/// A first time of this many seconds, three billion years, is nanoseconds since 1970.
+/// If the first time is at least this many seconds (three billion years), times are nanoseconds since 1970.
 const NANOSECONDS: f64 = 1e17;
 
-/// The poses of a body as a file has them.
+/// The poses of a body in a file.
 #[derive(Default)]
 pub(crate) struct TrajectoryPoses {
     pub(crate) times: Vec<Decimal>,
-    /// The most decimals of a time in seconds.
+    /// The largest number of decimals of a time in seconds.
     pub(crate) decimals: u32,
-    /// The numbers of a line, of the first one; 0 before it.
+    /// How many numbers the first line has; 0 before it is read.
     columns: usize,
     /// The unit of the times.
     unit: Option<TimeUnit>,
     pub(crate) positions: Vec<DVec3>,
     pub(crate) rotations: Vec<DQuat>,
-    /// The line of each.
+    /// The line of each pose.
     pub(crate) lines: Vec<u64>,
 }
 
 impl TrajectoryPoses {
-    /// Reads a line, given also as the file has it, with its commas.
+    /// Reads `line`; `original` is the same line with its commas.
     fn read<R: BufRead>(
         &mut self,
         lines: &mut Lines<R>,
@@ -233,7 +232,7 @@ impl TrajectoryPoses {
         Ok(loaded)
     }
 
-    /// The clip, whose poses are at these times, seconds from a whole second on.
+    /// The clip with poses at these times, in seconds after the whole second `offset`.
     pub(crate) fn at(
         self,
         name: &str,
@@ -288,7 +287,7 @@ impl TrajectoryPoses {
     }
 }
 
-/// How many decimals a number has in a unit of `10^power` seconds, as seconds.
+/// Number of decimals in seconds of a number in a unit of `10^power` seconds.
 pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
     last_digit_power(token)
         .saturating_add(power)
@@ -296,13 +295,13 @@ pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
         .unsigned_abs()
 }
 
-/// Whether commas within numbers look like decimal ones: blanks separate numbers, and commas too.
+/// Whether commas seem to be decimal commas: there are commas within numbers that blanks separate.
 fn has_decimal_commas(line: &str) -> bool {
     let mut words = line.split_whitespace();
     line.split_whitespace().count() > 1 && words.any(|word| word.trim_matches(',').contains(','))
 }
 
-/// The samples of the one track of one clip, which are to be written as a trajectory.
+/// The samples of the only track of the only clip, to be written as a trajectory.
 pub(crate) struct Trajectory<'a> {
     pub(crate) sampled: &'a SampledClip<'a>,
     options: &'a MotionOptions,
@@ -310,7 +309,7 @@ pub(crate) struct Trajectory<'a> {
 
 impl<'a> Trajectory<'a> {
     /// # Errors
-    /// When there is not one clip of one track, or lists of samples differ in length.
+    /// When there is not exactly one clip of one track, or when the lengths of lists do not fit.
     pub(crate) fn of(
         clips: &'a [SampledClip<'a>],
         options: &'a MotionOptions,
@@ -333,10 +332,10 @@ impl<'a> Trajectory<'a> {
         Diagnostic::new(&self.options.name, Code::TumWrite, message).into()
     }
 
-    /// The rotation of a sample and the digits of its position.
+    /// The rotation of a sample, and its position as text.
     ///
     /// # Errors
-    /// When one is not finite.
+    /// When one of them is not finite.
     pub(crate) fn pose(&self, sample: usize) -> Result<(Quat, [String; 3]), WriteError> {
         let position = self.sampled.translation(sample, 0);
         let rotation = self.sampled.rotations[sample];
@@ -349,15 +348,15 @@ impl<'a> Trajectory<'a> {
         Ok((rotation, self.sampled.coordinates(sample, 0)))
     }
 
-    /// What is said of a time that no file holds.
+    /// The error of a time that files cannot store.
     pub(crate) fn out_of_range(&self, sample: usize) -> WriteError {
         let time = self.sampled.times[sample];
         self.refuse(format!("the time {time} s is out of range"))
     }
 }
 
-/// Writes one clip of one track. Times keep all digits, also those that count from 1970; the other
-/// numbers have the fewest digits that read back as the same f32, about an origin where there is one.
+/// Writes one clip of one track. Times keep all digits, even those since 1970. Other numbers have the fewest digits
+/// that are read back as the same f32, relative to an origin if there is one.
 fn write_motion(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,

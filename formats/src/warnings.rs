@@ -1,10 +1,10 @@
-//! Warnings of one input, one for each kind.
+//! Collects warnings about one input, one for each kind.
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 
-/// Names of what is left out, for a message; `None` where nothing is.
+/// The names of data that is left out, for a message; `None` if there are none.
 pub(crate) fn listed(mut names: Vec<String>) -> Option<String> {
-    /// More names than anybody reads.
+    /// The largest number of names in a message.
     const MAX_NAMES: usize = 12;
     let count = names.len();
     names.truncate(MAX_NAMES);
@@ -15,8 +15,8 @@ pub(crate) fn listed(mut names: Vec<String>) -> Option<String> {
     (count > 0).then(|| format!("{}{more}", names.join(", ")))
 }
 
-/// Collects what is remarkable about an input: the first of each code keeps its location and message,
-/// the others are counted.
+/// Collects warnings about an input: the first of each code determines the location and the message, and the others
+/// are counted.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Warnings {
     file: String,
@@ -24,7 +24,7 @@ pub(crate) struct Warnings {
 }
 
 impl Warnings {
-    /// Of an input that messages call `file`.
+    /// For an input whose name in messages is `file`.
     pub(crate) fn new(file: &str) -> Self {
         Self {
             file: file.to_owned(),
@@ -32,7 +32,7 @@ impl Warnings {
         }
     }
 
-    /// Counts a warning; location and message are made only for the first of its code.
+    /// Counts a warning; `describe` is called only for the first of its code.
     pub(crate) fn warn<M: Into<String>>(
         &mut self,
         code: Code,
@@ -48,7 +48,7 @@ impl Warnings {
         self.list.push(warning);
     }
 
-    /// All of them, in the order in which their kinds came up.
+    /// All warnings, in the order in which their codes first occurred.
     pub(crate) fn into_list(self) -> Vec<Diagnostic> {
         self.list
     }

@@ -1,4 +1,4 @@
-//! The shortest path along edges (Dijkstra, 1959).
+//! Finds the shortest path along edges (Dijkstra, 1959).
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -7,7 +7,7 @@ use crate::endpoints::Task;
 use crate::mesh::links::NONE;
 use crate::mesh::surface::{Spot, Surface};
 
-/// A distance that can be ordered: none is NaN.
+/// A distance with a total order: it is never NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Distance(pub(crate) f64);
 
@@ -25,8 +25,8 @@ impl Ord for Distance {
     }
 }
 
-/// For every vertex the length of the shortest path along edges, and the vertex before it on that
-/// path; infinite and [`NONE`] where no path leads.
+/// For every vertex, the length of the shortest path along edges and the vertex before it on that path; infinity and
+/// [`NONE`] if there is no path.
 pub(crate) fn distances(surface: &Surface, start: u32) -> (Vec<f64>, Vec<u32>) {
     let mut lengths = vec![f64::INFINITY; surface.positions.len()];
     let mut before = vec![NONE; surface.positions.len()];
@@ -48,7 +48,7 @@ pub(crate) fn distances(surface: &Surface, start: u32) -> (Vec<f64>, Vec<u32>) {
     (lengths, before)
 }
 
-/// The path from start to goal, which lie on one piece.
+/// The path from start to goal, which lie on the same piece.
 pub(crate) fn find_path(task: &Task<'_>) -> Vec<Spot> {
     let (_, before) = distances(&task.surface, task.start);
     let mut path = vec![Spot::vertex(task.goal)];

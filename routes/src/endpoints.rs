@@ -1,4 +1,4 @@
-//! Start and goal become vertices of the surface.
+//! Makes start and goal vertices of the surface.
 
 use std::borrow::Cow;
 
@@ -10,8 +10,8 @@ use crate::mesh::links::Links;
 use crate::mesh::surface::Surface;
 use crate::mesh::tree::{Nearest, nearest_on};
 
-/// A point within this fraction of a face's height of an edge lies on the edge. Rounding moves
-/// points of edges by less, and routes that are so much shorter or longer are the same.
+/// A point within this fraction of a face's height of an edge counts as on the edge. Points of edges move less than
+/// this by rounding, and routes whose lengths differ by this are equal.
 const ON_EDGE: f64 = 1e-12;
 
 /// A surface with start and goal among its vertices.
@@ -19,7 +19,7 @@ pub(crate) struct Task<'a> {
     pub(crate) surface: Cow<'a, Surface>,
     pub(crate) start: u32,
     pub(crate) goal: u32,
-    /// How far the surface was from the requested points, at the start and at the goal.
+    /// The distances of the requested start and goal from the surface.
     pub(crate) off: [f64; 2],
 }
 
@@ -74,15 +74,15 @@ pub(crate) fn locate_endpoints(
     })
 }
 
-/// A surface whose links are those before the first new vertex.
+/// A copy of a surface to which vertices are added. Its links are those from before the first new vertex.
 struct VertexInserter<'a> {
     surface: Cow<'a, Surface>,
-    /// Faces that were cut, and what they were cut into.
+    /// The faces that were divided, and their parts.
     changed: Vec<usize>,
 }
 
 impl VertexInserter<'_> {
-    /// The vertex at a point of the surface, which is made where there is none.
+    /// The vertex at a point of the surface, which is added if there is none.
     fn vertex(&mut self, at: Nearest) -> u32 {
         let corners = self.surface.triangle(at.face);
         let longest = (0..3)
@@ -105,7 +105,7 @@ impl VertexInserter<'_> {
         }
     }
 
-    /// A new vertex between others, its normal between theirs.
+    /// Adds a vertex between others, with a normal between theirs.
     fn add(&mut self, position: DVec3, normal: impl FnOnce(&[DVec3]) -> DVec3) -> u32 {
         let surface = self.surface.to_mut();
         surface.positions.push(position);

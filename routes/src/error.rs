@@ -3,143 +3,143 @@
 use glam::DVec3;
 use thiserror::Error;
 
-/// Why vertices and faces are no mesh.
+/// Why vertices and faces do not make a mesh.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// No face that has an area.
+    /// There is no face with an area.
     #[error("the mesh has no faces; give one with triangles or polygons")]
     Empty,
-    /// A coordinate is NaN or infinite, or beyond 1e75, where areas overflow.
+    /// A coordinate is NaN or infinite, or its magnitude exceeds 1e75, where areas overflow.
     #[error("vertex {vertex} (from 0) is at {position}; coordinates must be numbers below 1e75")]
     NotFinite {
-        /// Counted from 0.
+        /// Index of the vertex, from 0.
         vertex: usize,
-        /// Where it is said to be.
+        /// Its position.
         position: DVec3,
     },
-    /// A face names a vertex that is not there.
+    /// A face contains a vertex that does not exist.
     #[error("face {face} (from 0) names vertex {vertex}, and there are {count} from 0 on")]
     Index {
-        /// Counted from 0.
+        /// Index of the face, from 0.
         face: usize,
-        /// The vertex that it names.
+        /// Index of the vertex.
         vertex: u64,
         /// The number of vertices.
         count: usize,
     },
-    /// A face of fewer than three corners.
+    /// A face has fewer than three corners.
     #[error("face {face} (from 0) has {corners} corners; a face has three or more")]
     Corners {
-        /// Counted from 0.
+        /// Index of the face, from 0.
         face: usize,
-        /// How many it has.
+        /// Number of its corners.
         corners: usize,
     },
-    /// Three different corners on a line.
+    /// The three different corners of a triangle lie on a line.
     #[error(
         "face {face} (from 0) has no area: its corners {corners:?} lie on a line; remove it, or \
          collapse its shortest edge"
     )]
     Flat {
-        /// Counted from 0.
+        /// Index of the face, from 0.
         face: usize,
-        /// Where its corners are.
+        /// Positions of its corners.
         corners: [DVec3; 3],
     },
     /// The sides of a polygon cross each other.
     #[error("the sides of face {face} (from 0) cross each other; cut it into triangles")]
     Crosses {
-        /// Counted from 0.
+        /// Index of the face, from 0.
         face: usize,
     },
-    /// A polygon of very many corners that is not convex.
+    /// A polygon that is not convex has too many corners.
     #[error(
         "face {face} (from 0) is not convex and has {corners} corners, and can have {max}; cut it into triangles"
     )]
     TooManyCorners {
-        /// Counted from 0.
+        /// Index of the face, from 0.
         face: usize,
-        /// How many it has.
+        /// Number of its corners.
         corners: usize,
-        /// How many it can have.
+        /// The largest number of corners.
         max: usize,
     },
-    /// A distance for welding that is none.
+    /// The distance for welding is negative or not finite.
     #[error("vertices cannot be welded within {tolerance}; give a distance from 0")]
     Weld {
         /// The distance.
         tolerance: f64,
     },
-    /// More triangles than are counted in 32 bits, three corners each.
+    /// There are too many triangles to number their corners in 32 bits.
     #[error("the mesh has {triangles} triangles, and can have {max}; simplify it")]
     TooMany {
-        /// How many it has.
+        /// Number of triangles.
         triangles: usize,
-        /// How many it can have.
+        /// The largest number of triangles.
         max: usize,
     },
 }
 
-/// Something unusual about a mesh, which is used all the same.
+/// An unusual property of a mesh, which can be used nevertheless.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeshWarning {
-    /// Triangles with two equal corners.
+    /// Triangles with two equal corners are dropped.
     #[error(
         "{count} triangles have equal corners and are dropped; the first is of face {face} (from 0)"
     )]
     Dropped {
-        /// How many.
+        /// Number of such triangles.
         count: usize,
-        /// The face of the first, from 0.
+        /// Index of the face of the first one, from 0.
         face: usize,
     },
-    /// Polygons whose corners lie in no plane.
+    /// Polygons whose corners do not lie in one plane are cut in their mean plane.
     #[error(
         "{count} polygons are not flat; they are divided into triangles in their mean plane; the first is face {face} (from 0)"
     )]
     NotFlat {
-        /// How many.
+        /// Number of such polygons.
         count: usize,
-        /// The first, from 0.
+        /// Index of the first one, from 0.
         face: usize,
     },
-    /// Triangles with the same corners as others.
+    /// Triangles with the same corners as others count once.
     #[error(
         "{count} triangles have the same corners as others, as in a two-sided sheet; they count once; the first is of face {face} (from 0)"
     )]
     Doubled {
-        /// How many.
+        /// Number of such triangles.
         count: usize,
-        /// The face of the first, from 0.
+        /// Index of the face of the first one, from 0.
         face: usize,
     },
-    /// Corners that lie on the sides of other faces.
+    /// Corners lie on open sides of other faces, which are divided there.
     #[error("{count} corners are on boundary edges of other faces; these faces are divided there")]
     SidesCut {
-        /// How many.
+        /// Number of such corners.
         count: usize,
     },
-    /// Open sides that almost touch.
+    /// Open sides almost touch, as at a seam. Routes do not cross it.
     #[error(
         "{count} corners are within {distance:e} of an open side that they do not touch, as at a seam; routes do not cross it: weld them (--weld DISTANCE)"
     )]
     Seam {
-        /// How many.
+        /// Number of corners near an open side of another face.
         count: usize,
-        /// The distance that was looked at.
+        /// The distance within which corners count.
         distance: f64,
     },
-    /// Triangles that were wound in the opposite direction to their neighbours.
+    /// Triangles that were wound in the opposite direction to their neighbours are reversed.
     #[error(
         "{count} triangles wind in the opposite direction to their neighbours; they are reversed"
     )]
     Rewound {
-        /// How many.
+        /// Number of such triangles.
         count: usize,
     },
-    /// A surface with one side, as a Möbius strip.
+    /// The surface has only one side, like a Möbius strip, and therefore no normals.
     #[error("the surface has one side only: it has no normals")]
     OneSided,
 }
@@ -154,15 +154,15 @@ pub enum RouteError {
         /// The point.
         point: DVec3,
     },
-    /// Start and goal lie on pieces that do not touch.
+    /// Start and goal lie on pieces of the surface that are not connected.
     #[error(
         "start and goal are on parts of the surface that are not connected: the start's has {start} \
          triangles, the goal's {goal}; if a seam separates them, weld it (--weld DISTANCE)"
     )]
     OtherPiece {
-        /// Triangles of the piece that the start lies on.
+        /// Number of triangles of the piece with the start.
         start: usize,
-        /// Triangles of the piece that the goal lies on.
+        /// Number of triangles of the piece with the goal.
         goal: usize,
     },
     /// The start or the goal is not on free ground.
@@ -171,26 +171,26 @@ pub enum RouteError {
          than the finest edge), or too steep; free ground is {distance} away"
     )]
     NotFree {
-        /// The start or the goal, on the surface.
+        /// The start or the goal, moved to the surface.
         point: DVec3,
-        /// From there to the nearest free ground.
+        /// Distance of this point from the nearest free ground.
         distance: f64,
     },
-    /// Neither half of the cut arrives.
+    /// The cut by the plane does not lead from start to goal in either direction.
     #[error("the cut by the plane does not lead from start to goal; use `--by exact`")]
     NoPlaneRoute,
-    /// No normal tells which plane is meant.
+    /// The normals at start and goal do not define a plane.
     #[error(
         "the plane is not defined: the normals at start and goal are opposite, or run along the line \
          between them; use `--by exact`"
     )]
     NoPlane,
-    /// An edge of three faces: the cut branches.
+    /// An edge has three or more faces, so that the cut branches.
     #[error(
         "a cut by a plane needs edges of at most two faces, and this mesh has edges of three or more; use `--by exact`"
     )]
     PlaneBranches,
-    /// A surface with one side has no normals.
+    /// The surface has only one side, and therefore no normals.
     #[error(
         "the surface has one side only, as a Möbius strip, and so no normals; use `--by exact`"
     )]
@@ -201,9 +201,9 @@ pub enum RouteError {
          simplify the mesh, or use `--by edges`"
     )]
     TooLarge {
-        /// Triangles of the mesh.
+        /// Number of triangles of the mesh.
         triangles: usize,
-        /// Windows that are kept at most.
+        /// The largest number of windows.
         max: usize,
     },
 }

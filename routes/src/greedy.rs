@@ -1,13 +1,13 @@
-//! A walk along edges, each time the one that points most nearly to the goal.
+//! Finds a walk along edges that always takes the edge whose direction is nearest to that of the goal.
 
 use crate::endpoints::Task;
 use crate::mesh::surface::Spot;
 
-/// Cosines nearer to each other than this are the same; the vertex with the lower number is taken.
+/// Cosines that differ by less than this are equal; the vertex with the lower index is then used.
 const SAME: f64 = 1e-12;
 
-/// The path from start to goal, which lie on one piece. No vertex is visited twice: from a dead end
-/// the walk goes back, and the vertices that it went back from are not part of the path.
+/// The path from start to goal, which lie on the same piece. No vertex is visited twice. At a dead end the walk goes
+/// back, and the vertices from which it went back are not part of the path.
 pub(crate) fn find_path(task: &Task<'_>) -> Vec<Spot> {
     let surface = &*task.surface;
     let goal = surface.positions[task.goal as usize];

@@ -1,4 +1,4 @@
-//! Ground with holes where obstacles stand, and where it is too steep.
+//! Finds the parts of a mesh that are clear of obstacles and not too steep.
 
 use std::collections::HashMap;
 
@@ -10,25 +10,27 @@ use crate::mesh::Mesh;
 use crate::route::{By, Route};
 use crate::together;
 
-/// Triangles that halving may make.
+/// The largest number of triangles after halving.
 pub const MAX_TRIANGLES: usize = 4_000_000;
 
-/// A point is on free ground when that is nearer than this part of the mesh's size.
+/// A point is on free ground if its distance from it is less than this, relative to the size of the mesh.
 const ON_GROUND: f64 = 1e-9;
 
-/// The obstacles and slopes that a route keeps clear of.
+/// The obstacles and slopes that a route avoids.
 #[derive(Debug, Clone, Copy)]
 pub struct Clear<'a> {
-    /// The obstacles, which stand still. Their surfaces count: ground within them is cut off by the
-    /// hole about it.
+    /// The obstacles, which do not move. Their surfaces count: ground inside an obstacle is separated from the rest
+    /// by the hole around its surface.
     pub obstacles: Option<&'a Mesh>,
-    /// How far every point of a route stays from them, in the unit of the mesh.
+    /// The smallest distance of a route from the obstacles, in the unit of the mesh.
     pub clearance: f64,
-    /// Triangles at the edge of a hole are halved until their longest edge is at most so long.
+    /// Triangles at the edge of a hole are halved until their longest edge is not longer than this, in the unit of
+    /// the mesh.
     pub finest: f64,
-    /// The steepest slope, rad, against `up`.
+    /// The steepest slope in radians: the angle between a triangle and the plane perpendicular to `up`; `None` for no
+    /// limit.
     pub max_slope: Option<f64>,
-    /// The direction upwards; of any length but 0.
+    /// The upward direction, of any length but 0.
     pub up: DVec3,
 }
 
@@ -36,28 +38,28 @@ pub struct Clear<'a> {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GroundError {
-    /// The clearance is negative, or no number.
+    /// The clearance is negative or not finite.
     #[error("the clearance is {clearance}; give a number of 0 or more")]
     Clearance {
-        /// The value.
+        /// The clearance.
         clearance: f64,
     },
-    /// The finest edge is not a number over 0.
+    /// The finest edge is not a positive finite number.
     #[error("the finest edge is {finest}; give a number over 0")]
     Finest {
-        /// The value.
+        /// The finest edge.
         finest: f64,
     },
-    /// The slope is not between 0 and 90°, or there is no direction upwards.
+    /// The slope is not between 0 and 90°, or the upward direction is 0.
     #[error("slopes are from 0 to 90 degrees against a direction that is not 0")]
     Slope,
-    /// Halving to the finest edge makes too many triangles.
+    /// Halving down to the finest edge makes too many triangles.
     #[error("more than {MAX_TRIANGLES} triangles at a finest edge of {finest}; give a longer one")]
     TooFine {
-        /// The value.
+        /// The finest edge.
         finest: f64,
     },
-    /// Nothing is free.
+    /// No triangle is free.
     #[error("no ground is free: all of it is within the clearance, or too steep")]
     Nothing,
     /// The free triangles do not make a valid mesh.
@@ -65,13 +67,13 @@ pub enum GroundError {
     Mesh(#[from] MeshError),
 }
 
-/// The part of a mesh that is free.
+/// The free part of a mesh.
 #[derive(Debug, Clone)]
 pub struct Ground<'a> {
     whole: &'a Mesh,
-    /// The triangles on which every point is clear of all obstacles.
+    /// The free triangles: they are not too steep, and every point on them is clear of all obstacles.
     pub mesh: Mesh,
-    /// How many triangles there were after halving, free or not.
+    /// Number of triangles after halving that are not too steep, whether they are clear of obstacles or not.
     pub triangle_count: usize,
 }
 
@@ -80,20 +82,21 @@ pub struct Ground<'a> {
 enum TriangleClass {
     Free,
     Closed,
-    /// Partly both, as far as one can tell.
+    /// Not known: a part may be free, and a part not.
     Open,
 }
 
 impl<'a> Ground<'a> {
-    /// Cuts holes into a mesh. A triangle stays when the distance of its centre from the obstacles
-    /// is at least the clearance and its own radius together, so that all of its points are clear;
-    /// routes on the rest are free by construction, and shortest up to the finest edge.
+    /// Cuts holes into a mesh. A triangle stays if the distance of its centre from the obstacles is at least the
+    /// clearance plus the triangle's radius, so that all of its points are clear. Routes on these triangles are free
+    /// by construction, and shortest up to the finest edge.
     ///
-    /// Triangles at the edge of a hole are halved at their longest edges, together with their
-    /// neighbours there, so that no vertex lies within an edge (Rivara, 1984).
+    /// Triangles at the edge of a hole are halved at their longest edges, together with their neighbours at these
+    /// edges, so that no vertex lies within an edge (Rivara, 1984).
     ///
     /// # Errors
-    /// When an option is no number, or nothing is left.
+    /// When an option is out of range, when halving makes more than [`MAX_TRIANGLES`], when no triangle is free, or
+    /// when the free triangles do not make a mesh.
     pub fn new(mesh: &'a Mesh, clear: Clear<'_>) -> Result<Self, GroundError> {
         let Clear {
             clearance, finest, ..
@@ -162,11 +165,10 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// The route between the points of the whole mesh that are nearest to `from` and `to`, over
-    /// the free triangles.
+    /// The route over the free triangles between the points of the whole mesh that are nearest to `from` and `to`.
     ///
     /// # Errors
-    /// When one of them is not free, or as [`Mesh::route`].
+    /// When one of these points is not on free ground, and as [`Mesh::route`].
     pub fn route(&self, from: DVec3, to: DVec3, by: By) -> Result<Route, RouteError> {
         let mut off = [0.0; 2];
         let mut ends = [from, to];
@@ -187,7 +189,7 @@ impl<'a> Ground<'a> {
         Ok(Route { off, ..route })
     }
 
-    /// The routes of many pairs, each on a thread of its own.
+    /// The routes of many pairs of points, computed in parallel.
     #[must_use]
     pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
         let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
@@ -216,8 +218,8 @@ fn sides([a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [a.distance(b), b.distance(c), c.distance(a)]
 }
 
-/// The longest side; of equal ones that between the lowest vertices, so that both triangles at an
-/// edge agree.
+/// The longest side. Of equal ones, it is the one between the lowest vertices, so that both triangles at an edge
+/// agree.
 fn longest(positions: &[DVec3], triangle: [u32; 3]) -> usize {
     let lengths = sides(triangle.map(|vertex| positions[vertex as usize]));
     let key = |side: usize| edge(triangle[side], triangle[(side + 1) % 3]);
@@ -233,8 +235,8 @@ fn edge(one: u32, other: u32) -> (u32, u32) {
     (one.min(other), one.max(other))
 }
 
-/// Halves the coarse triangles at their longest edges. Where an edge of another triangle is halved
-/// by that, so is its longest one, and so on.
+/// Halves the `coarse` triangles at their longest edges. If this divides an edge of another triangle, that triangle
+/// is also halved at its longest edge, and so on.
 fn halve(
     positions: &mut Vec<DVec3>,
     triangles: &mut Vec<[u32; 3]>,

@@ -1,4 +1,4 @@
-//! The cut of the surface by a plane through start and goal.
+//! Finds the cut of the surface by a plane through start and goal.
 
 use glam::DVec3;
 
@@ -7,13 +7,13 @@ use crate::error::RouteError;
 use crate::mesh::links::{NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
 
-/// A direction is along another when the sine of the angle between them is below this.
+/// A direction is parallel to another if the sine of the angle between them is below this.
 const ALONG: f64 = 1e-9;
 
-/// The shorter of the two halves of the cut, where they lead from start to goal.
+/// The shorter half of the cut, of those that lead from start to goal.
 ///
 /// # Errors
-/// When the plane is not defined, or neither half arrives.
+/// When the plane is not defined, or neither half leads to the goal.
 pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     let surface = &*task.surface;
     let normal = plane_normal(task)?;
@@ -54,8 +54,8 @@ pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     Err(RouteError::NoPlaneRoute)
 }
 
-/// The unit normal of the plane: it runs through both points and along the sum of their normals;
-/// where that is undefined along the start's, then along the goal's.
+/// The unit normal of the plane, which contains both points and the direction of the sum of their normals. If this is
+/// undefined, the plane contains the normal of the start, otherwise that of the goal.
 fn plane_normal(task: &Task<'_>) -> Result<DVec3, RouteError> {
     let surface = &*task.surface;
     let [start, goal] = [task.start, task.goal].map(|vertex| surface.positions[vertex as usize]);
@@ -85,21 +85,20 @@ impl PlaneCut<'_> {
         self.heights[vertex as usize] >= 0.0
     }
 
-    /// The plane passes between the ends of this edge.
+    /// Whether the plane passes between the ends of this edge.
     fn cuts(&self, half_edge: u32) -> bool {
         let faces = &self.surface.faces;
         self.is_above(at(faces, half_edge)) != self.is_above(at(faces, next(half_edge)))
     }
 
-    /// The half-edges through which the cut leaves the faces about the start.
+    /// The half-edges through which the cut leaves the faces around the start.
     fn exits(&self) -> Vec<u32> {
         let corners = self.surface.links.corners(self.task.start).iter();
         let opposite = corners.map(|&corner| next(corner));
         opposite.filter(|&half_edge| self.cuts(half_edge)).collect()
     }
 
-    /// Follows the cut from one face to the next, until it comes to the goal, to a boundary or back
-    /// to where it was.
+    /// Follows the cut from face to face, until it reaches the goal, a boundary or its beginning.
     fn follow(&self, exit: u32) -> Option<Vec<Spot>> {
         let faces = &self.surface.faces;
         let mut path = vec![Spot::vertex(self.task.start)];

@@ -1,4 +1,4 @@
-//! Routes: from one point of a mesh to another.
+//! Routes from one point of a mesh to another.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,19 +17,20 @@ pub enum By {
     /// The shortest path over the surface.
     #[default]
     Exact,
-    /// The cut of the surface by the plane through start and goal and along their normals.
+    /// The cut of the surface by the plane that contains start and goal and the direction of the sum of their
+    /// normals.
     Plane,
-    /// Along edges, each time the one that points most nearly to the goal.
+    /// A walk along edges that always takes the edge whose direction is nearest to that of the goal.
     Greedy,
     /// The shortest path along edges.
     Edges,
 }
 
 impl By {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 4] = [Self::Exact, Self::Plane, Self::Greedy, Self::Edges];
 
-    /// `exact`, `plane`, `greedy` or `edges`.
+    /// The name: `exact`, `plane`, `greedy` or `edges`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -56,17 +57,17 @@ impl FromStr for By {
     }
 }
 
-/// A path over a surface: straight from each point to the next.
+/// A path over a surface, straight from each point to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
-    /// From the start to the goal, in the unit of the mesh. One point where the two are the same.
+    /// The points from the start to the goal, in the unit of the mesh; one point if both are equal.
     pub points: Vec<DVec3>,
-    /// The unit normal of the surface at each point, 0 where the normals of its faces cancel out;
-    /// `None` where the surface has one side.
+    /// The unit normal of the surface at each point; 0 where the normals of its faces cancel out. `None` if the
+    /// surface has only one side.
     pub normals: Option<Vec<DVec3>>,
     /// The length over the surface, in the unit of the mesh.
     pub length: f64,
-    /// How far start and goal were from the surface.
+    /// The distances of the requested start and goal from the surface.
     pub off: [f64; 2],
 }
 
@@ -74,7 +75,7 @@ impl Mesh {
     /// The route between the points of the surface that are nearest to `from` and `to`.
     ///
     /// # Errors
-    /// When a point is not finite, no path leads from one to the other, or `by` finds none.
+    /// When a point is not finite, when start and goal are not connected, or when `by` finds no route.
     pub fn route(&self, from: DVec3, to: DVec3, by: By) -> Result<Route, RouteError> {
         if by == By::Plane && self.has_branches {
             return Err(RouteError::PlaneBranches);
@@ -92,7 +93,7 @@ impl Mesh {
         Ok(Route::new(&task, &spots))
     }
 
-    /// The routes of many pairs, each on a thread of its own. Each takes the memory of one alone.
+    /// The routes of many pairs of points, computed in parallel. Each takes as much memory as a single call.
     #[must_use]
     pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
         let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
@@ -101,7 +102,11 @@ impl Mesh {
 }
 
 impl Route {
-    /// The point at a distance along the straight lines from the start, and the unit normal there.
+    /// The point at a distance along the straight lines from the start, and the unit normal at it. Distances below 0
+    /// and above the length of these lines have the first and the last point.
+    ///
+    /// # Panics
+    /// When the route has no points.
     #[must_use]
     pub fn at(&self, distance: f64) -> (DVec3, Option<DVec3>) {
         let mut rest = distance.max(0.0);
@@ -120,7 +125,7 @@ impl Route {
         (self.points[last], normals(last))
     }
 
-    /// The route through points on edges; those at the same position become one.
+    /// The route through points on edges; consecutive points at the same position become one.
     pub(crate) fn new(task: &Task<'_>, spots: &[Spot]) -> Self {
         let surface = &*task.surface;
         let mut points: Vec<DVec3> = Vec::with_capacity(spots.len());

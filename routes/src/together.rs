@@ -1,9 +1,9 @@
-//! Work that the threads share. A caller's own rayon pool is used where it calls from one; else there is
-//! one for the call. Where the system refuses threads, the calling one does it all.
+//! Runs work on several threads: in the caller's rayon pool if it calls from one, otherwise in a new pool for the
+//! call. If the system refuses threads, the calling thread does all of it.
 
 use rayon::prelude::*;
 
-/// The results of `of` for each, in order.
+/// The results of `of` for all entries, in order.
 pub(crate) fn map<T: Sync, R: Send>(all: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let together = || all.par_iter().map(&of).collect();
     if all.len() < 2 {

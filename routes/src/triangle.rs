@@ -4,8 +4,8 @@ use glam::DVec3;
 
 /// The point of a triangle that is nearest to `p`, as weights of its corners.
 ///
-/// Christer Ericson, Real-Time Collision Detection (2005), 5.1.5: the region of Voronoi's diagram
-/// in which `p` lies says whether a corner, an edge or the inside is nearest.
+/// From Christer Ericson, Real-Time Collision Detection (2005), 5.1.5: the region of the Voronoi diagram in which `p`
+/// lies determines whether a corner, an edge or the inside is nearest.
 pub(crate) fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -41,7 +41,7 @@ pub(crate) fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [va / sum, vb / sum, vc / sum]
 }
 
-/// The point of these weights.
+/// The point with these weights.
 pub(crate) fn blend(weights: [f64; 3], corners: [DVec3; 3]) -> DVec3 {
     weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2]
 }

@@ -1,10 +1,11 @@
-//! Walkers that wait for each other, and for bodies that move on known tracks.
+//! Plans walkers that wait for each other, and for bodies that move on known tracks.
 //!
-//! Moving obstacles are avoided by speed, not by the route (Kant and Zucker, 1986): each walker keeps its
-//! route, and waits on it. With the *delay* w = t - s/v (s the distance walked, v the speed) walking keeps w
-//! and waiting raises it, and the obstacle of a moving thing in (s, w) is a convex region for each
-//! straight stretch of both. A walker's plan is a staircase between those regions with the least
-//! delay at its end. One walker is planned after another; each is an obstacle for the next.
+//! Walkers avoid moving obstacles by their speed, not by their route (Kant and Zucker, 1986): each walker keeps its
+//! route and waits on it. The *delay* is w = t - s/v, where s is the distance walked and v the speed. Walking keeps w
+//! constant, and waiting increases it. In the plane (s, w), a moving obstacle is a convex region for each pair of a
+//! straight stretch of the route and a straight stretch of the obstacle's track. A walker's plan is a staircase
+//! between these regions with the least delay at its end. Walkers are planned one after another; each is an obstacle
+//! for the next.
 
 mod plan;
 mod region;
@@ -15,35 +16,35 @@ use thiserror::Error;
 use crate::route::Route;
 use crate::walkers::plan::Stay;
 
-/// Something that moves on a known track: straight from each position to the next.
+/// A body that moves on a known track, straight from each position to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mover {
-    /// Seconds and positions, times increasing. It is not there before the first and after the last.
+    /// Times in seconds, increasing, and positions. The body does not exist before the first and after the last time.
     pub track: Vec<(f64, DVec3)>,
-    /// Of the ball that it fills.
+    /// Radius of the ball that the body occupies.
     pub radius: f64,
 }
 
-/// Somebody who walks a route, and waits on it where that is needed.
+/// A walker on a route, which waits on it where necessary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walker {
     /// The route that it walks.
     pub route: Route,
-    /// Of the ball that it fills.
+    /// Radius of the ball that the walker occupies.
     pub radius: f64,
-    /// In units of the mesh a second.
+    /// Speed, in units of the mesh per second.
     pub speed: f64,
-    /// When it sets out, in seconds. Before that it stands at its start, from time 0 on.
+    /// Time at which it starts to walk, in seconds. From time 0 until then it stands at the start of its route.
     pub start: f64,
 }
 
-/// When a walker is where.
+/// The positions of a walker over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Seconds, the distance walked until then, in the unit of the mesh, and the position. Two with the same
-    /// position are a wait between them.
+    /// For each point: the time in seconds, the distance walked until then in the unit of the mesh, and the position.
+    /// Between two entries with the same position the walker waits.
     pub times: Vec<(f64, f64, DVec3)>,
-    /// When it arrives, in seconds. It stays at its goal.
+    /// Time of arrival, in seconds. The walker then stays at its goal.
     pub arrival: f64,
 }
 
@@ -51,42 +52,43 @@ pub struct Plan {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum WalkerError {
-    /// Its speed is not a number over 0, its radius or its start not one of 0 or more.
+    /// The speed is not a positive finite number, or the radius or the start is not a finite number of 0 or more.
     #[error(
         "speed {speed}, radius {radius}, start {start}: give a speed over 0, and others of 0 or more"
     )]
     Numbers {
-        /// In units a second.
+        /// Speed, in units of the mesh per second.
         speed: f64,
-        /// In units.
+        /// Radius, in units of the mesh.
         radius: f64,
-        /// In seconds.
+        /// Start, in seconds.
         start: f64,
     },
-    /// No waiting on the route leads past the others.
+    /// No sequence of waits on the route avoids the other bodies.
     #[error(
         "cannot pass: wherever it waits on its route, something comes too near; give it another route, or plan it before others"
     )]
     Blocked,
-    /// Its route is too long or too many others come near.
+    /// The route and the tracks of the others have too many stretches.
     #[error(
         "{stretches} stretches of the route and {others} of other tracks are too many; simplify the tracks"
     )]
     TooMany {
-        /// Of the route.
+        /// Number of points of the route.
         stretches: usize,
-        /// Of all others.
+        /// Number of stretches of all other tracks.
         others: usize,
     },
 }
 
-/// Stretches of a route times stretches of others that are looked at.
+/// The largest number of stretches of a route times stretches of others.
 const MAX_PAIRS: usize = 100_000_000;
 
-/// Plans one walker after another; each keeps away from all movers and from all walkers before it.
-/// A walker that cannot pass has no plan, and is no obstacle for others.
+/// Plans one walker after another. Each keeps away from all movers and from all walkers before it. A walker without a
+/// plan is not an obstacle for others.
 ///
-/// Not complete: another order, or other routes, may lead where this does not.
+/// The search is not complete: with another order of the walkers, or other routes, there may be plans where this
+/// finds none.
 #[must_use]
 pub fn plan(walkers: &[Walker], movers: &[Mover]) -> Vec<Result<Plan, WalkerError>> {
     let mut others: Vec<(Mover, Stay)> = movers

@@ -1,5 +1,5 @@
-//! The messages of an Arrow file or stream, each held against the length of the file before it is
-//! decoded: the crate takes offsets and counts at their word.
+//! Reads the messages of an Arrow file or stream. Each is checked against the length of the file before it is
+//! decoded, because the crate `arrow` trusts the offsets and counts in it.
 
 use arrow_buffer::Buffer;
 use arrow_ipc::{
@@ -11,21 +11,21 @@ use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::text::lines::Limits;
 
-/// Files begin and end with it.
+/// The first and the last bytes of a file.
 pub(crate) const MAGIC: &[u8] = b"ARROW1";
 
-/// Before each message of a stream.
+/// The bytes before each message of a stream.
 const CONTINUATION: [u8; 4] = [0xff; 4];
 
-/// What a compressed buffer begins with: its length when unpacked.
+/// Length of the prefix of a compressed buffer, which is its uncompressed length.
 const PREFIX: usize = 8;
 
-/// Compressed files hold at most so many bytes a byte, all together: equal numbers are packed to
-/// nothing, but the times beside them differ.
+/// The largest number of bytes that each byte of a compressed file may unpack to, on average. Equal numbers compress
+/// to nearly nothing, but the times beside them differ.
 const MAX_EXPANSION: u64 = 1024;
 
-/// Bytes that a row of a column, and a byte that was packed, take: as they are decoded, in the table's
-/// columns and in the keys that they become.
+/// Bytes of memory for each row of a column and for each unpacked byte: while it is decoded, in the table's columns
+/// and in the keys.
 const DECODED: usize = 8;
 
 /// Whether the first bytes are those of a stream: a message that is not endless.
@@ -36,11 +36,11 @@ pub(crate) fn is_stream(start: &[u8]) -> bool {
     length.is_some_and(|length| (1..1 << 24).contains(&i32::from_le_bytes(*length)))
 }
 
-/// A message that has rows or words.
+/// A message that contains rows or a dictionary.
 pub(crate) struct DataMessage<'a> {
     pub(crate) version: MetadataVersion,
     pub(crate) body: MessageBody<'a>,
-    /// The bytes that the message's offsets count from.
+    /// The bytes from which the message's offsets count.
     pub(crate) data: Buffer,
 }
 
@@ -49,22 +49,22 @@ pub(crate) enum MessageBody<'a> {
     Rows(RecordBatch<'a>),
 }
 
-/// The messages of a file in the order in which they are to be read.
+/// The messages of a file, in the order in which they are read.
 pub(crate) struct Messages<'a> {
     name: &'a str,
     bytes: &'a Buffer,
-    /// Where the blocks of a file are; none for a stream.
+    /// Locations of the blocks of a file; `None` for a stream.
     blocks: Option<std::vec::IntoIter<(u64, u64, u64)>>,
     schema: Option<Schema<'a>>,
-    /// Where the next message of a stream begins.
+    /// Offset of the next message of a stream.
     at: usize,
-    /// How many bytes may yet be unpacked, and numbers be there.
+    /// How many bytes may still be unpacked, or numbers be read.
     left: u64,
     budget: Budget,
 }
 
 impl<'a> Messages<'a> {
-    /// Looks for the footer of a file; anything else is a stream.
+    /// Looks for the footer of a file; without one the bytes are a stream.
     pub(crate) fn of(name: &'a str, bytes: &'a Buffer, limits: Limits) -> Result<Self, Diagnostic> {
         let mut messages = Self {
             budget: Budget::of(bytes.len(), limits),
@@ -149,7 +149,7 @@ impl<'a> Messages<'a> {
         Ok(schema)
     }
 
-    /// The next message with rows or words.
+    /// The next message with rows or a dictionary.
     pub(crate) fn next(&mut self) -> Result<Option<DataMessage<'a>>, Diagnostic> {
         let next = match &mut self.blocks {
             None => self.next_of_stream()?,
@@ -185,7 +185,7 @@ impl<'a> Messages<'a> {
         }))
     }
 
-    /// A message of a file, where its footer says.
+    /// The message of a file at the location that its footer contains.
     fn block(
         &self,
         offset: u64,
@@ -239,7 +239,7 @@ impl<'a> Messages<'a> {
         Ok(Some((message, self.bytes.slice_with_length(start, body))))
     }
 
-    /// Every count and every offset within the data, before the crate relies on them.
+    /// Checks that every count and every offset lies within the data, before the crate uses them.
     fn check(&mut self, batch: &RecordBatch<'_>, data: &Buffer) -> Result<(), Diagnostic> {
         let wrong = || self.damaged("a message has impossible counts; the file is damaged");
         let mut counts = vec![batch.length()];

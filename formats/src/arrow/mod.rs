@@ -25,7 +25,7 @@ use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
 use crate::table::plan::TablePlan;
 
-/// Arrow IPC files, and streams.
+/// The Arrow IPC format: files and streams.
 pub static FORMAT: Format = Format {
     name: "arrow",
     summary: "an Arrow table, a row for each key",
@@ -51,20 +51,20 @@ pub static FORMAT: Format = Format {
     options: &FormatOption::OF_TABLES,
 };
 
-/// Reads a file; `-` is standard input.
+/// Reads an Arrow IPC file or stream; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_arrow(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
     read_arrow(&name, source.into_bytes(options.limits.file)?, options)
 }
 
-/// Reads the bytes of a file or a stream; `name` is what messages call it.
+/// Reads the bytes of an Arrow IPC file or stream; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid; the first error is returned.
 pub fn read_arrow(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let (table, plan) = decoded(name, "a batch", || read_table(name, bytes, options))?;
     clips(&table, &plan, options)

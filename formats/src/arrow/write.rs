@@ -1,4 +1,4 @@
-//! Tables as Arrow IPC files, uncompressed, so that they can be mapped into memory as they are.
+//! Writes tables as uncompressed Arrow IPC files, which can be mapped into memory.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -9,7 +9,7 @@ use arrow_schema::{ArrowError, Schema};
 
 use crate::table::rows::{Head, RowSink};
 
-/// Writes an Arrow file as rows come.
+/// Writes an Arrow file while rows arrive.
 pub(crate) struct ArrowSink<'a>(FileWriter<&'a mut dyn Write>);
 
 impl<'a> ArrowSink<'a> {
@@ -26,7 +26,7 @@ impl RowSink for ArrowSink<'_> {
         self.0.write(batch).map_err(io_error)
     }
 
-    /// Every batch can be read by itself.
+    /// Each batch can be read by itself.
     fn end_part(&mut self) -> io::Result<()> {
         Ok(())
     }
@@ -36,7 +36,7 @@ impl RowSink for ArrowSink<'_> {
     }
 }
 
-/// Keeps the system's own error, a broken pipe's too.
+/// Converts an error and keeps the system's error in it, for example that of a broken pipe.
 fn io_error(error: ArrowError) -> io::Error {
     match error {
         ArrowError::IoError(_, error) => error,

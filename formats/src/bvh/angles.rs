@@ -1,21 +1,20 @@
-//! Angles about three turned axes, from quaternions, continuous from frame to frame.
+//! Converts quaternions to Euler angles about rotating axes, continuous from frame to frame.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DQuat;
 
-/// Within this of gimbal lock (the sine of the middle angle's half distance from it, times √2) the
-/// first and the last angle are the noise of a quaternion in f32, which moves either by up to a
-/// radian; an angle chosen freely changes the rotation by 3e-7 rad at most.
+/// The bound of gimbal lock: the sine of half the middle angle's distance from it, times √2. Within this bound the
+/// first and the last angle are noise of an f32 quaternion, which changes either by up to a radian. Choosing one of
+/// them freely changes the rotation by 3e-7 rad or less.
 const LOCKED: f64 = 1e-7;
 
-/// The angles, radians, whose turns about `axes` (three different ones, each turned by those
-/// before) make up the rotation, as near as can be to those of the frame before.
+/// The Euler angles in radians about `axes` (three different ones, each rotated by those before) of a rotation,
+/// nearest to the angles of the frame before.
 ///
-/// By Bernardes and Viollet, *Quaternion to Euler angles conversion: a direct, general and
-/// computationally efficient method* (2022): the sum and the difference of the first and the last
-/// angle are angles of two complex numbers, of which one vanishes in gimbal lock and the other
-/// stays exact.
+/// From Bernardes and Viollet, *Quaternion to Euler angles conversion: a direct, general and computationally
+/// efficient method* (2022): the sum and the difference of the first and the last angle are the angles of two complex
+/// numbers. One of these numbers vanishes in gimbal lock, and the other stays exact.
 pub(super) fn nearest(q: DQuat, axes: [usize; 3], before: [f64; 3]) -> [f64; 3] {
     let [first, middle, last] = axes;
     let v = [q.x, q.y, q.z];

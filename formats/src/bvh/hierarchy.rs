@@ -12,17 +12,17 @@ use crate::origin::SMALL;
 use crate::text::lines::Lines;
 use crate::text::number;
 
-/// What every file begins with.
+/// The first word of every file.
 pub(super) const FIRST_WORD: &str = "HIERARCHY";
 
-/// What may come behind channels on their line.
+/// Words that may follow channels on the same line.
 const AFTER_CHANNELS: [&str; 4] = ["}", "JOINT", "END", "OFFSET"];
 
 /// The joints of a file, parents before their children.
 #[derive(Debug, Default)]
 pub(super) struct Hierarchy {
     pub(super) joints: Vec<HierarchyJoint>,
-    /// Channels of all joints together, the numbers of a row.
+    /// Number of channels of all joints together, which is the number of columns of a row.
     pub(super) columns: usize,
 }
 
@@ -31,11 +31,11 @@ pub(super) struct HierarchyJoint {
     pub(super) name: String,
     pub(super) parent: Option<usize>,
     pub(super) offset: DVec3,
-    /// The axes that the joint turns about, in this order, each with its number's column in a row.
+    /// The axes of the joint's rotation channels in their order, each with its column in a row.
     pub(super) rotations: Vec<(usize, usize)>,
-    /// The coordinates that a row has, each with its column.
+    /// The axes of the joint's position channels, each with its column in a row.
     pub(super) positions: Vec<(usize, usize)>,
-    /// All of these in their order, and the End Sites.
+    /// The channels in their order, and the End Sites.
     pub(super) written: BvhJoint,
 }
 
@@ -54,9 +54,9 @@ impl Word {
 
 /// An open brace.
 struct Block {
-    /// What opened it, for messages.
+    /// The line of the keyword before it, for messages.
     line: u64,
-    /// An End Site is no joint.
+    /// The joint; `None` for an End Site.
     joint: Option<usize>,
     /// The joint that an End Site belongs to.
     end_of: Option<usize>,
@@ -66,7 +66,7 @@ struct Block {
 
 struct Parser<'a, R> {
     lines: &'a mut Lines<R>,
-    /// The current line, and where the next word is looked for: in bytes, and in characters.
+    /// The current line, and the offset of the next word in it, in bytes and in characters.
     line: String,
     at: usize,
     column: u64,
@@ -108,7 +108,7 @@ impl Hierarchy {
 }
 
 impl<R: BufRead> Parser<'_, R> {
-    /// Reads what one keyword begins; whether it was another than `MOTION`.
+    /// Reads a keyword and its statement; `false` after `MOTION`.
     fn statement(&mut self) -> Result<bool, Diagnostic> {
         let Some(word) = self.next()? else {
             let message = "the file ends without MOTION; is it truncated?".to_owned();
@@ -152,7 +152,7 @@ impl<R: BufRead> Parser<'_, R> {
         Ok(true)
     }
 
-    /// `ROOT name {` or `JOINT name {`; the name is all that is on the line.
+    /// Reads `ROOT name {` or `JOINT name {`; the name is the rest of the line.
     fn joint(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let start = self.at;
         while self.word_before(&["{"]).is_some() {}
@@ -178,7 +178,7 @@ impl<R: BufRead> Parser<'_, R> {
         self.brace(keyword, Some(joint))
     }
 
-    /// The brace behind a joint's name or `End Site`.
+    /// Reads the brace after a joint's name or `End Site`.
     fn brace(&mut self, keyword: &Word, joint: Option<usize>) -> Result<(), Diagnostic> {
         match self.next()? {
             Some(word) if word.text == "{" => {}
@@ -220,7 +220,7 @@ impl<R: BufRead> Parser<'_, R> {
         Ok(())
     }
 
-    /// `OFFSET x y z`.
+    /// Reads `OFFSET x y z`.
     fn offset(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let mut offset = [0.0; 3];
         for coordinate in &mut offset {
@@ -254,7 +254,7 @@ impl<R: BufRead> Parser<'_, R> {
         Ok(())
     }
 
-    /// `CHANNELS count name…`, on one line.
+    /// Reads `CHANNELS count name…`, on one line.
     fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let Some(count) = self.word_before(&AFTER_CHANNELS) else {
             let message = "CHANNELS without their number; write `CHANNELS 0`".to_owned();
@@ -318,7 +318,7 @@ impl<R: BufRead> Parser<'_, R> {
         }
     }
 
-    /// The next word of this line, unless it is one of `stops`. A brace is a word of its own.
+    /// The next word of this line, unless it is one of `stops`. A brace is a separate word.
     fn word_before(&mut self, stops: &[&str]) -> Option<Word> {
         let rest = &self.line[self.at..];
         let start = rest.find(|c| c != ' ' && c != '\t')?;

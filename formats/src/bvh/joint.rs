@@ -1,19 +1,19 @@
-//! How a joint is written down in BVH: what its rotations and translations do not tell.
+//! The BVH data of joints that their rotations and translations do not determine.
 
 use std::fmt;
 
 use glam::Vec3;
 
-/// The channels and End Sites of a joint.
+/// The BVH channels and End Sites of a joint.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BvhJoint {
-    /// The joint's numbers in the row of a frame, in their order.
+    /// The channels of the joint, in the order of their numbers in the row of a frame.
     pub channels: Vec<BvhChannel>,
-    /// Where its End Sites are, relative to the joint, in the file's units.
+    /// The positions of its End Sites relative to the joint, in the file's units.
     pub end_sites: Vec<Vec3>,
 }
 
-/// One number of a row; the axis is 0 for x, 1 for y, 2 for z.
+/// A BVH channel, one number of a row. Its axis is 0 for x, 1 for y, 2 for z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum BvhChannel {
     /// `Xposition`, a coordinate.
@@ -25,7 +25,7 @@ pub enum BvhChannel {
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 
 impl BvhChannel {
-    /// The channel of that name, in any case.
+    /// The channel with this name; case is ignored.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let (letter, kind) = name.split_at_checked(1)?;
@@ -60,13 +60,13 @@ impl fmt::Display for BvhChannel {
 }
 
 impl BvhJoint {
-    /// The channels as text, as BVH has them: `Zrotation Xrotation Yrotation`.
+    /// The names of the channels in one text: `Zrotation Xrotation Yrotation`.
     pub(crate) fn channels_text(&self) -> String {
         let names: Vec<String> = self.channels.iter().map(ToString::to_string).collect();
         names.join(" ")
     }
 
-    /// The channels of such a text, if it is one: each at most once.
+    /// Parses the names of channels; `None` if a name is unknown or occurs twice.
     pub(crate) fn channels_of(text: &str) -> Option<Vec<BvhChannel>> {
         let mut channels = Vec::new();
         for name in text.split_ascii_whitespace() {

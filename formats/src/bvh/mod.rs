@@ -1,9 +1,9 @@
 //! BVH, motion capture as text: a hierarchy of joints, then a row of numbers for each frame.
 //!
-//! A joint's rotation is the product of its rotation channels in the order in which `CHANNELS`
-//! names them, each about an axis that those before have turned, in degrees. Position channels
-//! replace the joint's `OFFSET`, each its own coordinate. End Sites are no joints; they and the order of
-//! the channels are kept beside the clip ([`BvhJoint`]), and written again.
+//! A joint's rotation is a product of rotations about the axes of its rotation channels, with angles in degrees. The
+//! order of the factors is that of `CHANNELS`; each axis is rotated by the rotations before it. Position channels
+//! replace coordinates of the joint's `OFFSET`. End Sites are not joints. They and the order of the channels are kept
+//! with the clip ([`BvhJoint`]), and written again.
 
 mod angles;
 mod hierarchy;
@@ -24,7 +24,7 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::Source;
 use crate::text::lines::Lines;
 
-/// Motion capture of a skeleton.
+/// The BVH format: motion capture of a skeleton.
 pub static FORMAT: Format = Format {
     name: "bvh",
     summary: "motion capture of a skeleton, as text",
@@ -51,21 +51,21 @@ pub static FORMAT: Format = Format {
     options: &[FormatOption::RawTimes, FormatOption::Sequence],
 };
 
-/// Reads a file; `-` is standard input.
+/// Reads a BVH file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_bvh(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     Source::read_by(path, options.pipes, |name, reader| {
         read_bvh(name, reader, options)
     })
 }
 
-/// Reads a clip; `name` is what messages call the input. Translations have the file's units, times
-/// are whole frames of the file's rate from 0.
+/// Reads a BVH clip; `name` is the input's name in messages. Translations have the file's units. Times are whole
+/// frames of the file's rate, from 0.
 ///
 /// # Errors
-/// The first fault that refuses the input.
+/// When the input is invalid; the first error is returned.
 pub fn read_bvh(
     name: &str,
     reader: impl BufRead,

@@ -1,4 +1,4 @@
-//! The second half of a file: the frames, a row of numbers each, made into keys row by row.
+//! Reads the second half of a file: the frames, one row of numbers each, which become keys row by row.
 
 use std::borrow::Cow;
 use std::io::BufRead;
@@ -16,20 +16,20 @@ use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 
-/// The keys of all frames, in the order `[frame][joint]`: rotations of the joints that have
-/// rotation channels, positions of those that have position channels.
+/// The keys of all frames, in the order `[frame][joint]`: rotations of the joints with rotation channels, and
+/// positions of the joints with position channels.
 pub(super) struct FrameKeys {
     rate: FrameRate,
     count: usize,
     rotations: Blocks<Quat>,
     positions: Blocks<Vec3>,
-    /// What f32 left of the positions, where one of the first frame is large enough for an origin.
+    /// The rounding errors of the positions in f32, if one of the first frame is large enough for an origin.
     remainders: Option<Blocks<Vec3>>,
 }
 
 impl FrameKeys {
-    /// Reads all behind `MOTION`. With `raw_times` the frame time is taken as it is printed, not as
-    /// that of a usual rate.
+    /// Reads everything after `MOTION`. With `raw_times` the frame time is the printed number, not that of a common
+    /// rate.
     pub(super) fn read<R: BufRead>(
         lines: &mut Lines<R>,
         hierarchy: &Hierarchy,
@@ -110,7 +110,7 @@ impl FrameKeys {
         self.count += 1;
     }
 
-    /// One track a joint; joints without rotation channels have one key.
+    /// Makes a clip with one track for each joint; joints without rotation channels have one key.
     pub(super) fn into_clip<R: BufRead>(
         self,
         lines: &Lines<R>,
@@ -184,8 +184,8 @@ impl FrameKeys {
     }
 }
 
-/// The product of turns about the axes, the first the outermost: each is about an axis that those
-/// before it have turned.
+/// The product of rotations about the axes of `channels`. The first is the outermost factor: each axis is rotated by
+/// the rotations before it.
 fn rotation(channels: &[(usize, usize)], row: &[f64]) -> Quat {
     let mut q = DQuat::IDENTITY.to_array();
     for &(axis, column) in channels {
@@ -201,7 +201,7 @@ fn rotation(channels: &[(usize, usize)], row: &[f64]) -> Quat {
     rounded(DQuat::from_array(q))
 }
 
-/// The number of `Frames: 120`.
+/// Reads the number of `Frames: 120`.
 fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
     let field = read_field(lines, &["frames"], Code::BvhFrames, "Frames: 120")?;
     let whole = field.text.parse();
@@ -214,7 +214,7 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
     })
 }
 
-/// The rate of `Frame Time: 0.0083333`.
+/// Reads the rate of `Frame Time: 0.0083333`.
 fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, Diagnostic> {
     let Field { column, text } = read_field(
         lines,
@@ -235,7 +235,7 @@ fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, D
     })
 }
 
-/// What stands behind a line's words and colon.
+/// The text after a line's keyword and colon.
 struct Field {
     column: u64,
     text: String,

@@ -1,4 +1,4 @@
-//! Sampled clips as BVH: a joint for each track, angles that are continuous from frame to frame.
+//! Writes sampled clips as BVH: a joint for each track, with angles that are continuous from frame to frame.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -16,39 +16,38 @@ use crate::origin::coordinate;
 use crate::rate::{RateSource, of};
 use crate::warnings::Warnings;
 
-/// Up to here an f32 is exact to 8e-6 degrees; larger angles are written with six decimals, so that
-/// a wheel that turns a hundred times reads back within 1e-6 rad too.
+/// Up to this angle an f32 is exact to 8e-6 degrees. Larger angles are written with six decimals, so that a wheel
+/// that rotates a hundred times is also read back within 1e-6 rad.
 const EXACT_DEGREES: f64 = 256.0;
 
-/// A joint where it comes in the file.
+/// A joint at its position in the file.
 struct WrittenJoint {
     track: usize,
     depth: usize,
     name: String,
     offset: Vec3,
-    /// What its offset and positions are to be moved by.
+    /// The vector to add to its offset and positions.
     origin: DVec3,
     /// The numbers of a row, in their order.
     channels: Vec<BvhChannel>,
-    /// The axes of its angles, three different ones; those that are no channels do not turn.
+    /// The axes of its angles, three different ones. Angles about axes without a channel are 0.
     axes: [usize; 3],
     end_sites: Vec<Vec3>,
 }
 
-/// Angles of channels that a joint has not are 0 within this, radians: what f32 leaves of them.
+/// The angle in radians up to which the angle of an axis without a channel counts as 0: the rounding error of f32.
 const UNTURNED: f64 = 5e-7;
 
-/// Writes one clip, and says what BVH has no room for.
+/// Writes one clip and returns warnings about data that BVH cannot store.
 ///
-/// Joints of clips from BVH have the channels and End Sites of their file, and more channels only
-/// where the motion needs them. Of others, roots and joints whose translation changes have position
-/// channels; the translation of the rest is their `OFFSET`, and the last joints end in an End Site at
-/// the joint itself. Tracks that have no skeleton, or are in the world already, are roots.
+/// Joints of clips from BVH have the channels and End Sites of their file, and further channels only where the motion
+/// needs them. Other joints have position channels if they are roots or if their translation changes; otherwise their
+/// translation is their `OFFSET`. The last joints of a chain end in an End Site at the joint itself. Tracks without a
+/// skeleton, and tracks relative to the world, are roots.
 ///
 /// # Errors
-/// When writing fails; for several clips, samples that are not frames of one rate, numbers that are
-/// not finite, or a sequence of angles that has an axis twice. `InvalidInput` for lists whose
-/// lengths are not those of the samples.
+/// When writing fails; when there are several clips; when samples are not frames of one rate, numbers are not finite,
+/// or the sequence of angles has an axis twice. `InvalidInput` if the lengths of lists do not fit the samples.
 pub(super) fn write_motion(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,
@@ -104,8 +103,8 @@ pub(super) fn write_motion(
     Ok(warnings.into_list())
 }
 
-/// The shortest digits of a frame's seconds, with zeros behind them where the digits alone would be
-/// read as another rate: 0.0167 is that of 60 frames a second.
+/// The frame time in seconds, with the fewest digits. Zeros are appended if these digits alone would be read as
+/// another rate: 0.0167 is that of 60 frames per second.
 fn frame_time(rate: FrameRate) -> String {
     let period = rate.time_of(1);
     let mut digits = period.to_string();
@@ -117,8 +116,7 @@ fn frame_time(rate: FrameRate) -> String {
     digits
 }
 
-/// The axes of the angles, each about those before it have turned: fixed axes in the other order are
-/// the same.
+/// The axes of the angles, each rotated by those before it. A sequence about fixed axes is the same in reverse order.
 fn axes(sequence: EulerSequence) -> Result<[usize; 3], String> {
     let mut axes = sequence.axes();
     if !sequence.is_intrinsic() {
@@ -131,7 +129,7 @@ fn axes(sequence: EulerSequence) -> Result<[usize; 3], String> {
     Ok(axes)
 }
 
-/// The rate of the samples, each on the frame behind the one before.
+/// The rate of the samples, which must be consecutive frames of it.
 fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
     let (times, translations) = (sampled.times, sampled.translations);
     if sampled.checked_len()? == 0 {
@@ -205,7 +203,7 @@ fn nodes(
     Ok(nodes)
 }
 
-/// One joint, given its track, its depth and its name.
+/// One joint, from its track, its depth and its name.
 fn node(
     sampled: &SampledClip<'_>,
     (track, depth, name): (usize, usize, String),
@@ -284,7 +282,7 @@ fn node(
     }
 }
 
-/// Whether a joint turns about axes that are not among the first ones of these.
+/// Whether a joint's rotation needs axes other than the first ones of `axes`, those in `among`.
 fn uses_other_axes(
     sampled: &SampledClip<'_>,
     track: usize,
@@ -301,7 +299,7 @@ fn uses_other_axes(
     })
 }
 
-/// All up to `MOTION`.
+/// The text up to `MOTION`.
 fn hierarchy(nodes: &[WrittenJoint]) -> String {
     let mut text = String::from("HIERARCHY\n");
     for (index, node) in nodes.iter().enumerate() {
@@ -332,8 +330,8 @@ fn hierarchy(nodes: &[WrittenJoint]) -> String {
     text
 }
 
-/// The blanks before a line of a joint so deep. Deeper ones than chains of bones are have no more: the
-/// blanks of a long chain would be many times its joints.
+/// The indentation of a line at this depth. It grows only to the depth of a chain of bones, because the blanks of a
+/// long chain would otherwise outweigh its joints.
 fn indentation(depth: usize) -> String {
     const DEEPEST: usize = 64;
     "  ".repeat(depth.min(DEEPEST))
@@ -348,8 +346,8 @@ fn push_vector(text: &mut String, origin: DVec3, vector: Vec3) {
     text.push('\n');
 }
 
-/// The shortest digits that read back as this f32, and a blank. Subnormal numbers are 0, as when
-/// they are read.
+/// Appends the shortest digits that are read back as this f32, and a blank. Subnormal numbers are written as 0, as
+/// they are also read.
 fn push_f32(text: &mut String, number: f32) {
     let number = if number.is_normal() { number } else { 0.0 };
     let _ = write!(text, "{number} "); // memory takes everything

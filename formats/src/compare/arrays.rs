@@ -1,4 +1,4 @@
-//! Two arrays of results, number by number.
+//! Compares two arrays of results, number by number.
 
 use glam::DQuat;
 use serde::Serialize;
@@ -8,34 +8,34 @@ use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
 use crate::npz::NumberArray;
 
-/// How far the norm of what counts as a rotation may be from 1: results in 16 bits are still rotations.
+/// Largest difference from 1 of the norm of a rotation: results in 16 bits still count as rotations.
 const UNIT: f64 = 1e-2;
 
-/// How far two arrays of one shape are apart.
+/// The differences of two arrays of the same shape.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ArrayDifference {
-    /// The shape of both.
+    /// Shape of both arrays.
     pub shape: Vec<usize>,
-    /// How many numbers there are.
+    /// Number of elements of each array.
     pub numbers: usize,
-    /// How many of them differ.
+    /// Number of elements whose bits differ; NaN values count as equal.
     pub differing: usize,
-    /// The differences of numbers.
+    /// Absolute differences of the elements.
     pub difference: Spread,
-    /// The indices of the largest.
+    /// Indices of the element with the largest difference.
     pub largest_at: Vec<usize>,
-    /// Angles in degrees, where four numbers each are a rotation.
+    /// Angles between the rotations, in degrees, if the last axis of both arrays consists of unit quaternions.
     pub rotation: Option<Spread>,
-    /// The indices of the rotation of the largest angle.
+    /// Indices of the rotation with the largest angle, without that of the last axis.
     pub largest_rotation_at: Option<Vec<usize>>,
 }
 
 impl ArrayDifference {
-    /// Compares two arrays, which errors call by the names `inputs`. Not a number is the same as not a number.
+    /// Compares two arrays; `inputs` are their names in errors. NaN equals NaN.
     ///
     /// # Errors
-    /// When their shapes differ.
+    /// When the shapes of the arrays differ.
     pub fn of(inputs: [&str; 2], [first, second]: [&NumberArray; 2]) -> Result<Self, CompareError> {
         if first.shape != second.shape {
             return Err(CompareError::Shapes {
@@ -68,8 +68,8 @@ impl ArrayDifference {
     }
 }
 
-/// The rotations that an array holds, if it holds nothing else: four numbers each, of norm 1. The order
-/// of their components does not matter to the angle between two.
+/// The rotations of an array that contains nothing else: four numbers each, of norm 1. The order of their components
+/// does not matter for the angle between two rotations.
 fn rotations(array: &NumberArray) -> Option<impl Iterator<Item = DQuat> + '_> {
     let rows = || {
         let rows = array.values.chunks_exact(4);
@@ -80,7 +80,7 @@ fn rotations(array: &NumberArray) -> Option<impl Iterator<Item = DQuat> + '_> {
     (whole && rows().all(is_unit)).then(rows)
 }
 
-/// The indices of a number of an array whose last axis is the fastest.
+/// The indices of an element of an array whose last axis is the fastest.
 fn indices(mut index: u64, shape: &[usize]) -> Vec<usize> {
     let mut found: Vec<usize> = shape
         .iter()

@@ -1,4 +1,4 @@
-//! Two clips, sampled at the same times.
+//! Compares two clips at the same sample times.
 
 use std::collections::HashMap;
 
@@ -13,72 +13,72 @@ use crate::motion::Motion;
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::world;
 
-/// Spans whose ends are nearer than this are the same: times in f32 of some hours.
+/// Time spans whose ends differ by less than this are equal, in seconds: f32 times of some hours are not more exact.
 const SAME_TIME: f64 = 1e-3;
 
-/// Two clips that are compared.
+/// Two clips to compare.
 #[derive(Debug, Clone, Copy)]
 pub struct ClipPair<'a> {
-    /// What messages call them.
+    /// Names of the clips in messages.
     pub inputs: [&'a str; 2],
     /// The clips.
     pub clips: [&'a Motion; 2],
 }
 
-/// The times that two clips have in common, seconds of the first one.
+/// The times that two clips have in common, in seconds, on the clock of the first clip.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CommonTimes {
-    /// The first time.
+    /// First common time, in seconds.
     pub start: f64,
-    /// The last time.
+    /// Last common time, in seconds.
     pub end: f64,
-    /// That one of the clips is longer, and where it is compared.
+    /// A warning if the time spans of the clips differ; it names both spans and the common one.
     pub warning: Option<String>,
 }
 
-/// How far two clips are apart.
+/// The differences of two clips.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct ClipDifference {
-    /// What messages call the clips.
+    /// Names of the clips in messages.
     pub inputs: [String; 2],
-    /// Tracks that both have.
+    /// Number of tracks that both clips have.
     pub tracks: usize,
-    /// Tracks that one alone has: of the first clip, and of the second.
+    /// Names of the tracks that only the first clip has, and of those that only the second clip has.
     pub missing: [Vec<String>; 2],
-    /// Samples of each track.
+    /// Number of samples of each track.
     pub samples: usize,
-    /// First and last time, seconds.
+    /// First and last sample time, in seconds, on the clock of the first clip.
     pub span: [f64; 2],
-    /// Rotations whose bits are the same.
+    /// Number of rotations whose bits are equal, up to the sign of the quaternion.
     pub identical: u64,
-    /// Degrees.
+    /// Angles between the rotations, in degrees.
     pub rotation: ChannelDifference,
-    /// Lengths, as in the files; nothing where neither clip moves.
+    /// Distances between the translations, in the files' unit of length; `None` if neither clip has translations.
     pub translation: Option<ChannelDifference>,
-    /// Lengths of the differences of scales; nothing where neither clip scales.
+    /// Lengths of the differences of the scales; `None` if neither clip has scales.
     pub scale: Option<ChannelDifference>,
 }
 
-/// The differences of a channel.
+/// The differences of one channel.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct ChannelDifference {
-    /// What they come to.
+    /// Mean, root mean square and maximum of the differences.
     #[serde(flatten)]
     pub spread: Spread,
-    /// The name of the track with the largest.
+    /// Name of the track with the largest difference.
     pub track: String,
-    /// When it is, seconds.
+    /// Time of the largest difference, in seconds.
     pub time: f64,
 }
 
 impl ClipPair<'_> {
-    /// The times that both have.
+    /// The times that lie in both clips.
     ///
     /// # Errors
-    /// When there is none.
+    /// When the time spans of the clips do not overlap.
     pub fn common_times(&self) -> Result<CommonTimes, CompareError> {
         let shifts = [0.0, self.shift()];
         let spans = [0, 1].map(|side| {
@@ -112,7 +112,8 @@ impl ClipPair<'_> {
         })
     }
 
-    /// Every key of both between these times, and the middle between neighbouring ones.
+    /// The sample times of a comparison: `common.start`, `common.end`, all key times of both clips between them, and
+    /// the middle of each interval between these times.
     #[must_use]
     pub fn keys(&self, common: &CommonTimes) -> SampleTimes {
         let (start, end) = (common.start, common.end);
@@ -132,10 +133,12 @@ impl ClipPair<'_> {
         SampleTimes::at(times)
     }
 
-    /// Compares them at some times, seconds of the first one: joints relative to their parents, or in the world.
+    /// Compares the clips at the times `frames`, in seconds, on the clock of the first clip. With `in_world` the
+    /// poses are relative to the world, otherwise to the parents.
     ///
     /// # Errors
-    /// When no track belongs to one of the other, or one cannot be sampled.
+    /// When no track of one clip corresponds to a track of the other, when a clip cannot be sampled, or when poses in
+    /// the world cannot be computed.
     pub fn differences(
         &self,
         engine: &Engine,
@@ -220,14 +223,15 @@ impl ClipPair<'_> {
         })
     }
 
-    /// What makes times of the first clip times of the second: each counts from whole seconds of its own.
+    /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
+    /// different whole seconds.
     fn shift(&self) -> f64 {
         let [first, second] = self.clips;
         (first.time_offset - second.time_offset) as f64
     }
 
-    /// The tracks that belong together, and the names of those that only one clip has: by their names,
-    /// where all have one of their own and any agree, else by their order.
+    /// Pairs of corresponding tracks, and the names of the tracks that only one clip has. Tracks correspond by name
+    /// if the names within each clip are distinct and at least one occurs in both clips; otherwise by index.
     #[expect(
         clippy::type_complexity,
         reason = "pairs, and a list of names for each side"
@@ -276,7 +280,7 @@ impl ClipPair<'_> {
     }
 }
 
-/// All poses of a clip, and what the translations of each track are to be moved by.
+/// All poses of a clip, and the origin to add to the translations of each track.
 fn poses(
     engine: &Engine,
     input: &str,

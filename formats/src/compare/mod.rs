@@ -1,4 +1,4 @@
-//! How far two motions, two paths of a body, or two arrays of results are apart.
+//! Compares two clips, two paths of a body, or two arrays of results.
 
 mod arrays;
 mod clips;
@@ -16,71 +16,71 @@ pub use crate::compare::paths::{
 };
 pub use crate::compare::tally::Spread;
 
-/// Why two clips cannot be compared.
+/// Why two inputs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompareError {
-    /// No track of one belongs to one of the other.
+    /// No track of one clip corresponds to a track of the other.
     #[error(
         "{} and {}: have {} and {} tracks, none of the same name; --tracks chooses some",
         inputs[0], inputs[1], tracks[0], tracks[1]
     )]
     NoTrackInBoth {
-        /// What messages call the clips.
+        /// Names of the clips in messages.
         inputs: [String; 2],
-        /// How many tracks they have.
+        /// Number of tracks of each clip.
         tracks: [usize; 2],
     },
-    /// Their keys lie at different times.
+    /// The time spans of the clips do not overlap.
     #[error(
         "no time lies in both: {} from {} to {} s, {} from {} to {} s",
         inputs[0], spans[0][0], spans[0][1], inputs[1], spans[1][0], spans[1][1]
     )]
     NoTimeInBoth {
-        /// What messages call the clips.
+        /// Names of the clips in messages.
         inputs: [String; 2],
-        /// Their first and last key times, seconds.
+        /// First and last key time of each clip, in seconds, on the clock of the first clip.
         spans: [[f64; 2]; 2],
     },
-    /// No pose of the reference lies at a time of the estimate.
+    /// The estimate has no pose at the time of any pose of the reference.
     #[error(
         "{} and {}: no pose of the first lies at a time of the second", inputs[0], inputs[1]
     )]
     NoPoseInBoth {
-        /// What messages call the clips.
+        /// Names of the clips in messages.
         inputs: [String; 2],
     },
-    /// No step of relative errors fits into the path.
+    /// The step of relative errors is longer than the path.
     #[error("{} and {}: --rpe is longer than the whole path", inputs[0], inputs[1])]
     StepTooLong {
-        /// What messages call the clips.
+        /// Names of the clips in messages.
         inputs: [String; 2],
     },
-    /// Arrays of different shapes.
+    /// The arrays have different shapes.
     #[error(
         "{} has the shape {:?} and {} has {:?}; arrays of one shape can be compared",
         inputs[0], shapes[0], inputs[1], shapes[1]
     )]
     Shapes {
-        /// What messages call the arrays.
+        /// Names of the arrays in messages.
         inputs: [String; 2],
-        /// Their shapes.
+        /// Shape of each array.
         shapes: [Vec<usize>; 2],
     },
-    /// A clip was not sampled.
+    /// A clip could not be sampled.
     #[error("{input}: {error}")]
     Evaluating {
-        /// What messages call the clip.
+        /// Name of the clip in messages.
         input: String,
-        /// Why.
+        /// The error of the engine.
         error: Error,
     },
-    /// The joints of a clip make no hierarchy.
+    /// The parents of a clip's joints do not make a hierarchy.
     #[error("{input}: {error}")]
     Hierarchy {
-        /// What messages call the clip.
+        /// Name of the clip in messages.
         input: String,
-        /// Why.
+        /// The fault of the hierarchy.
         error: HierarchyError,
     },
 }

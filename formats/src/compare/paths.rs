@@ -1,4 +1,4 @@
-//! An estimated path beside its reference: errors after an alignment, at the poses of the reference.
+//! Compares an estimated path with its reference: errors after an alignment, at the poses of the reference.
 
 use serde::Serialize;
 use tumble::{Engine, Interpolation, SampleTimes, method};
@@ -12,81 +12,82 @@ use crate::world::world;
 /// How an estimate is compared with its reference.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PathMeasure {
-    /// What is free when it is laid over the reference.
+    /// The degrees of freedom with which the estimate is aligned to the reference.
     pub align: Align,
-    /// Absolute errors, pose by pose.
+    /// Whether absolute errors are computed, pose by pose.
     pub is_absolute: bool,
-    /// The step of relative errors.
+    /// The step of relative errors; `None` if they are not computed.
     pub step: Option<Step>,
-    /// Seconds between neighbouring keys of the estimate beyond which it is not interpolated.
+    /// The longest interval between neighbouring keys of the estimate that is interpolated, in seconds; `None` for no
+    /// limit.
     pub max_gap: Option<f64>,
 }
 
-/// How far an estimate is from its reference.
+/// The errors of an estimate against its reference.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct PathDifference {
-    /// What messages call the clips.
+    /// Names of the clips in messages.
     pub inputs: [String; 2],
-    /// Poses of the reference that have one of the estimate.
+    /// Number of poses of the reference for which the estimate has a pose.
     pub poses: usize,
-    /// Poses of the reference before or after the estimate.
+    /// Number of poses of the reference before the first or after the last key of the estimate.
     pub outside: usize,
-    /// Poses of the reference in gaps of the estimate.
+    /// Number of poses of the reference in intervals of the estimate longer than [`PathMeasure::max_gap`].
     pub in_gaps: usize,
-    /// First and last time, seconds.
+    /// First and last time of the compared poses, in seconds, with the reference's time offset added.
     pub span: [f64; 2],
-    /// What lays the estimate over the reference.
+    /// The alignment of the estimate to the reference.
     pub alignment: AlignmentSummary,
-    /// Absolute errors.
+    /// Absolute errors, if they are computed.
     pub ape: Option<PathErrors>,
-    /// Relative errors.
+    /// Relative errors, if they are computed.
     pub rpe: Option<PathErrors>,
 }
 
-/// What lays an estimate over its reference: scale, then rotation, then translation.
+/// The alignment of an estimate to its reference: first the scale, then the rotation, then the translation.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct AlignmentSummary {
-    /// What was free in it: its name.
+    /// Name of the [`Align`] that was used.
     pub by: &'static str,
     /// The scale.
     pub scale: f64,
-    /// x y z w.
+    /// The rotation as a quaternion x y z w.
     pub rotation: [f64; 4],
-    /// By how much it turns, degrees.
+    /// Angle of the rotation, in degrees.
     pub degrees: f64,
     /// The translation.
     pub translation: [f64; 3],
 }
 
-/// Errors of one kind.
+/// The errors of one kind, absolute or relative.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct PathErrors {
-    /// How many.
+    /// Number of errors.
     pub count: usize,
-    /// Lengths, as in the files.
+    /// Distances, in the files' unit of length.
     pub translation: PathStatistics,
-    /// Degrees.
+    /// Angles, in degrees.
     pub rotation: PathStatistics,
 }
 
-/// What some errors come to, by the names of `evo`.
+/// Statistics of errors, named as in `evo`.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[non_exhaustive]
 pub struct PathStatistics {
-    /// The root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
-    /// The mean.
+    /// Mean.
     pub mean: f64,
-    /// The median.
+    /// Median.
     pub median: f64,
-    /// The deviation from the mean.
+    /// Standard deviation.
     pub std: f64,
-    /// The smallest.
+    /// Smallest error.
     pub min: f64,
-    /// The largest.
+    /// Largest error.
     pub max: f64,
 }
 
@@ -115,12 +116,13 @@ impl PathErrors {
 }
 
 impl PathDifference {
-    /// Compares a track of each of two clips, of which the second is an estimate of the path of the first: it is
-    /// interpolated by lines and arcs at the times of the first one's poses.
+    /// Compares one track of each of two clips: the second is an estimate of the path of the first. `clips` contains
+    /// for each the name in messages, the clip and the index of the track. The estimate is interpolated at the times
+    /// of the reference's poses, by straight lines and arcs.
     ///
     /// # Errors
-    /// When no pose of the first lies at a time of the second, no step fits into the path, or a clip cannot be
-    /// sampled.
+    /// When the estimate has no pose at the time of any pose of the reference, when the step of relative errors is
+    /// longer than the path, when a clip cannot be sampled, or when its poses in the world cannot be computed.
     pub fn of(
         engine: &Engine,
         clips: [(&str, &Motion, usize); 2],

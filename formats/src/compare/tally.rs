@@ -1,31 +1,31 @@
-//! Differences counted: the largest, where it is, and the mean.
+//! Statistics of differences: the largest, its index, the mean and the root mean square.
 
 use serde::Serialize;
 
-/// Differences while they are counted.
+/// The statistics of the added differences.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
     count: u64,
     sum: f64,
     squares: f64,
     largest: f64,
-    /// Which of them the largest is, in the order in which they were counted.
+    /// Index of the largest difference, in the order in which they were added.
     pub(super) largest_at: u64,
 }
 
-/// What many differences come to.
+/// Mean, root mean square and maximum of many differences.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// The mean.
+    /// Mean.
     pub mean: f64,
-    /// The root of the mean square.
+    /// Root mean square.
     pub rms: f64,
-    /// The largest.
+    /// Maximum.
     pub largest: f64,
 }
 
 impl Tally {
-    /// Counts one difference, 0 or more. What is no number is further than every number.
+    /// Adds one difference, 0 or more. NaN counts as infinity.
     pub(super) fn add(&mut self, difference: f64) {
         let difference = match difference.is_nan() {
             true => f64::INFINITY,
@@ -40,7 +40,7 @@ impl Tally {
         self.squares += difference * difference;
     }
 
-    /// Each of them times a number, such as degrees of a radian.
+    /// The statistics with each difference multiplied by `factor`, for example to convert radians to degrees.
     pub(super) fn times(self, factor: f64) -> Spread {
         let count = self.count.max(1) as f64;
         Spread {

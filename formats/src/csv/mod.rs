@@ -1,5 +1,5 @@
-//! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame, or with w behind z;
-//! or the numbers of another encoding instead of those of quaternions.
+//! CSV with a line for each frame: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`. The column `w` comes last
+//! in the order x y z w. Other encodings have their numbers as columns.
 
 mod motion;
 pub mod read;
@@ -16,10 +16,10 @@ use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResult
 use crate::quaternion::ComponentOrder;
 use crate::text::cell::text_cell;
 
-/// As in `.dat` files.
+/// The order of `.dat` files.
 pub(crate) const ORDER: ComponentOrder = ComponentOrder::Wxyz;
 
-/// Comma-separated values.
+/// The CSV format.
 pub static FORMAT: Format = Format {
     name: "csv",
     summary: "text, a row for each frame or key",
@@ -74,8 +74,8 @@ impl<W: Write> ResultWriter for CsvWriter<'_, W> {
     }
 }
 
-/// Writes frames as they come, with as many digits as it takes to read the same bits
-/// again; times are seconds.
+/// Writes a result as CSV, frame by frame. Numbers have as many digits as are needed to read back the same bits;
+/// times are in seconds.
 pub struct CsvWriter<'a, W: Write> {
     csv: ::csv::Writer<W>,
     timeline: &'a Timeline,
@@ -89,8 +89,9 @@ pub struct CsvWriter<'a, W: Write> {
 }
 
 impl<'a, W: Write> CsvWriter<'a, W> {
-    /// Writes the header for a set's rotations at the samples of a timeline; the order is that of
-    /// quaternions. F16 and Snorm16 are written as F32: digits cost nothing here.
+    /// Writes the header of a result: the rotations of `set` at the samples of `timeline`. `order` is that of
+    /// quaternions; other encodings have only one. The encodings F16 and Snorm16 are written as F32, because rounded
+    /// numbers would not be shorter.
     ///
     /// # Errors
     /// When writing fails.
@@ -114,11 +115,11 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         Ok(writer)
     }
 
-    /// Writes the next frames, `[frame][track]`.
+    /// Writes the next frames; `rotations` is in the order `[frame][track]`.
     ///
     /// # Errors
-    /// When writing fails, or (`InvalidInput`) the last frame is not whole or there
-    /// are more than the timeline has.
+    /// When writing fails, or (`InvalidInput`) when a frame is not complete or there are more frames than in the
+    /// timeline.
     pub fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
         let frames = rotations.chunks_exact(self.tracks.max(1));
         if !frames.remainder().is_empty() || self.frame + frames.len() > self.timeline.len() {
@@ -131,10 +132,10 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         Ok(())
     }
 
-    /// Flushes what was written.
+    /// Flushes the output.
     ///
     /// # Errors
-    /// When that fails, or (`InvalidInput`) frames are missing.
+    /// When flushing fails, or (`InvalidInput`) when frames are missing.
     pub fn finish(mut self) -> io::Result<()> {
         self.csv.flush()?;
         if self.frame < self.timeline.len() {
@@ -144,7 +145,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         Ok(())
     }
 
-    /// Whether w comes before the others.
+    /// Whether w is the first component.
     fn is_w_first(&self) -> bool {
         self.encoding.is_quaternion() && self.order == ComponentOrder::Wxyz
     }
@@ -193,7 +194,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     }
 }
 
-/// The conversion that the crate offers loses the kind, a broken pipe's too.
+/// Converts an error and keeps its kind, for example that of a broken pipe; the crate's conversion loses it.
 pub(crate) fn io_error(error: ::csv::Error) -> io::Error {
     match error.into_kind() {
         ::csv::ErrorKind::Io(error) => error,

@@ -1,4 +1,4 @@
-//! A sampled clip as CSV: a row for each sample, the rotation, then what moves and scales.
+//! Writes a sampled clip as CSV: a row for each sample, with rotations, then translations and scales.
 
 use std::io::{self, Write};
 
@@ -11,7 +11,7 @@ use crate::poses::{TRANSFORM, WORLD};
 use crate::quaternion::ComponentOrder;
 use crate::text::cell::text_cell;
 
-/// Writes one clip; the names of its columns are those that are read.
+/// Writes one clip; its columns have the names that the reader knows.
 ///
 /// # Errors
 /// When writing fails, or there are several clips.

@@ -1,4 +1,4 @@
-//! Keys from CSV: wide as it is written here, or long, with a header.
+//! Reads keys from CSV with a header: in the wide layout that Tumble writes, or in a long layout.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -18,20 +18,20 @@ use crate::text::cell::cell_text;
 use crate::text::number;
 use crate::warnings::Warnings;
 
-/// Reads a file; `-` is standard input.
+/// Reads a CSV file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_csv(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
     read_csv(&name, source.into_bytes(options.limits.file)?, options)
 }
 
-/// Reads the bytes of a file; `name` is what messages call it.
+/// Reads the bytes of a CSV file; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the input is invalid; the first error is returned.
 pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut warnings = Warnings::new(name);
     let start = check_encoding(name, &bytes, &mut warnings)?;
@@ -116,7 +116,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     Ok(loaded)
 }
 
-/// Refuses what is no text, and gives where the text begins: behind a byte-order mark.
+/// Refuses bytes that are not text, and returns the offset of the text, after a byte-order mark.
 fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<usize, Diagnostic> {
     let refuse = |message: &str| Err(Diagnostic::new(name, Code::Encoding, message));
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
@@ -139,9 +139,9 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
 struct Sheet<'a> {
     name: &'a str,
     bytes: &'a [u8],
-    /// Times are in units of 10 to this power of a second.
+    /// The power of ten of the unit of times, in seconds.
     time_power: i32,
-    /// Numbers that are missing, or called NaN, are NaN.
+    /// Whether numbers that are missing or `NaN` become NaN.
     bridges_gaps: bool,
 }
 
@@ -160,7 +160,7 @@ impl Sheet<'_> {
         refusal
     }
 
-    /// Reads the next row; blank lines are none.
+    /// Reads the next row; blank lines are skipped.
     fn next(
         &self,
         reader: &mut Reader<&[u8]>,
@@ -184,13 +184,13 @@ impl Sheet<'_> {
         Err(self.refuse(location, Code::Columns, message))
     }
 
-    /// Where a cell of a record begins.
+    /// The location of a cell of a record.
     fn cell(&self, record: &ByteRecord, column: usize) -> Location {
         cell_location(self.bytes, start_of(record), column)
     }
 }
 
-/// Where a record begins, and how many lines are before it.
+/// The offset of a record, and the number of lines before it.
 fn start_of(record: &ByteRecord) -> (usize, u64) {
     let position = record.position();
     position.map_or((0, 0), |at| {
@@ -198,8 +198,7 @@ fn start_of(record: &ByteRecord) -> (usize, u64) {
     })
 }
 
-/// Where a cell of the record begins that starts there; behind the record's end, where it has no
-/// such cell.
+/// The location of a cell of the record that begins at `start`; the end of the record if it has no such cell.
 fn cell_location(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Location {
     let ends = |byte: &u8| matches!(byte, b'\r' | b'\n');
     let rest = bytes.get(start..).unwrap_or_default();
@@ -229,7 +228,7 @@ fn cell_location(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> L
     }
 }
 
-/// What `String::from_utf8_lossy` gives, which takes several times as long for text without faults.
+/// The result of `String::from_utf8_lossy`, which is several times slower for valid text.
 fn as_text(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
@@ -237,10 +236,10 @@ fn as_text(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// One cell of a requested column.
+/// A cell of a requested column.
 struct TextCell<'a> {
     sheet: &'a Sheet<'a>,
-    /// Without the blanks around it.
+    /// The text without surrounding blanks.
     text: &'a [u8],
     column: usize,
     record: &'a ByteRecord,
@@ -252,7 +251,7 @@ impl TextCell<'_> {
         self.sheet.refuse(location, code, message)
     }
 
-    /// Appends what the cell says.
+    /// Appends the value of the cell.
     fn read(
         &self,
         values: &mut ColumnValues,
@@ -321,7 +320,7 @@ impl TextCell<'_> {
         Ok(())
     }
 
-    /// Appends a time with all its digits.
+    /// Appends a time with all of its digits.
     fn time(
         &self,
         text: &[u8],

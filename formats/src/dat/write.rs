@@ -1,4 +1,4 @@
-//! Keys as `.dat`: the header, then a line for each time.
+//! Writes keys as `.dat`: the header, then a line for each time.
 
 use std::borrow::Borrow;
 use std::io::{self, Write};
@@ -11,10 +11,10 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::SampledClip;
 
-/// Writes a clip's samples, and says what the format has no room for.
+/// Writes the samples of a clip.
 ///
 /// # Errors
-/// When writing fails, or there are several clips, too many tracks, or a time that does not increase.
+/// When writing fails, or when there are several clips, too many tracks, or a time that does not increase.
 pub(super) fn write_motion(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,
@@ -45,11 +45,11 @@ pub(super) fn write_motion(
     Ok(Vec::new())
 }
 
-/// Writes a set whose tracks share their times, with boxes of that length. Numbers have as
-/// many digits as it takes to read the same bits again.
+/// Writes a set whose tracks share their key times; `box_length` is the length of each box. Numbers have as many
+/// digits as are needed to read back the same bits.
 ///
 /// # Errors
-/// When writing fails, or (`InvalidInput`) the tracks' times differ.
+/// When writing fails, or (`InvalidInput`) when the key times of tracks differ.
 pub fn write_dat(mut writer: &mut impl Write, set: &TrackSet, box_length: f64) -> io::Result<()> {
     let times = set.tracks().next().map_or(&[][..], |track| track.times);
     if set.tracks().any(|track| track.times != times) {

@@ -1,8 +1,8 @@
-//! The transform of a node whose curves stand in one layer: the sums of `ufbx`, of the curves that matter alone.
+//! Evaluates the transform of a node whose curves are in one layer as `ufbx` does, from the curves that matter only.
 //!
-//! `ufbx` looks up nine properties by name for each time, and turns angles that never change into quaternions
-//! again. Here both is done once for each node, and a curve is looked at where it was looked at last. Whether
-//! the two agree is asked at a few times; where they do not, `ufbx` is asked every time.
+//! For each time, `ufbx` looks up nine properties by name and converts constant angles to quaternions again. Here
+//! this is done once for each node, and each curve is searched from its last key on. Both results are compared at
+//! several times; if they differ, `ufbx` is used for all times.
 
 use std::cell::Cell;
 
@@ -15,7 +15,7 @@ use ufbx::{
 use crate::fbx::times::Properties;
 use crate::fbx::{ROTATION, SCALE, TRANSLATION};
 
-/// How far the two may be apart: a part of the largest number.
+/// The largest difference between both results, relative to the largest number.
 const SAME: f64 = 1e-12;
 
 /// A node's transform as a sum of curves and constants:
@@ -25,34 +25,34 @@ pub(super) struct DirectEvaluator<'a> {
     rotation: Vector<'a>,
     scale: Vector<'a>,
     order: RotationOrder,
-    /// The constant rotations before and behind that of the curves; nothing for none.
+    /// The constant rotations before and after that of the curves, if there are any.
     before: Option<DQuat>,
     behind: Option<DQuat>,
-    /// Roff + Rp, Sp, and Sp + Soff - Rp, which turns with the node.
+    /// Roff + Rp, Sp, and Sp + Soff - Rp; the last rotates with the node.
     offset: DVec3,
     scale_pivot: DVec3,
     rotated_offset: DVec3,
 }
 
-/// Three numbers that curves move.
+/// A vector whose components have curves.
 struct Vector<'a> {
     rest: DVec3,
     curves: [Option<Curve<'a>>; 3],
 }
 
-/// A curve, and where it was looked at last.
+/// A curve, and the location of the last search in it.
 struct Curve<'a> {
     curve: &'a AnimCurve,
     keys: &'a [Keyframe],
-    /// The key behind that place.
+    /// Index of the key after that location.
     next: Cell<usize>,
 }
 
-/// Degrees to half of radians.
+/// The factor from degrees to half of radians.
 const HALF: f64 = std::f64::consts::PI / 180.0 * 0.5;
 
 impl<'a> DirectEvaluator<'a> {
-    /// Nothing for a node that is more than this.
+    /// `None` for a node whose transform has other parts.
     pub(super) fn of(
         node: &'a Node,
         properties: &Properties,
@@ -126,7 +126,7 @@ impl<'a> DirectEvaluator<'a> {
         })
     }
 
-    /// Whether it gives what `ufbx` does.
+    /// Whether the results are those of `ufbx`.
     pub(super) fn is(&self, exact: impl Fn(f64) -> Transform, [begin, end]: [f64; 2]) -> bool {
         [0.0, 0.271, 0.618, 1.0].into_iter().all(|part| {
             let time = begin + part * (end - begin);
@@ -149,7 +149,7 @@ impl<'a> DirectEvaluator<'a> {
         })
     }
 
-    /// The channels of these flags at a time; the others are at rest.
+    /// The channels of these flags at a time; others have their rest values.
     pub(super) fn at(&self, time: f64, flags: u32) -> Transform {
         let mut found = Transform::default();
         let rotates_offset = self.rotated_offset != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
@@ -189,7 +189,7 @@ impl<'a> DirectEvaluator<'a> {
         found
     }
 
-    /// Whether the curves of the channels of these flags never change.
+    /// Whether the curves of the channels of these flags are constant.
     pub(super) fn is_still(&self, flags: u32) -> bool {
         let rotates_offset = self.rotated_offset != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
         let carried = flags & TRANSLATION != 0 && rotates_offset;
@@ -224,7 +224,7 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// As `ufbx_evaluate_curve`, to the last operation.
+    /// Evaluates the curve as `ufbx_evaluate_curve` does, operation by operation.
     fn at(&self, time: f64, rest: f64) -> f64 {
         let keys = self.keys;
         let is_outside = || time < self.curve.min_time || time > self.curve.max_time;
@@ -262,7 +262,7 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// The first key behind a time.
+    /// Index of the first key after a time.
     fn next(&self, time: f64) -> usize {
         let keys = self.keys;
         let is_it = |index: usize| {
@@ -319,7 +319,7 @@ fn bezier_parameter(p1: f64, p2: f64, x0: f64) -> f64 {
     found.0
 }
 
-/// The rotation of angles in degrees.
+/// The rotation of Euler angles in degrees.
 fn euler_rotation(angles: DVec3, order: RotationOrder) -> DQuat {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.to_array().map(|angle| libm::sincos(angle * HALF));
     let [x, y, z] = [

@@ -1,8 +1,8 @@
-//! One channel of a node: the curve that a file's keys describe, as keys of our own that follow it.
+//! Converts one channel of a node to keys that follow the curve of the file.
 //!
-//! Curves of FBX are of Euler angles, weighted cubics and layers, which no sampler of a clip is. Between
-//! two key times the curve is evaluated at thirds, where a cubic of glTF meets it too; where the two are
-//! apart by more than a bound in between, the interval is cut in two, on a frame if there is one.
+//! FBX has curves of Euler angles, weighted cubics and layers, which no interpolation of a clip can represent.
+//! Between two key times the curve is evaluated at thirds, where a cubic of glTF has the same values. If both differ
+//! by more than a bound elsewhere, the interval is divided in two, on a frame if there is one.
 
 use glam::DVec4;
 use tumble::FrameRate;
@@ -10,37 +10,38 @@ use tumble::FrameRate;
 use crate::keys::just_before;
 use crate::rate::frame_time;
 
-/// The largest distance between a curve and the keys that follow it: radians for rotations, else a part of
-/// the channel's largest number.
+/// The largest distance between a curve and the keys that follow it: in radians for rotations, otherwise relative to
+/// the largest number of the channel.
 pub(super) const BOUND: f64 = 1e-6;
 
-/// Where the two are compared, in parts of an interval: no simple fractions, at which whole turns hide.
+/// The parameters in an interval at which both are compared. They are not simple fractions, at which whole rotations
+/// could be overlooked.
 const COMPARED: [f64; 3] = [0.839, 0.487, 0.171];
 
-/// Where a rotation is looked at that is the same at the ends and the thirds of an interval.
+/// The parameter at which a rotation is checked that is the same at the ends and the thirds of an interval.
 const BETWEEN: f64 = 0.414_213_56;
 
-/// How often an interval is cut in two at most.
+/// How often an interval is divided in two.
 const MAX_CUTS: u32 = 12;
 
-/// Between neighbouring keys that stand for the curve alone, a rotation is at most so far, radians: the
-/// shorter way is then the curve's.
+/// The largest angle in radians between neighbouring keys that replace the curve, so that the shorter arc is the
+/// curve's.
 const LONGEST_ARC: f64 = 2.1;
 
-/// What a channel is of.
+/// The kind of a channel's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ChannelKind {
     Rotation,
     Vector,
 }
 
-/// x y z w of a unit quaternion, or x y z and 0.
+/// A unit quaternion x y z w, or x y z and 0.
 pub(super) type ChannelValue = DVec4;
 
-/// A time of the file's keys: what the channel is at it, and on either side of it.
+/// A key time of the file, and the values of the channel at it and on either side of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct KeyStop {
-    /// Seconds as the file has them, and as the clip has them.
+    /// Seconds in the file, and in the clip.
     pub(super) file: f64,
     pub(super) clip: f64,
     pub(super) before: ChannelValue,
@@ -51,24 +52,24 @@ pub(super) struct KeyStop {
 /// The keys of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum FollowedKeys {
-    /// It rests there.
+    /// A constant value.
     Rest(ChannelValue),
-    /// Each key holds until the next one.
+    /// Each key is constant until the next one.
     Step(Vec<(f64, ChannelValue)>),
     /// Straight lines and arcs.
     Linear(Vec<(f64, ChannelValue)>),
-    /// With the tangents with which the curve arrives and leaves, a second.
+    /// Keys with arriving and leaving tangents, per second.
     Cubic(Vec<(f64, ChannelValue, [ChannelValue; 2])>),
 }
 
-/// How a channel is followed.
+/// Follows one channel.
 pub(super) struct ChannelFollower<'a> {
     pub(super) kind: ChannelKind,
-    /// The channel at a time of the file.
+    /// The value of the channel at a time of the file.
     pub(super) value: &'a dyn Fn(f64) -> Option<ChannelValue>,
-    /// The rate of the file, on whose frames intervals are cut.
+    /// The rate of the file; intervals are divided on its frames.
     pub(super) rate: Option<FrameRate>,
-    /// The file's keys stand for the curve: keys are added only where its rotation needs them.
+    /// Whether keys are added only where rotations need them.
     pub(super) keyframes: bool,
 }
 
@@ -85,12 +86,12 @@ struct FollowedInterval {
 /// A cubic from one end of an interval to the other.
 struct Cubic {
     ends: [ChannelValue; 2],
-    /// A part of the interval's length, not a second.
+    /// Derivatives by the parameter of the interval, not by seconds.
     tangents: [ChannelValue; 2],
 }
 
 impl Cubic {
-    /// The one that meets a curve at its thirds.
+    /// The cubic that has the values of a curve at its thirds.
     fn through(ends: [ChannelValue; 2], thirds: [ChannelValue; 2]) -> Self {
         let ([p, q], [a, b]) = (ends, thirds);
         Self {
@@ -110,8 +111,8 @@ impl Cubic {
 }
 
 impl ChannelFollower<'_> {
-    /// The keys for a channel with these stops, between which it was evaluated at thirds; and whether
-    /// they follow it everywhere. `None` where the channel cannot be evaluated so often.
+    /// The keys for a channel with these stops, whose values at the thirds between them are known, and whether the
+    /// keys follow the channel everywhere. `None` if the channel cannot be evaluated so often.
     pub(super) fn keys(
         &self,
         stops: &[KeyStop],
@@ -157,8 +158,7 @@ impl ChannelFollower<'_> {
         }
     }
 
-    /// Whether a rotation that is the same at the ends of each interval, and at its thirds, does not turn
-    /// about in between.
+    /// Whether a rotation that is the same at the ends and the thirds of each interval is also the same between them.
     fn stays_between(&self, stops: &[KeyStop]) -> Option<bool> {
         if self.kind == ChannelKind::Vector {
             return Some(true);
@@ -173,8 +173,8 @@ impl ChannelFollower<'_> {
         Some(true)
     }
 
-    /// The stops as keys, those at a jump as two, with signs that continue; and the pieces between them,
-    /// none where the channel jumps.
+    /// The stops as keys with continued signs, a stop at a jump as two keys; and the intervals between them, `None`
+    /// where the channel jumps.
     fn pieces(
         &self,
         stops: &[KeyStop],
@@ -219,7 +219,7 @@ impl ChannelFollower<'_> {
         (keys, pieces)
     }
 
-    /// Of the two quaternions of a rotation the one near to another.
+    /// The one of q and -q that is nearer to `to`.
     fn near(&self, value: ChannelValue, to: ChannelValue) -> ChannelValue {
         match self.kind {
             ChannelKind::Rotation if value.dot(to) < 0.0 => -value,
@@ -227,7 +227,7 @@ impl ChannelFollower<'_> {
         }
     }
 
-    /// How far a value of our own is from the channel's.
+    /// The distance of a value from the channel's.
     fn off(&self, ours: ChannelValue, exact: ChannelValue) -> f64 {
         match self.kind {
             ChannelKind::Vector => (ours - exact).abs().max_element(),
@@ -267,7 +267,7 @@ impl ChannelFollower<'_> {
         Some(self.off(at(middle), (self.value)(piece.time(middle))?) <= bound)
     }
 
-    /// Keys with tangents that follow all pieces.
+    /// Keys with tangents that follow all intervals.
     fn cubics(
         &self,
         stops: &[(f64, ChannelValue)],
@@ -306,7 +306,7 @@ impl ChannelFollower<'_> {
         Some((FollowedKeys::Cubic(keys), is_whole))
     }
 
-    /// The stops, and as many keys between them as it takes that arcs turn as the channel does.
+    /// The stops, and as many keys between them as are needed for arcs that follow the channel.
     fn linear_keys(
         &self,
         stops: &[(f64, ChannelValue)],
@@ -339,7 +339,7 @@ impl ChannelFollower<'_> {
         Some(keys)
     }
 
-    /// A piece whose signs continue those of the key before it.
+    /// An interval whose signs continue those of the key before it.
     fn after(&self, piece: FollowedInterval, last: ChannelValue) -> FollowedInterval {
         let a = self.near(piece.thirds[0], last);
         let b = self.near(piece.thirds[1], a);
@@ -350,7 +350,7 @@ impl ChannelFollower<'_> {
         }
     }
 
-    /// Two halves, the later one first; `None` where there is no more room between them.
+    /// Divides an interval in two, the later one first; `Some(None)` if it cannot be divided any more.
     fn cut(&self, piece: &FollowedInterval) -> Option<Option<[FollowedInterval; 2]>> {
         let [from, to] = piece.file;
         let length = to - from;
@@ -385,13 +385,13 @@ impl ChannelFollower<'_> {
 }
 
 impl FollowedInterval {
-    /// The time of the file at a part of the piece.
+    /// The time of the file at a parameter of the interval.
     fn time(&self, u: f64) -> f64 {
         self.file[0] + u * (self.file[1] - self.file[0])
     }
 }
 
-/// The keys of a channel that does nothing but jump.
+/// The keys of a channel that only jumps.
 fn steps(stops: &[KeyStop], thirds: &[[ChannelValue; 2]]) -> Option<Vec<(f64, ChannelValue)>> {
     let intervals = stops.windows(2).zip(thirds);
     let mut are_constant = intervals.map(|(pair, [a, b])| {

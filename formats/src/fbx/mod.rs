@@ -1,8 +1,9 @@
 //! FBX, as programs of Autodesk, Blender and Mixamo write it, binary or text.
 //!
-//! The file is read by `ufbx`, which also evaluates what a node's layers, curves, pivots and rotation orders
-//! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within a
-//! millionth (radians; else parts of the largest number), or those at the file's key times alone ([`ReadOptions::keyframes`]).
+//! The file is read by `ufbx`, which also evaluates the layers, curves, pivots and rotation orders of a node. Each
+//! animation stack becomes a clip, and each node a track. The keys follow the curves of the node within 1e-6 (in
+//! radians for rotations, otherwise relative to the largest number). With [`ReadOptions::keyframes`] they are only
+//! those at the key times of the file, and those that large rotations need.
 
 mod direct;
 mod follow;
@@ -36,7 +37,7 @@ use crate::rate::{RateSource, frame_time, of};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
-/// Scenes with their animations.
+/// The FBX format: scenes with their animations.
 pub static FORMAT: Format = Format {
     name: "fbx",
     summary: "scenes of Maya, Blender, MotionBuilder, Mixamo, as binary or text",
@@ -72,14 +73,14 @@ const MAGIC: &[u8] = b"Kaydara FBX Binary";
 /// The deepest nesting of nodes.
 const DEPTH: u32 = 1024;
 
-/// Half the distance on either side of a key at which a curve is asked whether it jumps there, seconds.
+/// The distance in seconds on either side of a key at which a curve is evaluated, to find jumps.
 const BESIDE: f64 = 1e-10;
 
-/// How often a curve of any input is evaluated at most, and how often more for each byte of it: a layer
-/// counts for an eighth.
+/// How often curves are evaluated: the number for every input, and the number for each byte of it. A layer counts as
+/// an eighth.
 const EVALUATIONS: (i64, i64) = (1 << 23, 256);
 
-/// Bytes of a track beside its keys, of a key time while it is looked at, and of a key.
+/// Bytes of memory of a track without its keys, of a key time while it is evaluated, and of a key.
 const TRACK: usize = 600;
 const STOP: usize = 10 * size_of::<Transform>();
 const KEY: usize = 4 * (size_of::<(f64, ChannelValue, [ChannelValue; 2])>());
@@ -91,10 +92,11 @@ fn is_fbx(start: &[u8]) -> bool {
     start.starts_with(MAGIC) || text.starts_with(b"; FBX ") || has(b"FBXHeaderExtension:")
 }
 
-/// Reads a file; `-` is standard input.
+/// Reads an FBX file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file; those of single stacks are in [`Loaded::refused`].
+/// When the file cannot be opened or is invalid; the first error is returned. Errors of single stacks are in
+/// [`Loaded::refused`].
 pub fn open_fbx(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
@@ -102,8 +104,8 @@ pub fn open_fbx(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
     read_fbx(&name, &bytes, options)
 }
 
-/// Reads the bytes of a file; `name` is what messages call it. Units and axes are those of the file, which
-/// [`Loaded::space`] has.
+/// Reads the bytes of an FBX file; `name` is the input's name in messages. Units and axes are those of the file;
+/// [`Loaded::space`] contains them.
 ///
 /// # Errors
 /// As [`open_fbx`].
@@ -202,7 +204,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
     })
 }
 
-/// The unit of lengths and the axis that is up, where the file says them.
+/// The unit of length and the up axis, if the file contains them.
 fn space(scene: &SceneRoot) -> Option<Space> {
     let up = match scene.settings.axes.up {
         CoordinateAxis::PositiveX => DVec3::X,
@@ -218,7 +220,7 @@ fn space(scene: &SceneRoot) -> Option<Space> {
     (metres.is_finite() && metres > 0.0).then_some(Space { up, metres })
 }
 
-/// What the file holds that no clip holds.
+/// Warns of contents of the file that no clip can store.
 fn warn_of_scene(scene: &SceneRoot, warnings: &mut Warnings) {
     let count = |count: usize, one: &str| match count {
         0 => None,
@@ -304,11 +306,11 @@ struct FbxReader<'a> {
     nodes: FbxNodes,
     rate: Option<FrameRate>,
     options: &'a ReadOptions,
-    /// How many are left.
+    /// How many evaluations are left.
     evaluations: AtomicI64,
 }
 
-/// The channels of a node as keys, where it rests, and whether all keys follow their curves.
+/// The keys of the channels of a node, its rest transform, and whether all keys follow their curves.
 struct NodeKeys {
     rest: Transform,
     translation: FollowedKeys,
@@ -333,7 +335,7 @@ enum FollowFault {
     Work,
 }
 
-/// Which of a node's channels an evaluation gives: `ufbx`'s `TransformFlags`, whose bits it does not let out.
+/// The channels that an evaluation computes: bits of `ufbx`'s `TransformFlags`, which the crate does not publish.
 const EXPLICIT: u32 = 0x4;
 const TRANSLATION: u32 = 0x10;
 const ROTATION: u32 = 0x20;
@@ -452,7 +454,8 @@ impl FbxReader<'_> {
         }
     }
 
-    /// A time of the file on the frame that it was rounded from: ticks hold no frames of 29.97.
+    /// A time of the file, moved to the frame from which it was rounded: ticks do not represent frames of 29.97
+    /// exactly.
     fn clip_time(&self, time: f64) -> f64 {
         let tick = 1.1 / self.scene.metadata.ktime_second.max(1) as f64;
         let frame = self.rate.map(|rate| frame_time(rate, 0.0, time));
@@ -503,7 +506,7 @@ impl FbxReader<'_> {
         })
     }
 
-    /// The keys of some channels of a node that have keys at the same times.
+    /// The keys of channels of a node that have the same key times.
     fn follow(
         &self,
         evaluator: &Evaluator<'_>,
@@ -587,7 +590,7 @@ impl FbxReader<'_> {
         Ok(found)
     }
 
-    /// Adds a node's track to a clip; gives where it rests.
+    /// Adds the track of a node to a clip; returns its rest transform.
     fn push(
         &self,
         clip: &mut Motion,
@@ -661,20 +664,20 @@ impl FbxReader<'_> {
     }
 }
 
-/// What gives the transforms of a node.
+/// Evaluates the transforms of a node.
 struct Evaluator<'a> {
     reader: &'a FbxReader<'a>,
     stack: usize,
     node: &'a Node,
     direct: Option<DirectEvaluator<'a>>,
-    /// What an evaluation counts.
+    /// The cost of an evaluation.
     cost: i64,
-    /// Evaluations that the reader has granted already.
+    /// Evaluations that the reader has granted and that are not used yet.
     left: Cell<i64>,
     fault: Cell<Option<FollowFault>>,
 }
 
-/// How many evaluations are granted at once: the count is shared by all threads.
+/// How many evaluations are granted at once, because all threads share the count.
 const GRANTED: i64 = 1024;
 
 impl<'a> Evaluator<'a> {
@@ -701,13 +704,13 @@ impl<'a> Evaluator<'a> {
         evaluator
     }
 
-    /// What `ufbx` gives.
+    /// The transform that `ufbx` computes.
     fn exact(&self, time: f64, flags: u32) -> Transform {
         let anim = &self.reader.scene.anim_stacks[self.stack].anim;
         ufbx::evaluate_transform_flags(anim, self.node, time, EXPLICIT | flags)
     }
 
-    /// Nothing where the work is too much or a number is not finite, which the [refusal](Self::refusal) tells.
+    /// `None` if the work is too much or a number is not finite; the [refusal](Self::refusal) contains the reason.
     fn at(&self, time: f64, flags: u32) -> Option<Transform> {
         if self.left.get() == 0 {
             let granted = GRANTED * self.cost;
@@ -736,7 +739,7 @@ impl<'a> Evaluator<'a> {
         is_finite.then_some(found)
     }
 
-    /// Whether the channels of these flags never change.
+    /// Whether the channels of these flags are constant.
     fn is_still(&self, flags: u32) -> bool {
         let direct = self.direct.as_ref();
         direct.is_some_and(|direct| direct.is_still(flags))
@@ -762,14 +765,14 @@ impl<'a> Evaluator<'a> {
 }
 
 impl Drop for Evaluator<'_> {
-    /// Gives back what was granted and not used.
+    /// Returns the granted evaluations that were not used.
     fn drop(&mut self) {
         let left = self.left.get() * self.cost;
         self.reader.evaluations.fetch_add(left, Ordering::Relaxed);
     }
 }
 
-/// A stop of one channel, with one sign on all sides; sides that differ by rounding alone do not.
+/// The stop of one channel. All sides have continued signs; sides that differ only by rounding become equal.
 fn stop(
     file: f64,
     clip: f64,
@@ -805,7 +808,7 @@ struct VectorKeys {
     tangents: Vec<[Vec3; 2]>,
 }
 
-/// With the sampler; none for a channel that is where its node rests.
+/// The keys and their interpolation; `None` for a channel that is constant at its rest value.
 fn vectors(
     keys: FollowedKeys,
     rest: ChannelValue,

@@ -1,4 +1,4 @@
-//! When the curves of each node have keys: plain numbers, which threads may share.
+//! The key times of the curves of each node, as plain numbers that threads can share.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,23 +11,24 @@ use crate::budget::{Budget, OverBudget};
 /// Times closer than this are one, seconds: FBX counts in ticks of 2.2e-11 s.
 pub(super) const SAME: f64 = 1e-9;
 
-/// Keys that an extrapolated curve may repeat, beside those that it has.
+/// How many keys an extrapolated curve may repeat, in addition to its keys.
 const REPEATED: f64 = 1e6;
 
-/// An angle that turns further than this between two keys, degrees, is looked at in so many parts in between.
+/// If an angle changes by more degrees than this between two keys, the curve is also evaluated between them, in up to
+/// [`MAX_PARTS`] parts.
 const LARGEST_STEP: f64 = 120.0;
 const MAX_PARTS: f64 = 4096.0;
 
-/// When one of a node's channels has keys.
+/// The key times of one channel of a node.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct ChannelTimes {
-    /// Seconds, as the file has them, in any order.
+    /// Seconds in the file, in any order.
     list: Vec<f64>,
-    /// Whether a curve may jump at one of them.
+    /// Whether a curve may jump at one of these times.
     pub(super) jump: bool,
 }
 
-/// The channels of a node.
+/// The key times of all channels of a node.
 #[derive(Debug, Clone, Default)]
 pub(super) struct NodeTimes {
     pub(super) translation: ChannelTimes,
@@ -36,20 +37,20 @@ pub(super) struct NodeTimes {
 }
 
 impl NodeTimes {
-    /// Whether no curve moves it.
+    /// Whether the node has no curve.
     pub(super) fn is_empty(&self) -> bool {
         let channels = [&self.translation, &self.rotation, &self.scale];
         channels.iter().all(|times| times.list.is_empty())
     }
 }
 
-/// Which of the first layer's properties move a node.
+/// The properties of the first layer that determine a node's transform.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Properties {
     pub(super) translation: Option<usize>,
     pub(super) rotation: Option<usize>,
     pub(super) scale: Option<usize>,
-    /// Nothing else moves it: no other property, and no other layer.
+    /// Whether no other property and no other layer changes it.
     pub(super) are_plain: bool,
 }
 
@@ -58,18 +59,18 @@ pub(super) struct Properties {
 pub(super) struct Takes {
     /// The first and the last time of the clip.
     pub(super) span: [f64; 2],
-    /// By the index of the node.
+    /// By index of the node.
     pub(super) nodes: HashMap<usize, NodeTimes>,
     pub(super) properties: HashMap<usize, Properties>,
-    /// Keys that lie outside the span.
+    /// Number of keys outside the span.
     pub(super) outside: usize,
-    /// Names of properties with curves that are no transforms.
+    /// Names of properties with curves that are not transforms.
     pub(super) others: Vec<String>,
-    /// The layers, of which each is evaluated for each value.
+    /// Number of layers, each of which is evaluated for each value.
     pub(super) layers: usize,
 }
 
-/// What of a node a property decides.
+/// The part of a node's transform that a property determines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum TransformPart {
     Translation,
@@ -91,7 +92,7 @@ fn part_of(property: &str) -> Option<TransformPart> {
 
 impl Takes {
     /// # Errors
-    /// When extrapolated curves have more keys than the file has a right to.
+    /// When extrapolated curves have more keys than the budget allows.
     pub(super) fn of(
         scene: &Scene,
         stack: &AnimStack,
@@ -152,7 +153,7 @@ impl Takes {
         Ok(takes)
     }
 
-    /// When the weight of a layer has keys.
+    /// The key times of a layer's weight.
     fn weight(&mut self, layer: &AnimLayer, budget: &Budget) -> Result<ChannelTimes, OverBudget> {
         let mut times = ChannelTimes::default();
         let weights = layer.anim_props.iter().filter(|property| {
@@ -167,7 +168,7 @@ impl Takes {
         Ok(times)
     }
 
-    /// What moves a node by way of its pivots, and of scales that nodes above it have.
+    /// Adds the times of a node's pivots and of the scales of its ancestors, which also determine its transform.
     fn carry(&mut self, node: &Node, budget: &Budget) -> Result<(), OverBudget> {
         let index = node.element.typed_id as usize;
         let pivot = |name| {
@@ -218,7 +219,7 @@ impl Takes {
     }
 }
 
-/// The first and the last time of a stack: those that it says or, where it says none, of its keys.
+/// The first and the last time of a stack, or of its keys if the stack does not contain them.
 fn span(stack: &AnimStack) -> [f64; 2] {
     let (begin, end) = (stack.time_begin, stack.time_end);
     if begin.is_finite() && end.is_finite() && begin < end {
@@ -238,8 +239,7 @@ fn span(stack: &AnimStack) -> [f64; 2] {
 }
 
 impl ChannelTimes {
-    /// Adds the times of a curve, as often as it is repeated within a span. Gives how many of its keys lie
-    /// outside.
+    /// Adds the times of a curve, repeated as often as it is within a span. Returns how many of its keys lie outside.
     fn add(
         &mut self,
         curve: &AnimCurve,
@@ -346,7 +346,7 @@ impl ChannelTimes {
         Ok(())
     }
 
-    /// The times within a span, in order, each once, and its ends; the first alone where there are no keys.
+    /// The times within a span in increasing order, each once, and its ends; only the first if there are no keys.
     pub(super) fn within(&self, [begin, end]: [f64; 2]) -> Vec<f64> {
         let is_inside = |time: &f64| *time > begin + SAME && *time < end - SAME;
         let mut list = vec![begin];

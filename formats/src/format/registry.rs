@@ -1,5 +1,4 @@
-//! What is asked of the table of file formats, [`FORMATS`]: which format has a name, and which of them a file
-//! is in.
+//! Searches the table of formats, [`FORMATS`]: for the format with a name, and for the format of a file.
 
 use std::path::Path;
 
@@ -9,7 +8,7 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::{START, Source};
 
 impl Format {
-    /// The format with that name, in any case.
+    /// The format with this name or extension; case is ignored.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         let has_name = |format: &&Self| {
@@ -21,13 +20,13 @@ impl Format {
         FORMATS.iter().copied().find(has_name)
     }
 
-    /// The format that the extension of a file tells.
+    /// The format with the extension of this path.
     #[must_use]
     pub fn of(path: &Path) -> Option<&'static Self> {
         Self::named(path.extension()?.to_str()?)
     }
 
-    /// The formats that results are written in, those that hold them as they come first.
+    /// The formats that can be written: first those that store results in parts, then those that store clips only.
     pub fn writable() -> impl Iterator<Item = &'static Self> {
         let as_they_come = FORMATS
             .iter()
@@ -37,7 +36,7 @@ impl Format {
         as_they_come.chain(FORMATS.iter().copied().filter(whole))
     }
 
-    /// The names of the formats that take an option, for messages.
+    /// The names of the formats that support an option, for messages.
     #[must_use]
     pub fn names_taking(option: FormatOption) -> String {
         let all = FORMATS.iter().filter(|format| format.takes(option));
@@ -45,8 +44,9 @@ impl Format {
         names.join(", ")
     }
 
-    /// The format of a file that begins with these bytes; by its name where they tell nothing, by how
-    /// many numbers its lines have where that tells nothing either, and else the first of the table.
+    /// The format of a file that begins with the bytes `start`. It is recognised by these bytes, otherwise by the
+    /// extension of `path`, otherwise by the number of numbers in its first line; otherwise it is the first of
+    /// [`FORMATS`].
     #[must_use]
     pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
         let probed = FORMATS.iter().copied().find(|format| (format.probe)(start));
@@ -62,19 +62,19 @@ impl Format {
             .unwrap_or(FORMATS[0])
     }
 
-    /// Reads a file in the format that it is in: see [`Format::detect`].
+    /// Reads a file in the format that [`Format::detect`] finds.
     ///
     /// # Errors
-    /// The first fault that refuses the file.
+    /// When the file cannot be opened or is invalid; the first error is returned.
     pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
         Self::detected(path).open(path, options)
     }
 
-    /// Reads the bytes of a file in the format that they are in: see [`Format::detect`]. Files that it names
-    /// beside itself are not read.
+    /// Reads the bytes of a file in the format that [`Format::detect`] finds; `name` is the input's name in messages.
+    /// Other files that it names are not read.
     ///
     /// # Errors
-    /// The first fault that refuses the file.
+    /// When the bytes are invalid; the first error is returned.
     pub fn read_detected(
         name: &str,
         bytes: Vec<u8>,
@@ -84,16 +84,16 @@ impl Format {
         (Self::detect(Path::new(name), start).read_bytes)(name, bytes, options)
     }
 
-    /// The format that a file is in: see [`Format::detect`]. Nothing is known of one that cannot be
-    /// read; that is reported when it is opened.
+    /// The format of a file, as [`Format::detect`] finds it. For a file that cannot be read, only its name is used;
+    /// opening it reports the error.
     #[must_use]
     pub fn detected(path: &Path) -> &'static Self {
         Self::detect(path, &Source::start(path))
     }
 }
 
-/// How many numbers the first line of text has that is no comment; nothing if it has anything else, or
-/// if the first line is the header of a `.dat` file.
+/// How many numbers the first line of text has that is not a comment; `None` if it has anything else, or if the first
+/// line is the header of a `.dat` file.
 fn table_width(start: &[u8]) -> Option<usize> {
     let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
     // The last line may be cut.

@@ -1,5 +1,4 @@
-//! Clips are written with the signs of their rotations continued, and with a warning of what the format
-//! has no room for.
+//! Writes clips with continued signs of rotations, and warns of data that the format cannot store.
 
 use std::io::{self, Write};
 
@@ -12,16 +11,16 @@ use crate::motion::{ChannelInterpolation, SampledClip};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::signs::{continue_signs, signs_jump};
 
-/// Scales this close to 1 are 1: what rounding leaves of them.
+/// Scales this close to 1 count as 1, because of rounding.
 const UNSCALED: f32 = 1e-5;
 
 impl Format {
-    /// Writes sampled clips, each rotation with the sign that continues the one before it. Gives
-    /// warnings of what is left out, because the format has no room for it, or becomes another thing.
+    /// Writes sampled clips with continued signs: each rotation is negated if that makes it nearer to the one before.
+    /// Returns warnings about data that the format cannot store or that is changed.
     ///
     /// # Errors
-    /// When writing fails, or the format cannot hold the clips; results alone ([`Format::writes_clips`])
-    /// are written by [`WriteResults`](crate::format::WriteResults).
+    /// When writing fails, or when the format cannot store these clips. A format that stores results only
+    /// ([`Format::writes_clips`]) is written by [`WriteResults`](crate::format::WriteResults).
     pub fn write_clips(
         &self,
         clips: &[SampledClip<'_>],
@@ -61,7 +60,7 @@ impl Format {
     }
 }
 
-/// Says what of some clips a format has no room for, and which names it changes.
+/// Warnings about the features of some clips that a format cannot store, and about names that it changes.
 fn warnings(
     format: &Format,
     clips: &[SampledClip<'_>],
@@ -105,8 +104,8 @@ fn no_room(
     Some(Diagnostic::new(&options.name, Code::NoRoom, message))
 }
 
-/// What is lost of a feature where the format has no room for it; nothing if the clip does not have it, or
-/// if its absence is refused or warned of elsewhere.
+/// The loss if a format cannot store a feature; `None` if the clip does not have the feature, or if another error or
+/// warning reports its loss.
 fn loss(
     feature: Feature,
     sampled: &SampledClip<'_>,
@@ -161,9 +160,10 @@ fn loss(
     has_it.then_some(loss)
 }
 
-/// Says what a file holds that none of its clips holds, and that a file made of clips therefore lacks: meshes,
-/// cameras, channels of weights. `warnings` were given when it was read: arrays that they name are not named
-/// again. `why` says what makes a new file where the format is the input's ("some tracks make").
+/// A message about the contents of a file that none of its clips contains, and that a new file made of these clips
+/// therefore lacks: meshes, cameras, channels of weights. `None` if there are none, or if `warnings`, those of
+/// reading the file, already name them. `format` is the output's format. If this is the format of the input, `why` is
+/// the reason for a new file, as the beginning of the message ("some tracks make").
 #[must_use]
 pub fn left_behind(
     document: &dyn Document,

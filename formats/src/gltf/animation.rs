@@ -1,4 +1,4 @@
-//! One animation as a clip.
+//! Converts one animation to a clip.
 
 use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -15,38 +15,38 @@ use crate::motion::grid::restore;
 use crate::motion::{self, Channels, Joint, Motion};
 use crate::rate::Precision;
 
-/// What writing has to know of an animation that was read.
+/// Data of an animation that was read, for writing it again.
 #[derive(Debug)]
 pub(super) struct ReadAnimation {
-    /// First and last key time: as the file has them, and as the clip has them.
+    /// First and last key time, in the file and in the clip.
     pub(super) stored_span: [f32; 2],
     pub(super) span: [f64; 2],
-    /// The channels of more than one key that are not STEP.
+    /// The channels that have more than one key and are not STEP.
     pub(super) sampled: Vec<SampledChannel>,
-    /// The other channels that move tracks: they change only where the clip is cut.
+    /// The other channels that move tracks. They change only if the clip is cut.
     pub(super) others: Vec<SampledChannel>,
-    /// Channels that move other things, such as weights.
+    /// Number of channels that move anything else, such as weights.
     pub(super) beside: usize,
 }
 
 /// A channel that gets other keys when the file is written again.
 #[derive(Debug)]
 pub(super) struct SampledChannel {
-    /// Its index among the animation's channels, and its sampler's.
+    /// Its index among the channels of the animation, and that of its sampler.
     pub(super) channel: usize,
     pub(super) sampler: usize,
-    /// What of which track it moves.
+    /// The track and the property that it moves.
     pub(super) track: usize,
     pub(super) path: TargetPath,
 }
 
-/// Bytes of a track beside its keys: its name, its joint, its channels, and its entries in the lists.
+/// Bytes of memory of a track without its keys: its name, its joint, its channels, and its entries in lists.
 const TRACK: usize = 400;
 
-/// Reads the animation of that index; nothing if it moves no node.
+/// Reads the animation with this index; `None` if it moves no node.
 ///
 /// # Errors
-/// The first fault that refuses the animation.
+/// When the animation is invalid; the first error is returned.
 pub(super) fn read(
     index: usize,
     reader: &GltfReader<'_>,
@@ -213,7 +213,7 @@ fn moved(
     Ok(all)
 }
 
-/// The node that a channel moves, and what of it; `None` if it moves something else.
+/// The node and the property that a channel moves; `None` if it moves anything else.
 fn target(
     reader: &GltfReader<'_>,
     channel: &Channel,
@@ -233,11 +233,11 @@ fn target(
     moved
 }
 
-/// The times of channels, by the accessor that they are in.
+/// The times of channels, by the index of their accessor.
 type TimesOf = BTreeMap<usize, InputTimes>;
 
-/// The times of all channels, on the frames of one rate where they are; the first and the last of
-/// them as the file has them; and the rate.
+/// The times of all channels, moved to the frames of one rate if they fit it; the first and the last time in the
+/// file; and the rate.
 fn times(
     reader: &GltfReader<'_>,
     moved: &[MovedChannel],
@@ -262,10 +262,9 @@ fn times(
     Ok((times, [first as f32, last as f32], rate))
 }
 
-/// The nodes that are tracks: those that are moved, those that carry them, and the other joints of
-/// their skins.
+/// The nodes that are tracks: those that are moved, their ancestors, and the other joints of their skins.
 struct Tracks {
-    /// In their order in the file.
+    /// In the order of the file.
     nodes: Vec<usize>,
 }
 
@@ -278,13 +277,13 @@ impl Tracks {
         }
     }
 
-    /// The track of a node that is one.
+    /// The track of a node.
     fn of_node(&self, node: usize) -> usize {
         self.nodes.partition_point(|&listed| listed < node)
     }
 }
 
-/// Where a node rests; notes where that is more than a transform can say.
+/// The rest transform of a node; records in `motion` if the node's matrix is not a transform.
 fn rest(
     node: usize,
     reader: &GltfReader<'_>,

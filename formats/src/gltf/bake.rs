@@ -1,4 +1,4 @@
-//! The keys of one animation, replaced in its file by samples or by the keys of a cut clip.
+//! Replaces the keys of one animation in its file by samples, or by the keys of a clip that was cut.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -17,13 +17,13 @@ use crate::gltf::write_new::{FLOAT, SHORT};
 use crate::gltf::written_keys::WrittenKeys;
 use crate::motion::{self, SampledClip};
 
-/// Numbers as a file has them.
+/// The bytes of numbers in a file.
 fn bytes_of(numbers: &[f32]) -> Vec<u8> {
     let each = numbers.iter().flat_map(|number| number.to_le_bytes());
     each.collect()
 }
 
-/// Rotations in f32 as those of 16 bits a component.
+/// Converts f32 rotations to 16 bits for each component.
 fn shorts_of(bytes: &[u8]) -> Vec<u8> {
     let numbers = bytes.as_chunks::<4>().0.iter();
     let numbers: Vec<f32> = numbers.map(|&bytes| f32::from_le_bytes(bytes)).collect();
@@ -36,7 +36,7 @@ fn shorts_of(bytes: &[u8]) -> Vec<u8> {
     each.flat_map(i16::to_le_bytes).collect()
 }
 
-/// One animation on its way into the file.
+/// One animation that is being written to the file.
 pub(super) struct AnimationBaker<'a> {
     json: &'a Json<'a>,
     pointer: String,
@@ -48,11 +48,11 @@ pub(super) struct AnimationBaker<'a> {
     kept: HashSet<usize>,
     samplers: Vec<&'a RawValue>,
     samplers_array: &'a RawValue,
-    /// The clip was cut: all its channels get other keys.
+    /// Whether the clip was cut, so that all its channels get other keys.
     is_cut: bool,
-    /// Rotations have 16 bits a component.
+    /// Whether rotations have 16 bits for each component.
     quantize: bool,
-    /// The buffer view that the bytes will be.
+    /// The buffer view of the new bytes.
     view: usize,
     pub(super) bytes: Vec<u8>,
 }
@@ -65,7 +65,7 @@ struct BakedSampler {
     values: Range<usize>,
 }
 
-/// Whether the keys that are written are those of a part of the animation.
+/// Whether only a part of the animation is written.
 pub(super) fn is_cut(read: &ReadAnimation, sampled: &SampledClip<'_>) -> bool {
     let span = sampled.clip.set.time_span();
     sampled.is_at_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
@@ -213,7 +213,7 @@ impl<'a> AnimationBaker<'a> {
         Ok(())
     }
 
-    /// The accessor of times, one for equal ones.
+    /// The accessor of times; equal lists of times share one.
     fn input(
         &mut self,
         seconds: &[f64],
@@ -235,7 +235,7 @@ impl<'a> AnimationBaker<'a> {
         Ok(input)
     }
 
-    /// Times in f32, those of the first key that the file has and of the last as the file has them.
+    /// Times in f32. The first and the last key of the file keep the times that the file has.
     fn times(&self, seconds: &[f64]) -> Result<Vec<f32>, Diagnostic> {
         let mut times: Vec<f32> = seconds.iter().map(|&time| time as f32).collect();
         for (time, &second) in times.iter_mut().zip(seconds) {
@@ -255,7 +255,7 @@ impl<'a> AnimationBaker<'a> {
         }
     }
 
-    /// The samples of a channel, as the file holds them.
+    /// The samples of a channel, as the file stores them.
     fn values(&self, channel: &SampledChannel) -> Vec<u8> {
         let tracks = self.sampled.clip.set.track_count();
         let all = |list: &[f32]| -> Vec<u8> {
@@ -272,7 +272,7 @@ impl<'a> AnimationBaker<'a> {
         }
     }
 
-    /// Whether a sampler's interpolation can be changed in the JSON: linear need not be named.
+    /// Whether a sampler's interpolation can be changed in the JSON; linear is the default.
     fn takes(&self, sampler: usize, interpolation: &str) -> Result<bool, Diagnostic> {
         let raw = self.samplers[sampler];
         let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
@@ -292,7 +292,7 @@ impl<'a> AnimationBaker<'a> {
         )
     }
 
-    /// Gives a sampler other keys; returns its index.
+    /// Replaces the keys of a sampler; returns its index.
     fn change_sampler(
         &self,
         sampler: usize,

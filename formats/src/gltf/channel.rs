@@ -1,4 +1,4 @@
-//! The keys of one channel: times, values and tangents.
+//! Reads the keys of one channel: times, values and tangents.
 
 use glam::{DQuat, DVec4, Quat, Vec3};
 use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
@@ -21,7 +21,7 @@ pub(super) struct MovedChannel {
     pub(super) sampler_index: usize,
     pub(super) sampler: Sampler,
     pub(super) interpolation: motion::ChannelInterpolation,
-    /// Pointers to what the sampler names.
+    /// JSON pointers to the accessors of the sampler.
     input: String,
     pub(super) output: String,
     times: Accessor,
@@ -43,22 +43,23 @@ impl InputTimes {
 
 /// The keys of one channel.
 pub(super) struct ChannelKeys {
-    /// Seconds, strictly increasing; none for a channel that rests.
+    /// Times in seconds, strictly increasing; empty for a channel at rest.
     pub(super) times: Vec<f64>,
     values: ChannelValues,
 }
 
-/// With the tangents with which the curve arrives and leaves, if it has any.
+/// The values, with the tangents at which the curve arrives and leaves, if there are any.
 enum ChannelValues {
     Rotations(Vec<Quat>, Vec<[Quat; 2]>),
     Vectors(Vec<Vec3>, Vec<[Vec3; 2]>),
 }
 
 impl MovedChannel {
-    /// A channel, its node and target path; its sampler and the index of that; the pointer to the sampler.
+    /// `(channel, node, path)` is the index of the channel, its node and its target path; `pointer` is the JSON
+    /// pointer to its sampler.
     ///
     /// # Errors
-    /// When the interpolation is not known, or there are not as many values as times say.
+    /// When the interpolation is unknown, or when the number of values does not fit the times.
     pub(super) fn new(
         reader: &GltfReader<'_>,
         (channel, node, path): (usize, usize, TargetPath),
@@ -116,10 +117,10 @@ impl MovedChannel {
         size_of::<f64>() + values * size_of::<Quat>()
     }
 
-    /// The times as the file has them.
+    /// The times in the file.
     ///
     /// # Errors
-    /// When they are no floats, or missing.
+    /// When they are not floats, or missing.
     pub(super) fn stored_times(&self, reader: &GltfReader<'_>) -> Result<Vec<f64>, Diagnostic> {
         let count = usize::try_from(self.times.count).unwrap_or(usize::MAX);
         reader.take(count, 2 * size_of::<f64>(), &self.input)?;
@@ -133,10 +134,10 @@ impl MovedChannel {
         Ok(times)
     }
 
-    /// The keys, at times that increase.
+    /// The keys, at increasing times.
     ///
     /// # Errors
-    /// When values are missing or broken, or times do not increase.
+    /// When values are missing or invalid, or when times do not increase.
     pub(super) fn keys(
         &self,
         reader: &GltfReader<'_>,
@@ -236,11 +237,11 @@ impl MovedChannel {
     }
 }
 
-/// A dot product this close to 0 is a half turn within f32 rounding.
+/// Two rotations whose dot product is within this of 0 differ by 180°, up to the rounding of f32.
 const HALF_TURN_PRODUCT: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// Where neighbours are half a turn apart, sets keep the signs that keys have: they get those whose
-/// inner product is not negative, by which glTF says which way round is the shorter.
+/// Between neighbouring keys that differ by 180°, sets keep the signs of the keys. This makes their inner product
+/// positive or 0, by which glTF defines the shorter arc.
 fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, location: &dyn Fn(usize) -> Location) {
     for key in 1..keys.len() {
         let product = dot(keys[key - 1].as_dquat(), keys[key].as_dquat());
@@ -258,7 +259,7 @@ fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, location: &dyn Fn(usiz
 }
 
 impl ChannelKeys {
-    /// Appends a track of these rotations.
+    /// Adds a track of these rotations.
     ///
     /// # Errors
     /// When a number is not finite.
@@ -274,7 +275,7 @@ impl ChannelKeys {
         }
     }
 
-    /// Gives the last track these translations or scales.
+    /// Adds these translations or scales to the last track.
     ///
     /// # Errors
     /// When a number is not finite.

@@ -1,9 +1,12 @@
-//! Buffer views that meshopt compressed, decoded.
+//! Decodes buffer views that meshopt compressed.
 
 use crate::gltf::meshopt::{Filter, decode_attributes};
 use crate::gltf::schema::MeshoptView;
 
-/// The elements of a compressed view, at most so many bytes, or why there are none.
+/// The elements of a compressed view, up to `limit` bytes.
+///
+/// # Errors
+/// Why they cannot be decoded, as text.
 pub(super) fn decode(bytes: &[u8], view: &MeshoptView, limit: u64) -> Result<Vec<u8>, String> {
     let filter = Filter::named(&view.mode, view.filter.as_deref());
     let filter = filter.map_err(|error| error.to_string())?;

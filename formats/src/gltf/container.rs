@@ -1,4 +1,4 @@
-//! The outside of a file: JSON alone (`.gltf`), or JSON, a BIN chunk and perhaps others (GLB).
+//! The container of a file: JSON alone (`.gltf`), or JSON, a BIN chunk and perhaps others (GLB).
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -27,15 +27,15 @@ pub(super) struct Container {
 #[derive(Debug)]
 struct Chunks {
     bytes: Vec<u8>,
-    /// Type and byte range of the data, in the order of the file.
+    /// Type and byte range of each chunk, in the order of the file.
     list: Vec<(u32, Range<usize>)>,
 }
 
 impl Container {
-    /// Takes a file apart; `name` is what messages call it.
+    /// Splits a file into its chunks; `name` is the file's name in messages.
     ///
     /// # Errors
-    /// When a GLB is not whole, or the JSON is not UTF-8.
+    /// When a GLB is not complete, or when the JSON is not UTF-8.
     pub(super) fn parse(
         name: &str,
         bytes: Vec<u8>,
@@ -70,7 +70,7 @@ impl Container {
         Ok(Self { text, glb })
     }
 
-    /// Bytes of the file.
+    /// Number of bytes of the file.
     pub(super) fn length(&self) -> usize {
         self.glb
             .as_ref()
@@ -88,10 +88,10 @@ impl Container {
         Some(&glb.bytes[range.clone()])
     }
 
-    /// Writes a GLB with this JSON and these parts of a BIN chunk, and the other chunks of the file.
+    /// Writes a GLB with this JSON, these parts of a BIN chunk, and the other chunks of the file.
     ///
     /// # Errors
-    /// When writing fails, or (`FileTooLarge`) a GLB cannot be so long.
+    /// When writing fails, or (`FileTooLarge`) when the GLB would be too long.
     pub(super) fn write_glb(
         &self,
         text: &str,
@@ -137,7 +137,7 @@ impl Container {
     }
 }
 
-/// What makes a length a multiple of four.
+/// The bytes that make a length a multiple of four.
 pub(super) fn padding(length: usize, with: &[u8; 3]) -> &[u8] {
     &with[..length.wrapping_neg() % 4]
 }
@@ -203,7 +203,7 @@ fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, ContainerFault> {
 }
 
 /// # Errors
-/// When a GLB cannot be so long.
+/// When a GLB would be too long.
 pub(super) fn check_length(json: &Json<'_>, length: u64) -> Result<(), Diagnostic> {
     if length <= u64::from(u32::MAX) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Where the bytes go that a file gets.
+//! Adds bytes to the buffers of a file.
 
 use serde_json::value::RawValue;
 
@@ -10,7 +10,7 @@ use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::Buffer;
 use crate::gltf::uri;
 
-/// The bytes that a file gets, and the buffer that they are in.
+/// The new bytes of a file, and their buffer.
 pub(super) struct BufferData<'a> {
     home: BufferHome<'a>,
     buffer: usize,
@@ -18,23 +18,23 @@ pub(super) struct BufferData<'a> {
 }
 
 enum BufferHome<'a> {
-    /// Behind what the BIN chunk has; the length that its buffer says, if it has one.
+    /// After the bytes of the BIN chunk; with the length of its buffer in the JSON, if it has one.
     Bin(&'a [u8], Option<&'a RawValue>),
-    /// Behind the buffers that are gathered into a BIN chunk.
+    /// After the buffers that are gathered in a BIN chunk.
     Gathered(GatheredBuffers),
-    /// A buffer of its own, as a data URI.
+    /// In a separate buffer, as a data URI.
     Uri,
 }
 
-/// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
+/// The buffers of a GLB: the BIN chunk, and those that could not be gathered in it.
 pub(super) struct GatheredBuffers {
-    /// What the first gathered buffer says of itself beside its length and URI.
+    /// The properties of the first gathered buffer, except its length and its URI.
     pub(super) members: String,
     pub(super) kept: Vec<String>,
 }
 
 impl GatheredBuffers {
-    /// The list of buffers, for a BIN chunk of so many bytes.
+    /// The list of buffers, with a BIN chunk of `length` bytes.
     fn buffers(&self, length: u64) -> String {
         let bin = format!("{{\"byteLength\":{length}{}}}", self.members);
         let all = std::iter::once(&bin).chain(&self.kept);
@@ -44,10 +44,10 @@ impl GatheredBuffers {
 }
 
 impl<'a> BufferData<'a> {
-    /// Behind the BIN chunk of a GLB, or in a buffer of their own where that cannot be.
+    /// For bytes after the BIN chunk of a GLB, or in a separate buffer if that is not possible.
     ///
     /// # Errors
-    /// When the first buffer is broken.
+    /// When the first buffer is invalid.
     pub(super) fn of_file(
         json: &'a Json<'a>,
         reader: &GltfReader<'a>,
@@ -71,7 +71,7 @@ impl<'a> BufferData<'a> {
         })
     }
 
-    /// In a buffer of their own.
+    /// For bytes in a separate buffer.
     pub(super) fn in_uri(json: &Json<'_>) -> Self {
         Self {
             home: BufferHome::Uri,
@@ -80,7 +80,7 @@ impl<'a> BufferData<'a> {
         }
     }
 
-    /// Behind gathered buffers.
+    /// For bytes after gathered buffers.
     pub(super) fn gathered(gathered: GatheredBuffers, bytes: Vec<u8>) -> Self {
         Self {
             home: BufferHome::Gathered(gathered),
@@ -96,13 +96,13 @@ impl<'a> BufferData<'a> {
         }
     }
 
-    /// Where the new bytes begin in their buffer.
+    /// Offset of the new bytes in their buffer.
     fn base(&self) -> usize {
         let before = self.before().len();
         before + padding(before, &[0; 3]).len()
     }
 
-    /// The length of the buffer with so many more bytes.
+    /// The length of the buffer with `more` bytes.
     pub(super) fn length_with(&self, more: u64) -> u64 {
         (self.base() + self.bytes.len()) as u64 + more
     }
@@ -121,7 +121,7 @@ impl<'a> BufferData<'a> {
         edits.append_to("bufferViews", view)
     }
 
-    /// Writes the entry of the buffer; gives what the BIN chunk is made of, if the file has one.
+    /// Writes the entry of the buffer; returns the parts of the BIN chunk, if the file has one.
     pub(super) fn finish(&self, json: &Json<'_>, edits: &mut Edits<'_>) -> Option<Vec<&[u8]>> {
         let pad = |length: usize| padding(length, &[0; 3]);
         let length = self.length_with(0);

@@ -29,14 +29,14 @@ use crate::warnings::Warnings;
 /// A file that was read.
 #[derive(Debug)]
 pub(super) struct GltfDocument {
-    /// What messages call it.
+    /// The file's name in messages.
     pub(super) name: String,
     pub(super) container: Container,
-    /// Where the files are that it names.
+    /// The folder of the files that it names.
     pub(super) folder: Option<PathBuf>,
-    /// How much of them is read.
+    /// The largest sizes of these files that are read.
     pub(super) limits: Limits,
-    /// `None` for those that are kept as they are.
+    /// The animations; `None` for those that are written unchanged.
     pub(super) animations: Vec<Option<ReadAnimation>>,
 }
 
@@ -215,7 +215,7 @@ impl GltfDocument {
         Diagnostic::new(&self.name, code, message).inside(format!("/animations/{animation}"))
     }
 
-    /// URIs of files beside are right in the file's folder alone.
+    /// Checks that URIs of other files stay valid: they are relative to the folder of the file.
     fn check_folder(
         &self,
         reader: &GltfReader<'_>,
@@ -256,7 +256,7 @@ impl GltfDocument {
     }
 }
 
-/// The first buffer or image that is a file beside: its pointer and its URI.
+/// The first buffer or image in another file: its JSON pointer and its URI.
 fn named_file(json: &Json<'_>) -> Option<(String, String)> {
     ["buffers", "images"].iter().find_map(|list| {
         json.entries(list)

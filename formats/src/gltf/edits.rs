@@ -1,4 +1,4 @@
-//! Changes to the text of a file: everything else stays byte for byte.
+//! Edits the text of a file; everything else stays unchanged byte for byte.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -7,14 +7,14 @@ use serde_json::value::RawValue;
 
 use crate::gltf::json::Json;
 
-/// Changes to come, in any order.
+/// The changes to make, in any order.
 pub(super) struct Edits<'a> {
     json: &'a Json<'a>,
-    /// Byte ranges and their replacements; insertions at one offset in their order.
+    /// Byte ranges and their replacements. Insertions at the same offset are in their order.
     list: Vec<(Range<usize>, String)>,
-    /// How many entries arrays got, by the offsets of their ends.
+    /// Number of entries that were appended to arrays, by the offset of the array's end.
     appended: BTreeMap<usize, usize>,
-    /// Entries of arrays at the top that the file has not.
+    /// Entries of top-level arrays that the file does not have.
     missing: BTreeMap<&'static str, Vec<String>>,
 }
 
@@ -32,15 +32,14 @@ impl<'a> Edits<'a> {
         self.list.push((self.json.range(value), with.to_string()));
     }
 
-    /// Puts a member behind the others of an object, which has some.
+    /// Appends a member to an object that is not empty.
     pub(super) fn add(&mut self, object: &RawValue, name: &str, value: impl ToString) {
         let end = self.json.range(object).end - 1;
         let member = format!(",\"{name}\":{}", value.to_string());
         self.list.push((end..end, member));
     }
 
-    /// Replaces the member whose value this is by others; `before` is the value of the
-    /// member before it in `object`.
+    /// Replaces the member with this value by `with`; `before` is the value of the member before it in `object`.
     pub(super) fn replace_member(
         &mut self,
         object: &RawValue,
@@ -69,7 +68,7 @@ impl<'a> Edits<'a> {
         index
     }
 
-    /// Appends to an array at the top; returns the index of the new entry.
+    /// Appends to a top-level array; returns the index of the new entry.
     pub(super) fn append_to(&mut self, list: &'static str, entry: String) -> usize {
         if let Some(array) = self.json.array(list) {
             return self.append(array, self.json.entries(list).len(), &entry);
@@ -79,7 +78,7 @@ impl<'a> Edits<'a> {
         entries.len() - 1
     }
 
-    /// How many entries an array at the top has by now.
+    /// Number of entries of a top-level array, including the appended ones.
     pub(super) fn count(&self, list: &'static str) -> usize {
         let array = self
             .json

@@ -1,4 +1,4 @@
-//! A `.gltf` and its files as one: buffers are gathered into a BIN chunk, images embedded.
+//! Combines a `.gltf` and its files in one GLB: buffers are gathered in a BIN chunk, and images are embedded.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -15,10 +15,10 @@ use crate::gltf::schema::{Buffer, Texture};
 use crate::gltf::uri;
 use crate::gltf::whole::Whole;
 
-/// Gathers all buffers that can be; views of them are changed to where they are now.
+/// Gathers all buffers that can be read, and moves views to their new locations.
 ///
 /// # Errors
-/// When a buffer or a view is broken, or all are more than a GLB can hold.
+/// When a buffer or a view is invalid, or when a GLB cannot store all of them.
 pub(super) fn buffers<'a>(
     reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,
@@ -82,7 +82,7 @@ pub(super) fn buffers<'a>(
     ))
 }
 
-/// What was found; of a fault a warning that the URI is kept.
+/// The result; an error becomes a warning that the URI is kept.
 fn stays_outside<T>(reader: &GltfReader<'_>, found: Result<T, Diagnostic>) -> Option<T> {
     found
         .map_err(|fault| {
@@ -113,7 +113,7 @@ fn others(members: &JsonMembers<'_>) -> String {
     .collect()
 }
 
-/// Changes the buffer and the offset of a view, or of what a view is compressed as.
+/// Changes the buffer and the offset of a view, or of the compressed data of a view.
 fn move_view<'a>(
     reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,
@@ -144,10 +144,10 @@ fn move_view<'a>(
     Ok(())
 }
 
-/// Embeds the images that are files.
+/// Embeds the images that are in files.
 ///
 /// # Errors
-/// When an image's entry is broken, or all are more than a GLB can hold.
+/// When the entry of an image is invalid, or when a GLB cannot store all of them.
 pub(super) fn images<'a>(
     reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,

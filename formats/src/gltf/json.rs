@@ -1,5 +1,5 @@
-//! The JSON of a file: values are found by their offsets in the text, so that what is not touched
-//! comes back byte for byte, and what is read is typed, with a pointer to each fault.
+//! The JSON of a file. Values are found by their offsets in the text, so that unchanged ones are written back byte
+//! for byte. Values that are read have types, and errors contain a JSON pointer.
 
 use std::fmt;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use serde_json::value::RawValue;
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 
-/// The arrays at the top that are read or written.
+/// The top-level arrays that are read or written.
 const LISTS: [&str; 6] = [
     "nodes",
     "animations",
@@ -19,7 +19,7 @@ const LISTS: [&str; 6] = [
     "images",
 ];
 
-/// An object's names and values in their order; names may occur twice.
+/// The names and values of an object in their order; a name may occur twice.
 #[derive(Default)]
 pub(super) struct JsonMembers<'a>(pub(super) Vec<(String, &'a RawValue)>);
 
@@ -48,22 +48,22 @@ impl<'de: 'a, 'a> Deserialize<'de> for JsonMembers<'a> {
 }
 
 impl<'a> JsonMembers<'a> {
-    /// The first value of that name.
+    /// The first value with this name.
     pub(super) fn get(&self, name: &str) -> Option<&'a RawValue> {
         let found = self.0.iter().find(|(member, _)| member == name);
         found.map(|(_, value)| *value)
     }
 }
 
-/// One array at the top.
+/// One top-level array.
 struct TopLevelArray<'a> {
     name: &'static str,
-    /// `None` where the file has no such array.
+    /// `None` if the file does not have the array.
     array: Option<&'a RawValue>,
     entries: Vec<&'a RawValue>,
 }
 
-/// The text of a file, its arrays taken apart.
+/// The text of a file, with its arrays split into entries.
 pub(super) struct Json<'a> {
     /// What messages call the file.
     pub(super) name: &'a str,
@@ -74,7 +74,7 @@ pub(super) struct Json<'a> {
 
 impl<'a> Json<'a> {
     /// # Errors
-    /// What is no JSON, no object, or has something else for one of the arrays.
+    /// When the text is not JSON or not an object, or when one of the arrays is something else.
     pub(super) fn parse(name: &'a str, text: &'a str) -> Result<Self, Diagnostic> {
         let members = serde_json::from_str(text).map_err(|error| Diagnostic {
             location: Some(Location::Text {
@@ -99,10 +99,10 @@ impl<'a> Json<'a> {
         Ok(json)
     }
 
-    /// Makes the entries of one more array known.
+    /// Splits one more top-level array into entries.
     ///
     /// # Errors
-    /// When the file has something else of this name.
+    /// When the value with this name is not an array.
     pub(super) fn take_apart(&mut self, name: &'static str) -> Result<(), Diagnostic> {
         let array = self.member(name)?;
         let entries = array.map(|raw| self.typed(raw, &format!("/{name}")));
@@ -114,10 +114,10 @@ impl<'a> Json<'a> {
         Ok(())
     }
 
-    /// A value at the top.
+    /// A top-level value.
     ///
     /// # Errors
-    /// When the file has it twice.
+    /// When it occurs twice.
     pub(super) fn member(&self, name: &str) -> Result<Option<&'a RawValue>, Diagnostic> {
         let mut found = self.members.0.iter().filter(|(member, _)| member == name);
         let first = found.next().map(|(_, value)| *value);
@@ -130,25 +130,25 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// A list at the top that is of use where it is as glTF has it, and may be anything else.
+    /// A top-level list, which is ignored if it is not as in glTF.
     pub(super) fn optional<T: Deserialize<'a>>(&self, list: &str) -> Vec<T> {
         let found = self.member(list).ok().flatten();
         let typed = found.and_then(|raw| serde_json::from_str(raw.get()).ok());
         typed.unwrap_or_default()
     }
 
-    /// The entries of an array at the top; none where the file has no such array.
+    /// The entries of a top-level array; none if the file does not have it.
     pub(super) fn entries(&self, list: &str) -> &[&'a RawValue] {
         let list = self.lists.iter().find(|entry| entry.name == list);
         list.map_or(&[], |list| &list.entries)
     }
 
-    /// The text of an array at the top.
+    /// The text of a top-level array.
     pub(super) fn array(&self, list: &str) -> Option<&'a RawValue> {
         self.lists.iter().find(|entry| entry.name == list)?.array
     }
 
-    /// An entry of an array at the top that `from`, a pointer, names.
+    /// An entry of a top-level array; `from` is the JSON pointer of the value that names it.
     ///
     /// # Errors
     /// When there is no such entry, or it is not of this type.
@@ -170,10 +170,10 @@ impl<'a> Json<'a> {
         self.refuse(from, Code::IndexRange, message)
     }
 
-    /// A value of the type that it is to have.
+    /// A value of type `T`.
     ///
     /// # Errors
-    /// When it is not, lacks a property or has one twice; properties that are not read may be
+    /// When the value is of another type, lacks a property or has one twice. Properties that are not read may be
     /// anything.
     pub(super) fn typed<T: Deserialize<'a>>(
         &self,
@@ -195,7 +195,7 @@ impl<'a> Json<'a> {
         Diagnostic::new(self.name, code, message).inside(pointer)
     }
 
-    /// Where a value stands in the text.
+    /// The range of a value in the text.
     pub(super) fn range(&self, raw: &RawValue) -> Range<usize> {
         // Values are borrowed from the text, so that their addresses give their offsets.
         let start = raw.get().as_ptr() as usize - self.text.as_ptr() as usize;
@@ -203,7 +203,7 @@ impl<'a> Json<'a> {
     }
 }
 
-/// The message of an error, without line and column, which count within one value.
+/// The message of an error without its line and column, which count within one value.
 fn without_position(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let end = text.rfind(" at line ").unwrap_or(text.len());

@@ -1,16 +1,15 @@
-//! Matrices of nodes, split into a translation, a rotation and a scale.
+//! Splits matrices of nodes into a translation, a rotation and a scale.
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
 use crate::motion::Transform;
 use crate::quaternion::nearest_unit;
 
-/// Axes whose inner product is smaller are at right angles, as far as numbers in f32 can tell.
+/// Axes whose inner product is smaller than this are perpendicular, up to the rounding of f32.
 const RIGHT_ANGLE: f64 = 1e-5;
 
-/// The transform whose matrix this is, column after column, and whether the matrix shears or
-/// projects, so that it is the nearest of those with the same axis of x. `None` where f32 has no such
-/// numbers.
+/// The transform with this matrix, column by column, and whether the matrix has shear or a projection. In that case
+/// the transform is the nearest one with the same x axis. `None` if f32 cannot store its numbers.
 pub(super) fn split(matrix: [f64; 16]) -> Option<(Transform, bool)> {
     let column = |c: usize| DVec3::from_slice(&matrix[4 * c..]);
     let columns = [0, 1, 2].map(column);
@@ -41,8 +40,8 @@ pub(super) fn split(matrix: [f64; 16]) -> Option<(Transform, bool)> {
     all_finite.then_some((transform, is_sheared))
 }
 
-/// Unit axes at right angles to each other, each turned away from those before it as little as can
-/// be; an axis of length 0 goes where the others leave room.
+/// Perpendicular unit axes, each rotated away from the axes before it as little as possible. An axis of length 0 gets
+/// the remaining direction.
 fn at_right_angles(mut axes: [Option<DVec3>; 3]) -> [DVec3; 3] {
     for i in 0..3 {
         let before = axes;

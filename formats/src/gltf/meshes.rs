@@ -1,4 +1,4 @@
-//! The triangles of a scene, where its nodes rest.
+//! The triangles of a scene with its nodes at rest.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -16,18 +16,18 @@ use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
-/// Triangles of a whole file.
+/// The triangles of a file.
 #[derive(Debug, Clone, Default)]
 pub struct Triangles {
-    /// Of the vertices, in the scene.
+    /// Positions of the vertices, in the coordinates of the scene.
     pub positions: Vec<DVec3>,
-    /// Three vertices each.
+    /// Three vertex indices for each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// What was odd with the file.
+    /// Warnings about the file.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// The meshes of a scene.
+/// The glTF format of surfaces: the meshes of a scene.
 pub static SURFACE: SurfaceFormat = SurfaceFormat {
     name: FORMAT.name,
     summary: "glTF 2.0: the triangles of the scene, with its nodes at rest",
@@ -44,11 +44,11 @@ pub static SURFACE: SurfaceFormat = SurfaceFormat {
     },
 };
 
-/// The triangles of all meshes that nodes of the file's scene carry; of all nodes where it names no scene. `name`
-/// is what messages call the file, and `folder` where the files are that it names.
+/// The triangles of all meshes of the file's scene, or of all nodes if the file names no scene. `name` is the input's
+/// name in messages; `folder` is the folder of the files that it names.
 ///
 /// # Errors
-/// When the file or a mesh is broken, or its positions are compressed in a way that is not known.
+/// When the file or a mesh is invalid, or positions are compressed in an unknown form.
 pub fn triangles_of(
     name: &str,
     bytes: Vec<u8>,
@@ -140,7 +140,7 @@ pub(super) fn local_matrix(node: &Node) -> DMat4 {
     }
 }
 
-/// Bytes of a vertex and of a triangle: here, as numbers on the way, and in the mesh that is made of them.
+/// Bytes of memory of a vertex and of a triangle: here, while they are read, and in the mesh.
 const VERTEX: usize = 200;
 const TRIANGLE: usize = 400;
 

@@ -1,12 +1,11 @@
-//! Meshopt's attribute streams, versions 0 and 1, as the appendices of `KHR_meshopt_compression`
-//! specify them; `EXT_meshopt_compression` has version 0, which is what is written.
+//! The attribute streams of meshopt, versions 0 and 1, as the appendices of `KHR_meshopt_compression` specify them.
+//! `EXT_meshopt_compression` has version 0, which is the version that is written.
 //!
-//! A stream is a header byte, blocks of up to 256 elements, and a tail that holds the element before
-//! the first. An element has `stride` bytes. A block stores its elements' first bytes, then their
-//! second bytes and so on, each such list in groups of 16. What is stored is the difference from the
-//! element before, in 0, 1, 2, 4 or 8 bits. Four bytes of an element that begin at a multiple of
-//! four are a channel; in version 1 the tail says how the differences of each channel are to be
-//! applied.
+//! A stream is a header byte, blocks of up to 256 elements, and a tail with the element before the first one. An
+//! element has `stride` bytes. A block stores the first bytes of its elements, then their second bytes and so on,
+//! each such list in groups of 16. The stored values are differences from the element before, in 0, 1, 2, 4 or 8
+//! bits. Four bytes of an element that begin at a multiple of four are a channel; in version 1 the tail contains how
+//! the differences of each channel are applied.
 
 #![forbid(unsafe_code)]
 
@@ -20,10 +19,10 @@ const BLOCK: usize = 256;
 /// Bytes that a block decodes to, at most.
 const BLOCK_BYTES: usize = 8192;
 
-/// What is done to decoded elements.
+/// The filter that is applied to decoded elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Filter {
-    /// Nothing.
+    /// No filter.
     None,
     /// Three components and the index of the largest become four normalised i16, `x y z w`.
     Quaternion,
@@ -34,69 +33,69 @@ pub(crate) enum Filter {
 /// Why a view cannot be decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum MeshoptError {
-    /// Triangles, indices, or what is unknown.
+    /// The mode is that of triangles or indices, or unknown.
     #[error("the meshopt mode is `{0}`; animations must use the mode ATTRIBUTES")]
     Mode(String),
-    /// Normals, colours, or what is unknown.
+    /// The filter is that of normals or colours, or unknown.
     #[error(
         "the meshopt filter is `{0}`; animations are stored with NONE, QUATERNION or EXPONENTIAL"
     )]
     Filter(String),
-    /// An element's length that the format does not have.
+    /// The format does not have elements of this length.
     #[error("the meshopt stride is {stride} bytes; {allowed}")]
     Stride {
         /// Bytes of an element.
         stride: usize,
-        /// Which there are.
+        /// The lengths that it has.
         allowed: &'static str,
     },
-    /// Another header byte.
+    /// The header byte is unknown.
     #[error("the meshopt stream begins with {0:#04x}; 0xa0 and 0xa1 (versions 0 and 1) are read")]
     Version(u8),
-    /// Fewer bytes than the shortest stream of so many elements.
+    /// There are fewer bytes than in the shortest stream of this number of elements.
     #[error(
         "{count} elements of {stride} bytes need a meshopt stream of {needed} bytes or more, and \
          this one has {found}; export the file again"
     )]
     Short {
-        /// Elements said to be there.
+        /// Number of elements in the file.
         count: usize,
         /// Bytes of an element.
         stride: usize,
         /// The length of the shortest such stream.
         needed: u128,
-        /// Bytes given.
+        /// Number of bytes that were passed.
         found: usize,
     },
-    /// The blocks run into the tail.
+    /// The blocks overlap the tail.
     #[error(
         "the meshopt stream of {found} bytes ends within the block that begins with element \
          {element}; it is cut or damaged: export the file again"
     )]
     Cut {
-        /// Bytes given.
+        /// Number of bytes that were passed.
         found: usize,
         /// The first element of the block, counted from 0.
         element: usize,
     },
-    /// Bytes between the last block and the tail.
+    /// There are bytes between the last block and the tail.
     #[error(
         "{left} bytes of the meshopt stream are left after its {count} elements; it is damaged: \
          export the file again"
     )]
     LeftOver {
-        /// How many.
+        /// Number of these bytes.
         left: usize,
-        /// Elements decoded.
+        /// Number of decoded elements.
         count: usize,
     },
-    /// An unknown way to apply differences.
+    /// The mode of a channel is unknown.
     #[error(
         "channel {channel} of the meshopt stream has the unknown mode {mode:#04x}; export the \
          file again, with version 0 or 1 of the codec"
     )]
     Channel {
-        /// Which four bytes of an element, counted from 0.
+        /// Index of the channel: of the group of four bytes of an element, from 0.
         channel: usize,
         /// The mode's byte.
         mode: u8,
@@ -104,7 +103,7 @@ pub(crate) enum MeshoptError {
 }
 
 impl Filter {
-    /// The filter of a view, by the properties `mode` and `filter` of its extension object.
+    /// The filter of a view, from the properties `mode` and `filter` of its extension object.
     pub(crate) fn named(mode: &str, filter: Option<&str>) -> Result<Self, MeshoptError> {
         if mode != "ATTRIBUTES" {
             return Err(MeshoptError::Mode(mode.to_owned()));
@@ -118,11 +117,11 @@ impl Filter {
     }
 }
 
-/// Decodes `count` elements of `stride` bytes each, `count * stride` bytes in all. The caller has
-/// compared that product with its limits; the shortest streams decode to 1024 times their length.
+/// Decodes `count` elements of `stride` bytes each. The caller has compared the product of both with its limits; the
+/// shortest streams decode to 1024 times their length.
 ///
 /// # Errors
-/// When `bytes` are not exactly a stream of so many elements.
+/// When `bytes` are not exactly a stream of this number of elements.
 pub(crate) fn decode_attributes(
     bytes: &[u8],
     count: usize,
@@ -187,7 +186,7 @@ pub(crate) fn decode_attributes(
     Ok(output)
 }
 
-/// Elements of `stride` bytes each as a stream of version 0. Each group of 16 differences takes the width in
+/// Encodes elements of `stride` bytes each as a stream of version 0. Each group of 16 differences has the width in
 /// which it is shortest.
 pub(crate) fn encode_attributes(bytes: &[u8], stride: usize) -> Vec<u8> {
     let block = (BLOCK_BYTES / stride / GROUP * GROUP).min(BLOCK);
@@ -251,8 +250,8 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
     }
 }
 
-/// The fewest bytes that so many elements can take between the header and the tail: two bits a
-/// group in version 0, two bits a block in version 1, each for every byte of an element.
+/// The smallest number of bytes between the header and the tail of a stream: two bits for each group in version 0,
+/// two bits for each block in version 1, each for every byte of an element.
 fn least_body(count: usize, stride: usize, block: usize, has_channels: bool) -> u128 {
     let stride = stride as u128;
     if has_channels {
@@ -262,15 +261,15 @@ fn least_body(count: usize, stride: usize, block: usize, has_channels: bool) -> 
     ((count / block) as u128 * headers(block) + headers(count % block)) * stride
 }
 
-/// The next `count` bytes, `None` where they are not there.
+/// The next `count` bytes; `None` if there are fewer.
 fn take<'a>(body: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
     let (head, rest) = body.split_at_checked(count)?;
     *body = rest;
     Some(head)
 }
 
-/// Decodes the elements of one block. `before` is the element before the first, then the last of
-/// the block; `modes` are those of the channels, empty in version 0.
+/// Decodes the elements of one block. `before` is the element before the block, and then the last one of the block;
+/// `modes` are those of the channels, empty in version 0.
 fn decode_block(
     body: &mut &[u8],
     modes: &[u8],
@@ -296,8 +295,8 @@ fn decode_block(
     Some(())
 }
 
-/// Decodes the differences of one byte of all elements of a block; `control` are its two bits in
-/// the block's header, which version 0 does not have.
+/// Decodes the differences of one byte of all elements of a block. `control` are its two bits in the header of the
+/// block, which version 0 does not have.
 fn decode_list(
     body: &mut &[u8],
     control: Option<u8>,
@@ -326,8 +325,8 @@ fn decode_list(
     Some(())
 }
 
-/// Decodes 16 differences of `width` bits. One with all bits set is a byte behind the others; those
-/// of one bit begin at a byte's lowest, wider ones at its highest.
+/// Decodes 16 differences of `width` bits. If all bits of one are set, its value is a byte after the others.
+/// Differences of one bit begin at the lowest bit of a byte, wider ones at the highest.
 fn decode_group(body: &mut &[u8], width: usize, list: &mut [u8; GROUP]) -> Option<()> {
     let packed = take(body, 2 * width)?;
     match width {
@@ -349,9 +348,9 @@ fn decode_group(body: &mut &[u8], width: usize, list: &mut [u8; GROUP]) -> Optio
     Some(())
 }
 
-/// Four bytes of an element, from those of the element before and a difference: of bytes (mode 0)
-/// or of pairs of bytes (1), whose lowest bit says that the others are to be inverted, or exclusive
-/// or of all four, turned left by the mode's upper bits.
+/// Four bytes of an element, from those of the element before and a difference. In mode 0 it is a difference of
+/// bytes, in mode 1 of pairs of bytes; its lowest bit inverts the others. In other modes the difference, rotated
+/// right by the upper bits of the mode, is combined with the bytes by exclusive or.
 fn apply(before: [u8; 4], difference: [u8; 4], mode: u8) -> [u8; 4] {
     match mode & 15 {
         0 => array::from_fn(|byte| {
@@ -375,10 +374,10 @@ fn apply(before: [u8; 4], difference: [u8; 4], mode: u8) -> [u8; 4] {
     }
 }
 
-/// Three components as parts of `one`, times the root of 2, become `x y z w` as normalised i16. The
-/// fourth input is `one`, but its two lowest bits, which say which component is left out: the
-/// largest, which is positive. Nothing is rounded before the root where `one` has up to 12 bits,
-/// and the order of operations is meshoptimizer's, so that the results are the same.
+/// Converts three components, in units of `one` and times the root of 2, to `x y z w` as normalised i16. The fourth
+/// input is `one`, except its two lowest bits: these are the index of the omitted component, which is the largest and
+/// positive. Nothing is rounded before the root if `one` has up to 12 bits. The order of operations is that of
+/// meshoptimizer, so that the results are equal.
 pub(super) fn quaternion(element: &mut [u8; 8]) {
     let input: [i16; 4] =
         array::from_fn(|i| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]));
@@ -393,7 +392,7 @@ pub(super) fn quaternion(element: &mut [u8; 8]) {
     }
 }
 
-/// A mantissa in the 24 lower bits, times 2 to the power of the 8 upper bits, both signed.
+/// A mantissa in the 24 lower bits, times 2 to the power of the 8 upper bits; both are signed.
 fn exponential(element: &mut [u8; 4]) {
     let bits = i32::from_le_bytes(*element);
     let (mantissa, exponent) = (bits << 8 >> 8, bits >> 24);

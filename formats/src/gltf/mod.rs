@@ -1,15 +1,15 @@
 //! glTF 2.0, as text (`.gltf`) and as GLB.
 //!
-//! A clip for each animation, a track for each node that it moves or that carries such a node. What
-//! is read is checked; what is not read may be anything, and comes back byte for byte when the file
-//! is written with other keys.
+//! Each animation becomes a clip. Its tracks are the nodes that it moves, their ancestors, and the other joints of
+//! their skins. The parts of a file that are read are checked. Other parts may contain anything, and are written back
+//! byte for byte when the file is written with other keys.
 //!
-//! Reading: `container` splits a GLB into its chunks, `json` finds values in the text without copying them,
-//! `reader` gives the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` has the
-//! hierarchy, `channel` the keys of one channel, and `animation` makes a clip of one animation.
-//! Writing the same file again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the
-//! text and by bytes that `data` appends, and `gather` takes the files beside a `.gltf` into a GLB.
-//! Writing a new file of clips of any format: `write_new`.
+//! Reading: `container` splits a GLB into its chunks, `json` finds values in the text without copying them, `reader`
+//! returns the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` contains the
+//! hierarchy, `channel` the keys of one channel, and `animation` makes a clip of one animation. Writing the same file
+//! again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the text and by bytes that
+//! `data` appends, and `gather` embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new
+//! file: `write_new`.
 
 mod animation;
 mod bake;
@@ -53,7 +53,7 @@ use crate::source::Source;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
-/// Animations of nodes, with all else that makes a scene.
+/// The glTF format: scenes with animations of nodes.
 pub static FORMAT: Format = Format {
     name: "glb",
     summary: "glTF 2.0 animations, as GLB or text",
@@ -92,7 +92,7 @@ pub static FORMAT: Format = Format {
 /// The longest GLB: its header says the length in 32 bits.
 const LONGEST_GLB: u64 = u32::MAX as u64;
 
-/// Required extensions that are known, or say nothing of animations.
+/// The required extensions that are supported, or that do not concern animations.
 const KNOWN: [&str; 9] = [
     MESHOPT[0],
     MESHOPT[1],
@@ -112,16 +112,17 @@ fn is_gltf(start: &[u8]) -> bool {
         || is_object && text.windows(7).any(|seven| seven == b"\"asset\"")
 }
 
-/// Reads a file; `-` is standard input. Files that it names are read beside it.
+/// Reads a glTF file; `-` is standard input. Files that it names are read from its folder.
 ///
 /// # Errors
-/// The first fault that refuses the file; those of single animations are in [`Loaded::refused`].
+/// When the file cannot be opened or is invalid; the first error is returned. Errors of single animations are in
+/// [`Loaded::refused`].
 pub fn open_gltf(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let (name, bytes, folder) = bytes_of(path, options.limits, options.pipes)?;
     read_gltf(&name, bytes, folder, options)
 }
 
-/// What messages call a file, its bytes, and the folder where the files are that it names.
+/// The input's name in messages, its bytes, and the folder of the files that it names.
 fn bytes_of(
     path: &Path,
     limits: Limits,
@@ -139,7 +140,7 @@ fn bytes_of(
     Ok((name, bytes, folder))
 }
 
-/// Reads the bytes of a file; `name` is what messages call it, and `folder` where the files are
+/// Reads the bytes of a glTF file; `name` is the input's name in messages, and `folder` is the folder of the files
 /// that it names.
 ///
 /// # Errors

@@ -21,27 +21,27 @@ pub(super) struct Nodes {
     parents: Vec<Option<usize>>,
     names: Vec<String>,
     rests: Vec<OnceCell<Result<RestPose, Diagnostic>>>,
-    /// The joints of each skin, as far as there are such nodes.
+    /// The joints of each skin that exist as nodes.
     skins: Vec<Vec<usize>>,
     /// The skins of each node that is a joint.
     skins_of: HashMap<usize, Vec<usize>>,
-    /// How BVH has the joints that nodes were made of; empty where the file says nothing of it.
+    /// The BVH data of the joints that became nodes; empty if the file does not contain it.
     bvh: Vec<BvhJoint>,
-    /// Where the positions of the children of a node count from, if that is all that it says.
+    /// For each node that is only an origin, the vector that it adds to the positions of its children.
     origins: Vec<Option<DVec3>>,
 }
 
-/// Where a node rests.
+/// The rest transform of a node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RestPose {
     pub(super) transform: Transform,
-    /// Its matrix shears or projects, which no transform does.
+    /// Whether its matrix has shear or a projection, which a transform does not have.
     pub(super) is_sheared: bool,
 }
 
 impl Nodes {
     /// # Errors
-    /// When a node is broken, or they make no trees.
+    /// When a node is invalid, or when the nodes are not trees.
     pub(super) fn read(json: &Json<'_>) -> Result<Self, Diagnostic> {
         let count = json.entries("nodes").len();
         let node = |index| json.entry("nodes", index, "/nodes");
@@ -77,7 +77,7 @@ impl Nodes {
         self.parents[node]
     }
 
-    /// The node that carries a node, without those that are origins, and how far these move it.
+    /// The parent of a node, without nodes that are origins, and the translation of these origins.
     pub(super) fn carrier(&self, node: usize) -> (Option<usize>, DVec3) {
         let mut origin = DVec3::ZERO;
         let mut next = self.parents[node];
@@ -90,18 +90,18 @@ impl Nodes {
         (next, origin)
     }
 
-    /// Whether a node is an origin.
+    /// Whether a node is only an origin.
     pub(super) fn is_origin(&self, node: usize) -> bool {
         self.origins.get(node).is_some_and(Option::is_some)
     }
 
-    /// What the track of a node is called; no two nodes are called the same.
+    /// The name of a node's track, which is unique.
     pub(super) fn name(&self, node: usize) -> &str {
         &self.names[node]
     }
 
-    /// Adds the nodes that are connected with those among `nodes`: all that carry them, and all
-    /// joints of a skin that has one of them.
+    /// Adds the nodes that are connected with those in `nodes`: all their ancestors, and all joints of a skin that
+    /// contains one of them.
     pub(super) fn complete(&self, nodes: &mut BTreeSet<usize>) {
         let mut open: Vec<usize> = std::mem::take(nodes).into_iter().collect();
         let mut is_done = vec![false; self.skins.len()];
@@ -118,7 +118,7 @@ impl Nodes {
         }
     }
 
-    /// How BVH has the joint that a node was made of; nothing where the file says it of no node.
+    /// The BVH data of the joint that became a node; `None` if the file does not contain it.
     pub(super) fn bvh(&self, node: usize) -> Option<&BvhJoint> {
         self.bvh.get(node)
     }
@@ -127,10 +127,10 @@ impl Nodes {
         self.list[node].matrix.is_some()
     }
 
-    /// Where a node rests.
+    /// The rest transform of a node.
     ///
     /// # Errors
-    /// When its numbers are too large for f32, or its rotation is none.
+    /// When its numbers are too large for f32, or when its rotation is invalid.
     pub(super) fn rest(
         &self,
         node: usize,
@@ -141,7 +141,7 @@ impl Nodes {
     }
 }
 
-/// How BVH has the joints, where nodes say it among their extras: as they are written.
+/// The BVH data of joints, if the extras of nodes contain it, as Tumble writes them.
 fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
     if !json.text.contains("\"bvh\"") {
         return Vec::new();
@@ -166,7 +166,7 @@ fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
     }
 }
 
-/// Which nodes are origins, as they are written: a node that does nothing but to move its children.
+/// The nodes that are origins, as Tumble writes them: nodes that only translate their children.
 fn origins(json: &Json<'_>, list: &[Node]) -> Vec<Option<DVec3>> {
     if !json.text.contains("\"tumbleOrigin\"") {
         return Vec::new();
@@ -222,7 +222,7 @@ fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnos
     Ok(parents)
 }
 
-/// The nodes' own names; `node7` where there is none, `hand#12` where an earlier node is `hand`.
+/// The names of the nodes; `node7` for a node without a name, and `hand#12` if an earlier node is named `hand`.
 fn names(list: &[Node]) -> Vec<String> {
     let mut used = HashSet::new();
     let name = |(index, node): (usize, &Node)| {

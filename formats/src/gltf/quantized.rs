@@ -1,5 +1,5 @@
-//! Rotations of few bits: 16 a component, as accessors of normalised `SHORT` have them, or fewer of three
-//! components, from which meshopt's filter QUATERNION decodes such.
+//! Quantized rotations: 16 bits for each component, as accessors of normalised `SHORT` store them; or fewer bits for
+//! three components, which meshopt's filter QUATERNION decodes to these.
 
 use std::array;
 
@@ -8,27 +8,27 @@ use glam::{DQuat, Quat};
 use crate::gltf::meshopt::quaternion;
 use crate::quaternion::unit;
 
-/// What 1 is.
+/// The integer that represents 1.
 const ONE: f32 = 32767.0;
 
-/// The nearest components, which glTF divides by 32767.
+/// The nearest components as integers, which glTF divides by 32767.
 pub(crate) fn quantized(rotation: [f32; 4]) -> [i16; 4] {
     rotation.map(|component| (component * ONE).round_ties_even() as i16) // saturates
 }
 
-/// How the rotations of a file are kept.
+/// How the rotations of a file are quantized.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantization {
     /// 16 bits for each of four components.
     Components,
-    /// The three smaller components alone, by meshopt's filter QUATERNION, in steps of which so many are the root of
-    /// 1/2: 7 to 32767, one less than a multiple of 4. Of a quaternion and its negative it keeps the one whose
-    /// largest component is positive.
+    /// The three smaller components only, by meshopt's filter QUATERNION. The number is that of the steps from 0 to
+    /// √½: 7 to 32767, one less than a multiple of 4. Of q and -q, the one whose largest component is positive is
+    /// stored.
     Filtered(u16),
 }
 
 impl Quantization {
-    /// What is read of a rotation that was written so.
+    /// The rotation that is read back after `rotation` was written.
     pub(crate) fn read_back(self, rotation: Quat) -> Quat {
         let components = match self {
             Self::Components => quantized(rotation.to_array()),
@@ -44,7 +44,7 @@ impl Quantization {
     }
 }
 
-/// What meshopt's filter makes a rotation of: see [`quaternion`].
+/// The bytes of a rotation for meshopt's filter: see [`quaternion`].
 pub(crate) fn filtered(rotation: [f32; 4], steps: u16) -> [u8; 8] {
     let steps = steps.min(i16::MAX as u16) | 3;
     let one = f32::from(steps);

@@ -1,5 +1,4 @@
-//! From indices to bytes: buffers, and the views of them, each found, loaded and decoded once, and
-//! only if it is needed.
+//! Finds, loads and decodes buffers and their views, each once and only if it is needed.
 
 mod accessor;
 
@@ -21,24 +20,24 @@ use crate::warnings::Warnings;
 /// The extensions that compress a buffer view.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Bytes that a node takes, with its name and where it rests.
+/// Bytes of memory of a node, with its name and its rest transform.
 const NODE: usize = 640;
 
-/// Bytes that a BIN chunk may have behind what its buffer says: it is padded.
+/// Number of bytes that may follow the buffer in a BIN chunk, as padding.
 const PADDING: u64 = 3;
 
 /// A file that is being read.
 pub(super) struct GltfReader<'a> {
     pub(super) json: &'a Json<'a>,
     container: &'a Container,
-    /// Where files beside are; there are none beside standard input.
+    /// The folder of other files; `None` for standard input.
     folder: Option<&'a Path>,
     limits: Limits,
     /// The extensions that the file requires.
     required: Vec<String>,
     budget: Budget,
     buffers: Vec<OnceCell<Result<Cow<'a, [u8]>, Diagnostic>>>,
-    /// Of compressed views.
+    /// The decoded bytes of compressed views.
     decoded: Vec<OnceCell<Result<Vec<u8>, Diagnostic>>>,
     pub(super) warnings: RefCell<Warnings>,
 }
@@ -46,13 +45,13 @@ pub(super) struct GltfReader<'a> {
 /// The bytes of a buffer view.
 pub(super) struct View<'a> {
     pub(super) bytes: &'a [u8],
-    /// From one element to the next, where they are not packed.
+    /// Number of bytes from one element to the next; `None` if they are packed.
     pub(super) stride: Option<usize>,
 }
 
 impl<'a> GltfReader<'a> {
     /// # Errors
-    /// When the list of required extensions is none.
+    /// When the list of required extensions is invalid.
     pub(super) fn new(
         json: &'a Json<'a>,
         container: &'a Container,
@@ -80,17 +79,17 @@ impl<'a> GltfReader<'a> {
         })
     }
 
-    /// Takes memory for `count` things of `bytes` each that the part at `pointer` is to have.
+    /// Takes memory for `count` elements of `bytes` each, which the part of the file at `pointer` needs.
     ///
     /// # Errors
-    /// When the file has no right to so much.
+    /// When the memory budget does not allow it.
     pub(super) fn take(&self, count: usize, bytes: usize, pointer: &str) -> Result<(), Diagnostic> {
         self.budget
             .take(count, bytes)
             .map_err(|error| self.json.refuse(pointer, Code::Memory, error.to_string()))
     }
 
-    /// As [`GltfReader::take`], until the value is dropped.
+    /// As [`GltfReader::take`]; the memory is returned when the value is dropped.
     ///
     /// # Errors
     /// As [`GltfReader::take`].
@@ -121,13 +120,13 @@ impl<'a> GltfReader<'a> {
             .warn(code, || (location(), message()));
     }
 
-    /// More elements than the whole file has bytes are refused where no bytes stand for them.
+    /// Whether the file has at least `count` bytes: an accessor without bytes may not have more elements.
     pub(super) fn fits(&self, count: u64) -> bool {
         let bin = self.container.bin().map_or(0, <[u8]>::len);
         count <= (self.json.text.len() + bin) as u64
     }
 
-    /// The bytes of a buffer, as many as it says; `from` points at what names it.
+    /// The bytes of a buffer, as many as its entry contains; `from` is the JSON pointer of the value that names it.
     ///
     /// # Errors
     /// When they cannot be found, or are too few.
@@ -174,16 +173,16 @@ impl<'a> GltfReader<'a> {
         })
     }
 
-    /// The BIN chunk, if this buffer is it.
+    /// The BIN chunk, if it is this buffer.
     pub(super) fn bin(&self, index: usize, buffer: &Buffer<'_>) -> Option<&'a [u8]> {
         let is_bin = index == 0 && buffer.uri.is_none() && !buffer.extensions.is_fallback();
         self.container.bin().filter(|_| is_bin)
     }
 
-    /// What a URI stands for; `pointer` is that of the object that has it.
+    /// The data of a URI; `pointer` is the JSON pointer of the object with the URI.
     ///
     /// # Errors
-    /// When it is not followed, or cannot be read.
+    /// When the URI is refused, or its data cannot be read.
     pub(super) fn follow(&self, uri: &str, pointer: &str) -> Result<Vec<u8>, Diagnostic> {
         let pointer = format!("{pointer}/uri");
         let refuse = |message| self.json.refuse(&pointer, Code::Uri, message);
@@ -206,10 +205,11 @@ impl<'a> GltfReader<'a> {
         })
     }
 
-    /// The bytes of a buffer view, decoded if they are compressed; `from` points at what names it.
+    /// The bytes of a buffer view, decoded if they are compressed; `from` is the JSON pointer of the value that names
+    /// it.
     ///
     /// # Errors
-    /// When it or its buffer is broken, or needs an extension that is not known.
+    /// When the view or its buffer is invalid, or needs an unknown extension.
     pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, Diagnostic> {
         let view: BufferView<'a> = self.json.entry("bufferViews", index, from)?;
         let pointer = format!("/bufferViews/{index}");
@@ -236,7 +236,7 @@ impl<'a> GltfReader<'a> {
         })
     }
 
-    /// Warns of a stride in the view of an accessor whose elements are no vertices.
+    /// Warns of a stride in the view of an accessor that does not contain vertices.
     pub(super) fn warn_of_stride(&self, accessor: &Accessor) {
         let Some(index) = accessor.buffer_view else {
             return;
@@ -267,7 +267,7 @@ impl<'a> GltfReader<'a> {
             .map_err(|message| self.json.refuse(pointer, Code::Meshopt, message))
     }
 
-    /// A part of a buffer; `pointer` is that of the object that names it.
+    /// A part of a buffer; `pointer` is the JSON pointer of the object that names it.
     fn part(
         &self,
         buffer: usize,

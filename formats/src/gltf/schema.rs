@@ -1,4 +1,4 @@
-//! The parts of glTF 2.0 that are read, by their names in its specification.
+//! The parts of glTF 2.0 that are read, with their names in its specification.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -33,20 +33,20 @@ pub(super) struct Node {
     pub(super) skin: Option<usize>,
 }
 
-/// What else a node says; read only where a file says it.
+/// The other properties of a node, which are read only if a file contains them.
 #[derive(Deserialize)]
 pub(super) struct NodeBeside<'a> {
     #[serde(borrow)]
     pub(super) extras: Option<&'a RawValue>,
 }
 
-/// How BVH has the joint that a node was made of.
+/// The BVH data of the joint that became a node.
 #[derive(Deserialize)]
 pub(super) struct Extras {
     pub(super) bvh: BvhExtras,
 }
 
-/// The mark of a node that is where positions count from.
+/// The mark of a node that is an origin of positions.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct OriginExtras {
@@ -101,7 +101,7 @@ pub(super) struct Primitive<'a> {
     pub(super) extensions: JsonMembers<'a>,
 }
 
-/// The mode of a primitive that says none.
+/// The default mode of a primitive.
 fn triangles() -> u32 {
     4
 }
@@ -135,7 +135,7 @@ pub(super) struct Channel {
     pub(super) target: Target,
 }
 
-/// What of a node a channel moves.
+/// The property of a node that a channel moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum TargetPath {
     Translation,
@@ -161,7 +161,7 @@ impl TargetPath {
         }
     }
 
-    /// Numbers of a value.
+    /// How many numbers a value has.
     pub(super) fn width(self) -> usize {
         match self {
             Self::Rotation => 4,
@@ -190,7 +190,7 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// The node that is moved, and what of it; `None` if something else is.
+    /// The node and the property that are moved; `None` if anything else is moved.
     pub(super) fn moves(&self) -> Option<(usize, TargetPath)> {
         if self.path == "pointer" {
             let pointer = self.extensions.pointer.as_ref()?;
@@ -333,7 +333,7 @@ struct Fallback {
 }
 
 impl BufferExtensions {
-    /// Whether the buffer stands for what meshopt decodes, and may hold nothing.
+    /// Whether the buffer is only a substitute for the data that meshopt decodes, and may be empty.
     pub(super) fn is_fallback(&self) -> bool {
         [&self.ext, &self.khr]
             .into_iter()

@@ -1,4 +1,4 @@
-//! The meshes that the tracks of a clip carry: bent by a skin's joints, or fixed to one.
+//! Reads the meshes that move with the tracks of a clip: deformed by the joints of a skin, or fixed to a joint.
 
 use std::collections::HashMap;
 
@@ -12,21 +12,21 @@ use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Skin};
 use crate::motion::Motion;
 
-/// Bytes of a vertex with its bones and weights, as numbers on the way.
+/// Bytes of memory of a vertex with its bones and weights, while they are read.
 const VERTEX: usize = 160;
 
-/// More bones than this have no number.
+/// The largest number of bones, which are numbered in 16 bits.
 const MAX_BONES: usize = u16::MAX as usize + 1;
 
 /// The lists of a file that [`carried`] reads beside its nodes.
 pub(super) const LISTS: [&str; 3] = ["meshes", "scenes", "skins"];
 
-/// The meshes of the file's scene that tracks of a clip carry; nothing where there are none. The file's
-/// [`LISTS`] are taken apart.
+/// The meshes of the file's scene that move with tracks of a clip; `None` if there are none. The [`LISTS`] of the
+/// file must have been split into entries.
 ///
 /// # Errors
-/// When a mesh or a skin is broken or compressed in a way that is not known, or a joint of a skin is no track
-/// of the clip.
+/// When a mesh or a skin is invalid or compressed in an unknown form, or when a joint of a skin is not a track of the
+/// clip.
 pub(super) fn carried(
     reader: &GltfReader<'_>,
     clip: &Motion,
@@ -55,7 +55,7 @@ pub(super) fn carried(
 struct CarriedMeshBuilder<'a, 'file> {
     reader: &'a GltfReader<'file>,
     nodes: &'a Nodes,
-    /// By their names, which are those of their nodes.
+    /// The tracks by name; the names are those of their nodes.
     tracks: HashMap<String, usize>,
     mesh: CarriedMesh,
 }
@@ -90,7 +90,7 @@ impl CarriedMeshBuilder<'_, '_> {
         Ok(())
     }
 
-    /// The joints of a skin.
+    /// Adds the joints of a skin as bones.
     fn add_bones(&mut self, index: usize, node: usize) -> Result<(), Diagnostic> {
         let json = self.reader.json;
         let pointer = format!("/skins/{index}");
@@ -132,7 +132,7 @@ impl CarriedMeshBuilder<'_, '_> {
         Ok(())
     }
 
-    /// The track that carries a node, and where the node rests in it.
+    /// The track that moves a node, with the node's rest transform in it.
     fn carrier(&self, node: usize) -> Result<Option<Bone>, Diagnostic> {
         let mut to_joint = DMat4::IDENTITY;
         let mut next = Some(node);
@@ -211,7 +211,7 @@ impl CarriedMeshBuilder<'_, '_> {
     }
 }
 
-/// Weights whose sum is 1; those of a vertex that follows nothing are the first bone's.
+/// Weights with the sum 1. A vertex without weights follows the first bone.
 fn whole(four: &[f64; 4]) -> [f32; 4] {
     let four = four.map(|weight| if weight > 0.0 { weight } else { 0.0 });
     let sum: f64 = four.iter().sum();

@@ -1,4 +1,4 @@
-//! Where buffers and images are: in the URI itself, or in files beside.
+//! Reads the URIs of buffers and images: data in the URI, or other files.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
-/// Writers differ in whether they pad.
+/// Padding is optional, because writers differ in it.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new()
@@ -14,7 +14,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Whether the URI itself holds the data.
+/// Whether the URI contains the data.
 pub(super) fn is_data(uri: &str) -> bool {
     scheme(uri).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data"))
 }
@@ -22,7 +22,7 @@ pub(super) fn is_data(uri: &str) -> bool {
 /// The bytes of a data URI (RFC 2397).
 ///
 /// # Errors
-/// What is wrong with it.
+/// The error as text.
 pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     let Some((kind, data)) = uri.split_once(',') else {
         return Err("the data URI has no comma before its data".to_owned());
@@ -46,11 +46,10 @@ pub(super) fn of_bytes(bytes: &[u8]) -> String {
     )
 }
 
-/// The path of a file that a URI names, relative to the folder of the file that has the URI, and
-/// within it.
+/// The path of the file that a URI names, relative to the folder of the file with the URI, and within it.
 ///
 /// # Errors
-/// Why the URI is not followed: it leads elsewhere, or names no file.
+/// Why the URI is refused: it leads out of the folder, or does not name a file.
 pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
     if let Some(scheme) = scheme(uri) {
         return Err(format!(
@@ -90,7 +89,7 @@ pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// What stands before the first colon, if it is the scheme of a URI (or the letter of a drive).
+/// The text before the first colon, if it is the scheme of a URI (or the letter of a drive).
 fn scheme(uri: &str) -> Option<&str> {
     let (scheme, _) = uri.split_once(':')?;
     let is_part = |b: u8| b.is_ascii_alphanumeric() || b"+-.".contains(&b);
@@ -98,7 +97,7 @@ fn scheme(uri: &str) -> Option<&str> {
     (begins && scheme.bytes().all(is_part)).then_some(scheme)
 }
 
-/// `%41` is `A`.
+/// Decodes percent escapes: `%41` is `A`.
 fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();

@@ -1,11 +1,11 @@
-//! Whole numbers as JSON may write them: `1`, and as well `1.0` and `1e0`.
+//! Integers as JSON may write them: `1`, `1.0` or `1e0`.
 
 use std::fmt;
 use std::marker::PhantomData;
 
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
-/// A whole number from 0 on.
+/// An integer of 0 or more.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Whole<T>(pub(super) T);
 
@@ -41,12 +41,12 @@ impl<'de, T: TryFrom<u64>> Deserialize<'de> for Whole<T> {
     }
 }
 
-/// For a field of a structure.
+/// Deserializes a field.
 pub(super) fn whole<'de, D: Deserializer<'de>, T: TryFrom<u64>>(from: D) -> Result<T, D::Error> {
     Whole::deserialize(from).map(|whole| whole.0)
 }
 
-/// For a field that may be missing.
+/// Deserializes an optional field.
 pub(super) fn optional<'de, D: Deserializer<'de>, T: TryFrom<u64>>(
     from: D,
 ) -> Result<Option<T>, D::Error> {
@@ -54,7 +54,7 @@ pub(super) fn optional<'de, D: Deserializer<'de>, T: TryFrom<u64>>(
     Ok(found.map(|whole| whole.0))
 }
 
-/// For a list.
+/// Deserializes a list.
 pub(super) fn list<'de, D: Deserializer<'de>, T: TryFrom<u64>>(
     from: D,
 ) -> Result<Vec<T>, D::Error> {

@@ -1,6 +1,6 @@
-//! Clips of any format as a new glTF file: a node for each track, skins that make bones of the
-//! joints, and an animation for each clip. In its binary data, the inverse bind matrices come first,
-//! then each animation's times and the samples of its channels.
+//! Writes clips of any format as a new glTF file: a node for each track, skins so that programs show the joints as
+//! bones, and an animation for each clip. The binary data contains the inverse bind matrices, then the times and the
+//! samples of each animation.
 
 mod binary;
 mod json;
@@ -31,21 +31,20 @@ pub(super) use crate::gltf::write_new::json::{FLOAT, SHORT};
 /// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
 const HEADERS: u64 = 28;
 
-/// Writes clips as GLB, or where the options' `format` is `gltf`, as text with the binary data
-/// inside it; text takes memory for all of it.
+/// Writes clips as GLB, or, if the options' `format` is `gltf`, as text with embedded binary data. Text is built in
+/// memory.
 ///
-/// Joints with the same parents, by name, move the same nodes in all clips, so that clips of
-/// parts of one skeleton stay clips of one skeleton; clips whose joints rest in different places get
-/// nodes of their own. Tracks of a clip without skeleton are roots without skin. Poses in the world
-/// become relative to the parents. Rotations are f32, each with the sign that continues the one
-/// before it; translations and scales are written of joints where they leave the rest pose. Steps
-/// stay steps, all else is linear; the keys of clips that are written as such
-/// ([`SampledClip::is_at_keys`]) keep their samplers.
+/// Joints with the same names and parents are the same nodes in all clips, so that clips of parts of one skeleton
+/// stay clips of one skeleton. Clips whose joints rest at different positions get separate nodes. Tracks of a clip
+/// without a skeleton are roots without a skin. Poses relative to the world are converted to poses relative to the
+/// parents. Rotations are f32 unless the options quantize them, with continued signs. Translations and scales are
+/// written for joints where they differ from the rest pose. Steps stay steps; all other samples are joined by
+/// straight lines and arcs. Keys that are written as keys ([`SampledClip::is_at_keys`]) keep their interpolation.
 ///
 /// # Errors
 /// When writing fails; [`Code::NothingToAnimate`], [`Code::NotTrees`], [`Code::TimesInF32`],
-/// [`Code::TimesBelowZero`], [`Code::GlbTooLong`]; `InvalidInput` when the lists of a clip differ
-/// in length. Nothing is written then but by the system's fault.
+/// [`Code::TimesBelowZero`], [`Code::GlbTooLong`]; `InvalidInput` if the lengths of a clip's lists do not fit. Only
+/// after an error of the system may a part of the file have been written.
 pub fn write_new(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,
@@ -128,7 +127,7 @@ pub fn write_new(
     Ok(moved_starts(clips, options))
 }
 
-/// Says which clips count their times from whole seconds that an f32 cannot hold beside them.
+/// Warnings about clips whose times count from whole seconds that an f32 cannot store in addition.
 fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagnostic> {
     let mut warnings = Warnings::new(&options.name);
     for offset in clips.iter().map(|clip| clip.clip.time_offset) {
@@ -142,11 +141,11 @@ fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagn
     warnings.into_list()
 }
 
-/// A clip that can be written.
+/// A clip to be written.
 struct WritableClip<'a> {
     samples: ClipSamples<'a>,
     times: Vec<f32>,
-    /// Keys of its channels that are written instead of the samples, each channel with its times.
+    /// The keys of its channels, each with its times, if they are written instead of the samples.
     keys: Option<Vec<KeyedChannel>>,
     /// The node of each track.
     nodes: Vec<usize>,
@@ -160,7 +159,7 @@ struct KeyedChannel {
     keys: WrittenKeys,
 }
 
-/// The channels of a clip whose own keys are written; nothing where its samples are.
+/// The channels of a clip whose keys are written; `None` if its samples are written.
 fn keyed_channels(samples: ClipSamples<'_>) -> Result<Option<Vec<KeyedChannel>>, (Code, String)> {
     let clip = samples.clip();
     if !clip.is_at_keys || clip.clip.is_world {
@@ -220,9 +219,9 @@ fn parts<'a>(
 
 /// The binary data of a file.
 struct Chunk<'a> {
-    /// Bytes of all.
+    /// Number of bytes.
     length: u64,
-    /// All of it, where it is compressed.
+    /// The compressed bytes, if the data is compressed.
     compressed: Option<Vec<u8>>,
     binary: Binary<'a>,
 }
@@ -270,7 +269,7 @@ fn write_words<const N: usize>(out: &mut impl Write, words: [u32; N]) -> io::Res
     words.try_for_each(|word| out.write_all(&word.to_le_bytes()))
 }
 
-/// The length of a GLB of so much JSON and binary data, or why there is none.
+/// The length of a GLB with this JSON and binary data, or why it is too long.
 fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
     let length = HEADERS + json.next_multiple_of(4) + binary;
     u32::try_from(length).map_err(|_| {
@@ -281,7 +280,7 @@ fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
     })
 }
 
-/// The times of a clip as glTF has them, or why it cannot.
+/// The times of a clip in f32, or why they cannot be stored so.
 fn f32_times(samples: ClipSamples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
     // The sum makes -0 to 0.
     let times: Vec<f32> = seconds.iter().map(|&time| time as f32 + 0.0).collect();
@@ -364,7 +363,7 @@ fn animation<'a>(
     animation
 }
 
-/// The animation of channels that have keys of their own; equal times are written once.
+/// The animation of channels with separate keys; equal times are written once.
 fn keyed_animation(
     binary: &mut Binary<'_>,
     channels: Vec<KeyedChannel>,

@@ -1,4 +1,4 @@
-//! The keys of one channel as a file has them: at times of their own, with their own sampler.
+//! The keys of one channel as a file stores them: with separate times and a separate sampler.
 
 use glam::Quat;
 use tumble::Channel;
@@ -9,15 +9,15 @@ use crate::signs::continue_signs;
 
 /// The keys of a channel of a clip.
 pub(super) struct WrittenKeys {
-    /// Seconds.
+    /// Times in seconds.
     pub(super) times: Vec<f64>,
-    /// A value for each time; of cubics the arriving tangent, the value and the leaving tangent.
+    /// A value for each time; for cubics the arriving tangent, the value and the leaving tangent.
     pub(super) values: Vec<f32>,
     pub(super) sampler: ChannelInterpolation,
 }
 
 impl WrittenKeys {
-    /// The keys with which a clip moves a track; nothing where it rests.
+    /// The keys by which a clip moves a track; `None` if the track is at rest.
     pub(super) fn of(clip: &Motion, track: usize, path: TargetPath) -> Option<Self> {
         let samplers = clip.channels.get(track);
         match path {
@@ -35,8 +35,8 @@ impl WrittenKeys {
         }
     }
 
-    /// `sampler` is nothing where the clip says nothing of its tracks, and nothing inside where the
-    /// track rests.
+    /// `sampler` is `None` if the clip does not specify the interpolation of its tracks, and `Some(None)` if the
+    /// track is at rest.
     fn of_rotations(
         clip: &Motion,
         track: usize,
@@ -107,7 +107,7 @@ impl WrittenKeys {
     }
 }
 
-/// glTF's cubics have two keys at least; one key lasts, whatever joins keys.
+/// Cubics of glTF have at least two keys; a single key becomes a constant, whatever its interpolation.
 fn lasting(sampler: ChannelInterpolation, times: &[f64]) -> ChannelInterpolation {
     match (sampler, times.len()) {
         (ChannelInterpolation::Cubic, 0 | 1) => ChannelInterpolation::Linear,

@@ -1,11 +1,11 @@
-//! Messages of ROS 2 as DDS has them: plain CDR of version 1 or 2, in either order of bytes.
+//! Parses messages of ROS 2 as DDS encodes them: plain CDR of version 1 or 2, in either byte order.
 
 use glam::{DQuat, DVec3};
 
-/// A message that is being read. Why it cannot be is said in words that stand behind the message's name.
+/// A message that is being parsed. Errors are texts that follow the message's name.
 pub(super) struct Cdr<'a> {
     bytes: &'a [u8],
-    /// Numbers are aligned to their sizes, counted from here.
+    /// Offset in the message; numbers are aligned to their sizes from its beginning.
     at: usize,
     is_little: bool,
     /// The largest alignment.
@@ -78,7 +78,7 @@ impl<'a> Cdr<'a> {
         Ok(f64::from_le_bytes(self.number()?))
     }
 
-    /// A text, which ends with a zero.
+    /// Reads a text, which ends with a zero.
     pub(super) fn text(&mut self) -> Result<String, String> {
         let length = self.whole()? as usize;
         let bytes = self.take(length)?;
@@ -88,7 +88,7 @@ impl<'a> Cdr<'a> {
         Ok(text?.to_owned())
     }
 
-    /// How many entries a list of poses has.
+    /// Reads the number of entries of a list of poses.
     pub(super) fn count(&mut self) -> Result<usize, String> {
         let count = self.whole()? as usize;
         let left = self.bytes.len().saturating_sub(self.at);
@@ -100,7 +100,7 @@ impl<'a> Cdr<'a> {
         }
     }
 
-    /// The stamp and the frame.
+    /// Reads the stamp and the frame of a header.
     pub(super) fn header(&mut self) -> Result<(Stamp, String), String> {
         let stamp = Stamp {
             seconds: self.whole()?.cast_signed(),
@@ -109,7 +109,7 @@ impl<'a> Cdr<'a> {
         Ok((stamp, self.text()?))
     }
 
-    /// A position, then x y z w.
+    /// Reads a position, then a quaternion x y z w.
     pub(super) fn pose(&mut self) -> Result<(DVec3, DQuat), String> {
         let mut numbers = [0.0; 7];
         for number in &mut numbers {

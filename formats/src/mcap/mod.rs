@@ -1,8 +1,8 @@
-//! Trajectories in MCAP, the logs of ROS 2: topics of poses, odometry and paths, and transforms between frames.
+//! Trajectories in MCAP, the log format of ROS 2: topics of poses, odometry and paths, and transforms between frames.
 //!
-//! The file is read from its beginning to its end, records and chunks as they come, so that one that was cut
-//! (a robot that lost power) gives all that it holds. The crate `mcap` does not serve here: it asks for no
-//! budget before it unpacks a chunk, and brings decompressors of its own beside those that Parquet takes.
+//! The file is read from its beginning to its end, record by record and chunk by chunk, so that a truncated file (of
+//! a robot that lost power) returns everything that it contains. The crate `mcap` is not used, because it unpacks
+//! chunks without a memory budget and depends on other decompressors than Parquet does.
 
 mod cdr;
 mod records;
@@ -28,7 +28,7 @@ use crate::rate::Precision;
 use crate::source::Source;
 use crate::warnings::Warnings;
 
-/// Poses in a log.
+/// The MCAP format: poses in a log.
 pub static FORMAT: Format = Format {
     name: "mcap",
     summary: "logs of ROS 2: poses, odometry, paths and transforms",
@@ -53,19 +53,20 @@ pub static FORMAT: Format = Format {
     options: &[FormatOption::RawTimes, FormatOption::Duplicates],
 };
 
-/// Bytes of a pose on its way: as it was read, sorted, and as keys.
+/// Bytes of memory of a pose: as it is read, sorted, and as a key.
 const POSE: usize = 2 * size_of::<TimedPose>() + 64;
 
-/// Bytes of a track beside its keys.
+/// Bytes of memory of a track without its keys.
 const TRACK: usize = 400;
 
-/// Digits behind the point of a stamp.
+/// Number of decimals of a stamp in seconds.
 const NANOSECONDS: u32 = 9;
 
-/// Reads a file; `-` is standard input.
+/// Reads an MCAP file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file; those of single tracks are in [`Loaded::refused`].
+/// When the file cannot be opened or is invalid; the first error is returned. Errors of single tracks are in
+/// [`Loaded::refused`].
 pub fn open_mcap(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
@@ -73,9 +74,9 @@ pub fn open_mcap(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnosti
     read_mcap(&name, &bytes, options)
 }
 
-/// Reads the bytes of a file; `name` is what messages call it. One clip: a track for each topic of poses, by the
-/// topic's name, and one for each pair of frames, `parent/child`. Poses are at the stamps of their headers; times
-/// count from the whole second at or before the first.
+/// Reads the bytes of an MCAP file; `name` is the input's name in messages. The file becomes one clip. Each topic of
+/// poses is a track with the topic's name, and each pair of frames is a track named `parent/child`. The time of a
+/// pose is the stamp of its header. Times count from the whole second at or before the first one.
 ///
 /// # Errors
 /// As [`open_mcap`].
@@ -103,7 +104,7 @@ pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Load
     log.into_loaded(options)
 }
 
-/// What a message of a known type holds.
+/// The content of a message of a known type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MessageKind {
     PoseStamped,
@@ -115,7 +116,7 @@ enum MessageKind {
 }
 
 impl MessageKind {
-    /// By the name of a type, with `msg/` in it or without.
+    /// The kind with this name of a type, which may contain `msg/`.
     fn of(schema: &str) -> Option<Self> {
         let (package, rest) = schema.split_once('/')?;
         let name = rest.strip_prefix("msg/").unwrap_or(rest);
@@ -131,14 +132,14 @@ impl MessageKind {
     }
 }
 
-/// Where a body is at a time.
+/// The pose of a body at a time.
 #[derive(Debug, Clone, Copy)]
 struct TimedPose {
     /// Nanoseconds.
     time: i64,
     position: DVec3,
     rotation: DQuat,
-    /// Where its message begins in the file, or in its chunk.
+    /// Offset of its message in the file, or in its chunk.
     offset: u64,
 }
 
@@ -156,11 +157,11 @@ struct Log<'a> {
     name: &'a str,
     budget: &'a Budget,
     tracks: Vec<BodyTrack>,
-    /// The track of a topic, or of two frames.
+    /// The index of the track of a topic, or of a pair of frames.
     track_of: HashMap<[String; 2], usize>,
     /// Topics with messages of other types.
     others: Vec<String>,
-    /// Topics that are refused.
+    /// Topics that cannot be read.
     refused: Vec<(String, Diagnostic)>,
     warnings: Warnings,
 }
@@ -170,7 +171,7 @@ impl Log<'_> {
         Diagnostic::new(self.name, Code::Memory, error.to_string())
     }
 
-    /// Takes the poses of a message; what cannot be read of one refuses its topic.
+    /// Adds the poses of a message. If a message cannot be read, its topic is refused.
     fn message(
         &mut self,
         channel: &McapChannel,
@@ -446,7 +447,7 @@ impl Log<'_> {
 /// Why a message cannot be read.
 enum MessageFault {
     Memory(OverBudget),
-    /// What about it, behind its name.
+    /// The error in the message, as a text that follows its name.
     Message(String),
 }
 

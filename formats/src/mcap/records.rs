@@ -1,4 +1,4 @@
-//! The records of an MCAP file: messages, and what says how they are read.
+//! Reads the records of an MCAP file: messages, and the channels and schemas that describe them.
 
 use std::collections::HashMap;
 use std::io::Read;
@@ -7,37 +7,37 @@ use crate::budget::{Borrowed, Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::warnings::Warnings;
 
-/// How a file begins and ends.
+/// The first and the last bytes of a file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// The kinds of records that matter.
+/// The kinds of records that are read.
 const SCHEMA: u8 = 3;
 const CHANNEL: u8 = 4;
 const MESSAGE: u8 = 5;
 const CHUNK: u8 = 6;
 const DATA_END: u8 = 15;
 
-/// What the messages of a topic are.
+/// The channel of a topic: the type and encoding of its messages.
 #[derive(Debug, Clone)]
 pub(super) struct McapChannel {
     pub(super) topic: String,
-    /// How they are encoded.
+    /// The encoding of the messages.
     pub(super) encoding: String,
-    /// The name of their type.
+    /// The name of the messages' type.
     pub(super) schema: String,
 }
 
 /// A message.
 pub(super) struct Record<'a> {
     pub(super) channel: &'a McapChannel,
-    /// When it was logged, nanoseconds.
+    /// Time at which it was logged, in nanoseconds.
     pub(super) log_time: u64,
     pub(super) data: &'a [u8],
-    /// Where it, or its chunk, begins in the file.
+    /// Offset of the message, or of its chunk, in the file.
     pub(super) offset: u64,
 }
 
-/// A file whose records are read one after another.
+/// A file whose records are read in order.
 pub(super) struct Records<'a> {
     name: &'a str,
     budget: &'a Budget,
@@ -45,15 +45,15 @@ pub(super) struct Records<'a> {
     at: usize,
     schemas: HashMap<u16, String>,
     channels: HashMap<u16, McapChannel>,
-    /// The records of the chunk that is being read, where it is in the file, and how far it is read.
+    /// The records of the current chunk, the chunk's offset in the file, and the offset of the next record in it.
     chunk: Vec<u8>,
     chunk_offset: u64,
     chunk_at: usize,
-    /// The memory of the chunk.
+    /// The budget's memory of the chunk.
     borrowed: Option<Borrowed<'a>>,
 }
 
-/// Fields of a record.
+/// The fields of a record, which are not parsed yet.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -128,10 +128,10 @@ impl<'a> Records<'a> {
         fault
     }
 
-    /// The next message; nothing at the end, which a cut file has too, with a warning.
+    /// The next message; `None` at the end. A truncated file ends with a warning.
     ///
     /// # Errors
-    /// When the file is damaged, or says that it has more than fits into memory.
+    /// When the file is damaged, or claims to contain more than its memory budget allows.
     pub(super) fn next(
         &mut self,
         warnings: &mut Warnings,
@@ -251,13 +251,13 @@ impl<'a> Records<'a> {
         }
     }
 
-    /// Takes the memory of an entry with texts of so many bytes.
+    /// Takes memory from the budget for an entry with texts of `length` bytes.
     fn keep(&self, length: usize) -> Result<(), Diagnostic> {
         let charged = self.budget.take(length + 200, 1);
         charged.map_err(|error| Diagnostic::new(self.name, Code::Memory, error.to_string()))
     }
 
-    /// The records of a chunk.
+    /// The unpacked records of a chunk.
     fn unpacked(&self, content: &[u8], offset: u64) -> Result<(Vec<u8>, Borrowed<'a>), Diagnostic> {
         let mut fields = Fields(content);
         let head = (|| {

@@ -1,4 +1,4 @@
-//! The keys of a clip as times and numbers, and clips whose keys are samples.
+//! The key times of a clip, and clips whose keys are samples.
 
 use glam::{Quat, Vec3};
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet};
@@ -7,7 +7,7 @@ use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::sample::{ChannelMethods, Samples};
 
 impl Motion {
-    /// The times of all keys of all channels, in order, each once.
+    /// The key times of all channels, in increasing order, without repetitions.
     #[must_use]
     pub fn key_times(&self) -> Vec<f64> {
         let mut times: Vec<f64> = Vec::new();
@@ -24,8 +24,8 @@ impl Motion {
         times
     }
 
-    /// The clip with its samples at some frames as keys, joined by straight lines and arcs; steps stay
-    /// steps.
+    /// The clip with its samples at some times as keys, joined by straight lines and arcs. Channels with steps keep
+    /// their steps.
     ///
     /// # Errors
     /// As [`Engine::evaluate`].
@@ -34,10 +34,10 @@ impl Motion {
         Ok(self.with_keys(&methods.sample(engine, self, frames)?)?)
     }
 
-    /// The clip with some samples as keys, as [`sampled`](Self::sampled) has them.
+    /// The clip with `samples` as keys, as [`sampled`](Self::sampled) makes it.
     ///
     /// # Errors
-    /// When a sample is no key.
+    /// When a sample is not a valid key.
     pub fn with_keys(&self, samples: &Samples) -> Result<Self, TrackError> {
         let tracks = self.set.track_count();
         let mut set = TrackSet::new();
@@ -76,8 +76,8 @@ impl Motion {
         })
     }
 
-    /// The samples at the first and the last key alone, for formats that write the clip's own keys
-    /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)) in their place.
+    /// The samples at the first and the last key time only, for formats that write the keys of the clip
+    /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)) instead.
     ///
     /// # Errors
     /// As [`Engine::evaluate`].
@@ -89,7 +89,7 @@ impl Motion {
         methods.sample(engine, self, &SampleTimes::at(times))
     }
 
-    /// The keys of all channels.
+    /// Number of keys of all channels.
     #[must_use]
     pub fn key_count(&self) -> usize {
         self.key_lists().map(<[f64]>::len).sum()

@@ -1,16 +1,16 @@
-//! Times that a file rounded, put back on the frames that they were rounded from.
+//! Restores times that a file rounded to the frames from which they were rounded.
 //!
-//! glTF keeps times in f32, text has few decimals. A key at frame 17 of 24 fps is then at 0.70833331 s,
-//! and sampling at 120 fps would miss it, and the end, by 2e-9 s.
+//! glTF stores times in f32, and text has few decimals. A key at frame 17 of 24 fps is then at 0.70833331 s, and
+//! sampling at 120 fps would miss it, and the end, by 2e-9 s.
 
 use tumble::{Channel, FrameRate};
 
 use crate::motion::Motion;
 use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of};
 
-/// Puts lists of times of one clip on the frames of the rate that fits all of them; where there is none,
-/// each list on those of the rate that fits it alone, or it stays as it is. Gives the common rate of the keys, if
-/// there is one.
+/// Moves the lists of times of one clip to the frames of the rate that fits all of them. If there is none, each list
+/// is moved to the frames of the rate that fits it, or stays unchanged. Returns the common rate of the keys, if there
+/// is one.
 pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<FrameRate> {
     let common = of(&RateSource::Times(lists, precision));
     for list in &mut *lists {
@@ -32,8 +32,8 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
     common.rate().or_else(again)
 }
 
-/// Puts times on frames. Different times do not become one: of two in the same frame, as an exporter
-/// makes them of a cut, the nearer goes there, and the other stays as far from it as it was.
+/// Moves times to frames. Different times stay different: if two belong to the same frame, as an exporter writes a
+/// cut, the nearer one is moved to it, and the other keeps its distance from it.
 fn put(list: &mut [f64], found: FrameGrid) {
     let on_frame = |time: f64| frame_time(found.grid, found.phase, time);
     let stored = list.to_vec();
@@ -53,13 +53,14 @@ fn put(list: &mut [f64], found: FrameGrid) {
     }
 }
 
-/// Which times equal the one before.
+/// For each time but the first, whether it equals the one before.
 fn same(list: &[f64]) -> Vec<bool> {
     list.windows(2).map(|pair| pair[0] == pair[1]).collect()
 }
 
 impl Motion {
-    /// The rate of the keys, if there are keys on neighbouring frames of it, and all lie on its frames.
+    /// The rate of the keys: all key times are frames of it, and some are neighbouring frames. `None` if there is no
+    /// such rate.
     #[must_use]
     pub fn rate_of_keys(&self) -> Option<FrameRate> {
         let channels = [Channel::Translation, Channel::Scale];

@@ -1,14 +1,14 @@
-//! Some tracks of a clip as a clip of their own.
+//! Makes a clip of some tracks of a clip.
 
 use tumble::TrackError;
 
 use crate::motion::Motion;
 
 impl Motion {
-    /// The clip of these tracks, in that order. A joint whose parent is not among them is a root.
+    /// The clip of these tracks, in this order. A joint whose parent is not among them becomes a root.
     ///
     /// # Errors
-    /// When there is no such track.
+    /// When a track does not exist.
     pub fn select(&self, tracks: &[usize]) -> Result<Self, TrackError> {
         let set = self.set.select(tracks.iter().copied())?;
         let mut new_index = vec![None; self.set.track_count()];

@@ -1,8 +1,7 @@
-//! The arrays of a file: the members of a ZIP archive, or the one array of an NPY file.
+//! The arrays of a file: the members of a ZIP archive, or the only array of an NPY file.
 //!
-//! An archive is taken in whole, and its directory is checked before anything is unpacked: names,
-//! encryption, and sizes that its bytes cannot hold. Members are unpacked one at a time, when they
-//! are asked for.
+//! An archive is read into memory, and its directory is checked before anything is unpacked: names, encryption, and
+//! sizes that its bytes cannot contain. Members are unpacked one at a time, when they are requested.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -20,9 +19,9 @@ use crate::npz::array::Array;
 use crate::npz::header::{ArrayHeader, Element, LONGEST_START};
 use crate::text::lines::Limits;
 
-/// An open archive, all of whose bytes are held.
+/// An open archive in memory.
 pub(crate) struct Archive {
-    /// What messages call it.
+    /// The file's name in messages.
     pub(crate) file: String,
     bytes: Vec<u8>,
     pub(crate) members: Vec<Member>,
@@ -31,11 +30,11 @@ pub(crate) struct Archive {
 
 /// One file in the archive.
 pub(crate) struct Member {
-    /// What the archive calls it.
+    /// Its path in the archive.
     pub(crate) path: String,
-    /// What its array is called: the path without `.npy`.
+    /// The name of its array: the path without `.npy`.
     pub(crate) name: String,
-    /// The array's header, or why there is none.
+    /// The header of the array, or why there is none.
     pub(crate) header: Result<ArrayHeader, String>,
     pub(crate) is_deflated: bool,
     data: Range<usize>,
@@ -43,10 +42,10 @@ pub(crate) struct Member {
     checksum: Option<u32>,
 }
 
-/// What the only array of an NPY file is called: as `numpy.savez` calls arrays without a name.
+/// The name of the only array of an NPY file: `numpy.savez` uses it for arrays without a name.
 pub(crate) const ONLY_ARRAY: &str = "arr_0";
 
-/// No deflated byte stands for more bytes than this: 258 by two bits.
+/// The largest number of bytes for each deflated byte: 258 bytes for two bits.
 const LARGEST_RATIO: u64 = 1032;
 
 impl Archive {
@@ -153,26 +152,26 @@ impl Archive {
         }
     }
 
-    /// Takes memory for `count` things of `bytes` each that the file is to have.
+    /// Takes memory for `count` elements of `bytes` each from the file's budget.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
         self.budget
             .take(count, bytes)
             .map_err(|error| Diagnostic::new(&self.file, Code::Memory, error.to_string()))
     }
 
-    /// The index of the member with that array name.
+    /// The index of the member with this array name.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         let mut members = self.members.iter();
         members.position(|member| member.name == name && member.path != name)
     }
 
-    /// The shape of the array of that name.
+    /// The shape of the array with this name.
     pub(crate) fn shape(&self, name: &str) -> Option<&[usize]> {
         let header = self.members[self.find(name)?].header.as_ref();
         Some(&header.ok()?.shape)
     }
 
-    /// A fault of a member.
+    /// An error about a member.
     pub(crate) fn refuse(&self, member: usize, code: Code, message: String) -> Diagnostic {
         let refusal = Diagnostic::new(&self.file, code, message);
         match &*self.members[member].path {
@@ -181,8 +180,7 @@ impl Archive {
         }
     }
 
-    /// The header of a member that is an array whose bytes may be looked into, and are as many as
-    /// its shape says.
+    /// The header of a member, which must be an array of plain values with as many bytes as its shape requires.
     pub(crate) fn header(&self, member: usize) -> Result<&ArrayHeader, Diagnostic> {
         let header = self.members[member].header.as_ref().map_err(|why| {
             let message = format!("the array's header cannot be read: {why}");
@@ -216,7 +214,7 @@ impl Archive {
         Ok(Array { header, bytes })
     }
 
-    /// The array of that name, if there is one.
+    /// The array with this name, if there is one.
     pub(crate) fn array_named(&self, name: &str) -> Result<Option<Array<'_>>, Diagnostic> {
         self.find(name).map(|member| self.array(member)).transpose()
     }
@@ -285,7 +283,7 @@ impl Archive {
 }
 
 impl Member {
-    /// The first bytes, as many as a header has at most.
+    /// The first bytes, as many as the longest header has.
     fn start<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
         let packed = &bytes[self.data.clone()];
         if !self.is_deflated {
@@ -299,7 +297,7 @@ impl Member {
     }
 }
 
-/// Refuses members whose bytes are those of others too: a few bytes would unpack to any number.
+/// Refuses members that share bytes: a few bytes could otherwise unpack to any number.
 fn refuse_overlaps(file: &str, members: &[Member]) -> Result<(), Diagnostic> {
     let mut ranges: Vec<(&Range<usize>, &str)> = members
         .iter()
@@ -322,8 +320,8 @@ fn refuse_overlaps(file: &str, members: &[Member]) -> Result<(), Diagnostic> {
     }
 }
 
-/// A name that two entries of the central directory share. APPNOTE.TXT 4.3.12: a signature, and at
-/// 28, 30 and 32 the lengths of the name, the extra field and the comment behind 46 bytes.
+/// A name that two entries of the central directory share. From APPNOTE.TXT 4.3.12: a signature, and at 28, 30 and 32
+/// the lengths of the name, the extra field and the comment, which follow 46 bytes.
 fn repeated_name(bytes: &[u8], directory: u64) -> String {
     let mut names = HashSet::new();
     let mut at = usize::try_from(directory).unwrap_or(usize::MAX);

@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use crate::npz::header::{ArrayHeader, Element};
 
-/// An array whose bytes are all there.
+/// An array whose bytes are complete.
 pub(crate) struct Array<'a> {
     pub(crate) header: &'a ArrayHeader,
-    /// With the header.
+    /// The bytes, with the header.
     pub(crate) bytes: Cow<'a, [u8]>,
 }
 
-/// Where the numbers of each track and frame are, counted in numbers.
+/// The locations of the numbers of each track and frame, counted in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Strides {
     /// The first component of the first frame of the first track.
@@ -25,16 +25,16 @@ pub(crate) struct Strides {
     pub(crate) component: usize,
 }
 
-/// Makes a key of its numbers. A trait instead of a closure, because it is called for every key from
-/// loops for each type of number, and only methods can be marked for inlining: a call passes the
-/// numbers through memory, and takes longer than what it computes.
+/// Makes a key of its numbers. This is a trait and not a closure, because it is called for every key in loops for
+/// each type of number, and only methods can be marked for inlining: a call passes the numbers through memory, which
+/// takes longer than the computation.
 pub(crate) trait Make<const N: usize> {
     type Key;
 
     fn make(numbers: [f64; N]) -> Self::Key;
 }
 
-/// The numbers themselves.
+/// Returns the numbers themselves.
 pub(crate) struct AsStored;
 
 impl<const N: usize> Make<N> for AsStored {
@@ -46,14 +46,14 @@ impl<const N: usize> Make<N> for AsStored {
     }
 }
 
-/// Tracks that are read side by side: of rows of many tracks each cache line is then used whole.
+/// Number of tracks that are read together, so that of rows of many tracks each cache line is used completely.
 pub(crate) const TOGETHER: usize = 8;
 
-/// Fewer keys than this are read before another thread has woken up.
+/// Fewer keys than this are read faster by one thread.
 pub(crate) const MIN_PARALLEL_KEYS: usize = 1 << 14;
 
-/// Frames whose rows, some cache lines each, stay in the second cache from the first of those tracks
-/// to the last.
+/// Number of frames whose rows, some cache lines each, stay in the second cache from the first of these tracks to the
+/// last.
 const IN_CACHE: usize = 512;
 
 impl Array<'_> {
@@ -61,8 +61,8 @@ impl Array<'_> {
         &self.bytes[self.header.start..]
     }
 
-    /// For each track, `finish` of the list of what `M` makes of the numbers of every frame, on all
-    /// threads where there are many. Numbers must lie within the array, which must be of floats.
+    /// For each track, the result of `finish` for the list of keys that `M` makes of the numbers of every frame, on
+    /// all threads if there are many. The numbers must lie within the array, and must be floats.
     pub(crate) fn tracks<M: Make<N>, const N: usize, U: Send>(
         &self,
         at: Strides,
@@ -106,7 +106,7 @@ impl Array<'_> {
         together.unwrap_or_else(|_| starts.iter().flat_map(block).collect())
     }
 
-    /// The keys of some tracks, each a list.
+    /// The keys of some tracks, one list for each.
     fn gather<M: Make<N>, const SIZE: usize, const N: usize>(
         &self,
         (at, tracks, frames): (Strides, Range<usize>, usize),
@@ -128,7 +128,7 @@ impl Array<'_> {
         lists
     }
 
-    /// Every number in C order; `None` for what are no numbers.
+    /// Every number in C order; `None` if the elements are not numbers.
     pub(crate) fn numbers(&self) -> Option<Vec<f64>> {
         let values = self.values();
         let big = self.header.is_big_endian;
@@ -159,10 +159,10 @@ impl Array<'_> {
         Some(self.header.in_c_order(stored))
     }
 
-    /// Every text in C order, without the zeros that fill it up.
+    /// Every text in C order, without the zeros that pad it.
     ///
     /// # Errors
-    /// What is no text, in words.
+    /// Why an element is not a text, as text.
     pub(crate) fn texts(&self) -> Result<Vec<String>, String> {
         let big = self.header.is_big_endian;
         let size = self.header.element.size().unwrap_or(0);

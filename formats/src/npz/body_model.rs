@@ -1,5 +1,5 @@
-//! Bodies of SMPL, SMPL-H and SMPL-X as their models have them: where the joints of a shape are. The models
-//! have a licence of their own, and are brought by whoever has one.
+//! Models of SMPL, SMPL-H and SMPL-X bodies: the joint positions of a shape. The models have separate licences, and
+//! users supply the files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,10 +10,10 @@ use crate::npz::plan::read_numbers;
 use crate::source::Source;
 use crate::text::lines::Limits;
 
-/// The arrays of a motion that say its body's shape.
+/// The arrays of a motion that contain the shape of the body.
 pub(crate) const SHAPE: [&str; 2] = ["betas", "gender"];
 
-/// What a motion's file says of the shape; nothing of what it does not say in numbers and text.
+/// The shape that a motion's file contains; empty where it is not in numbers or text.
 pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
     let mut shape = Shape::default();
     if let Some(member) = archive.find("betas") {
@@ -33,12 +33,14 @@ pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
     Ok(shape)
 }
 
-/// Where each joint of a clip's body is relative to its parent, x y z of each in the order of the tracks and
-/// of the first where `trans` is 0, by a model: `J_regressor (v_template + shapedirs betas)`. Of a folder the
-/// model for the body's gender is taken.
+/// The offsets of the joints of a clip's SMPL body from their parents, as a model defines them: x, y, z of each
+/// joint, in the order of the tracks. For the first joint it is the position when `trans` is 0. The positions of
+/// joints are `J_regressor (v_template + shapedirs betas)`. If `path` is a folder, the model for the gender of the
+/// body is used.
 ///
 /// # Errors
-/// When the clip is no body of SMPL, there is no such model, or it has other joints or fewer betas.
+/// When the clip is not an SMPL body, when there is not exactly one such model, or when the model has other joints or
+/// fewer betas.
 pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f64>, Diagnostic> {
     let refuse =
         |message: String| Diagnostic::new(path.display().to_string(), Code::BodyModel, message);
@@ -81,7 +83,7 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     Ok((0..tracks).flat_map(offset).collect())
 }
 
-/// The one model of a folder for a gender: `SMPLH_FEMALE.npz`, `female/model.npz`.
+/// The only model for a gender in a folder: `SMPLH_FEMALE.npz`, `female/model.npz`.
 fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
     let refuse =
         |message: String| Diagnostic::new(folder.display().to_string(), Code::BodyModel, message);
@@ -130,7 +132,7 @@ fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
     }
 }
 
-/// The arrays that say where joints are.
+/// The arrays that determine joint positions.
 struct Model {
     vertices: usize,
     betas: usize,
@@ -186,7 +188,7 @@ impl Model {
         read_numbers(archive, member)
     }
 
-    /// Where the joints of a shape are.
+    /// The joint positions of a shape.
     fn joints(&self, archive: &Archive, betas: &[f64]) -> Result<Vec<[f64; 3]>, Diagnostic> {
         if betas.len() > self.betas {
             let message = format!(

@@ -1,4 +1,4 @@
-//! A plan's arrays as a clip.
+//! Reads the arrays of a plan as a clip.
 
 use std::ops::Range;
 
@@ -22,13 +22,13 @@ use crate::rotation_form::RotationForm;
 use crate::signs::continue_signs;
 use crate::warnings::Warnings;
 
-/// Bytes of a key, while it is read and in the set: its time, its rotation and its vectors.
+/// Bytes of memory of a key while it is read and in the set: its time, its rotation and its vectors.
 const KEY: usize = 64;
 
-/// Bytes of a track beside its keys.
+/// Bytes of memory of a track without its keys.
 const TRACK: usize = 400;
 
-/// Reads the clip. The plan then knows its rate.
+/// Reads the clip, and stores its rate in the plan.
 pub(crate) fn read(
     archive: &Archive,
     plan: &mut ArchivePlan,
@@ -143,7 +143,7 @@ pub(crate) fn read(
     Ok(motion)
 }
 
-/// The frames that stay where times repeat: see [`Origin::increasing`].
+/// The frames that are kept if times repeat: see [`Origin::increasing`].
 fn kept_frames(
     archive: &Archive,
     plan: &ArchivePlan,
@@ -168,7 +168,7 @@ fn kept_frames(
     origin.increasing(times, equal, warnings)
 }
 
-/// The numbers of all tracks of a part at one frame.
+/// The numbers of all tracks of an array at one frame.
 fn frame_of(part: &KeyArray, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
     let mut at = part.at;
     at.first += frame * at.frame;
@@ -186,11 +186,11 @@ fn frame_of(part: &KeyArray, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
 enum TrackKeys {
     /// Unit quaternions.
     Rotations(Vec<Quat>),
-    /// Translations or scales, and what translations are to be moved by.
+    /// Translations or scales, and the vector to add to translations.
     Vectors(DVec3, Vec<Vec3>),
 }
 
-/// The keys of some tracks of a part.
+/// The keys of some tracks of an array.
 fn read_keys(
     archive: &Archive,
     part: &KeyArray,
@@ -244,7 +244,7 @@ fn quaternion(order: ComponentOrder, [a, b, c, d]: [f64; 4]) -> DQuat {
 
 /// Unit quaternions of rotation vectors.
 struct FromVector;
-/// Unit quaternions, or NaN where something is to be said.
+/// Unit quaternions, or NaN if a warning or an error is needed.
 struct QuietXyzw;
 /// Likewise.
 struct QuietWxyz;
@@ -288,7 +288,7 @@ impl Make<3> for InF32 {
     }
 }
 
-/// The keys of a track that has some of which something is to be said.
+/// The keys of a track of which at least one needs a warning or an error.
 fn remarkable(
     archive: &Archive,
     part: &KeyArray,
@@ -324,7 +324,7 @@ fn remarkable(
     origin.unit(keys.map(|numbers| quaternion(order, numbers)), warnings)
 }
 
-/// The rotations of some tracks of a part that are no quaternions.
+/// The rotations of some tracks of an array that are not quaternions.
 fn of_form(
     archive: &Archive,
     part: &KeyArray,
@@ -358,7 +358,7 @@ fn of_form(
     tracks.zip(lists).map(check).collect()
 }
 
-/// The vectors of some tracks of a part.
+/// The vectors of some tracks of an array.
 fn vectors(
     archive: &Archive,
     part: &KeyArray,

@@ -1,4 +1,4 @@
-//! A file that is written again in the layout that it was read in.
+//! A file that is written again in the layout in which it was read.
 
 use std::fmt;
 use std::io::Write;
@@ -18,7 +18,7 @@ use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, times};
 use crate::npz::{FORMAT, linear, smpl, tumble_layout};
 use crate::warnings::Warnings;
 
-/// The archive, all of whose members are there, and what they mean.
+/// The archive with all of its members, and their meaning.
 pub(super) struct NpzDocument {
     archive: Archive,
     plan: ArchivePlan,
@@ -34,19 +34,19 @@ impl fmt::Debug for NpzDocument {
     }
 }
 
-/// What becomes of a member.
+/// The use of a member in the new file.
 enum MemberOutcome<'a> {
-    /// New keys.
+    /// New keys are written.
     Keys(&'a KeyArray),
     Rate,
     Times,
-    /// The same bytes.
+    /// The same bytes are written.
     Constant,
-    /// Numbers for each frame, interpolated linearly.
+    /// Numbers for each frame are interpolated linearly.
     Linear(usize),
-    /// What nobody can tell how to sample.
+    /// The member is left out, because its interpolation is unknown.
     LeftOut,
-    /// Nothing: another array says it.
+    /// The member is left out, because another array contains its data.
     Replaced,
 }
 
@@ -64,7 +64,7 @@ impl NpzDocument {
         Diagnostic::new(&self.archive.file, code, message).into()
     }
 
-    /// The arrays that hold keys: those that were read, and those that repeat parts of them.
+    /// The arrays that contain keys: those that were read, and those that repeat parts of them.
     fn parts(&self) -> Result<Vec<KeyArray>, Diagnostic> {
         let mut parts = self.plan.parts.clone();
         let is_whole = |part: &&KeyArray| {
@@ -102,7 +102,7 @@ impl NpzDocument {
         Ok(parts)
     }
 
-    /// What becomes of each member.
+    /// The use of each member.
     fn outcomes<'a>(
         &self,
         parts: &'a [KeyArray],
@@ -157,7 +157,7 @@ impl NpzDocument {
         Ok(outcomes)
     }
 
-    /// The members of some fate, for messages.
+    /// The members for which `is_meant` is true, for messages.
     fn named(
         &self,
         outcomes: &[MemberOutcome<'_>],
@@ -174,7 +174,7 @@ impl NpzDocument {
         }
     }
 
-    /// The axis along which an array has an entry for each frame, if it has.
+    /// The axis of frames of an array, if it has one.
     fn frame_axis(&self, member: usize) -> Option<usize> {
         // Of one frame, every list of one entry would be such.
         if self.plan.constants.contains(&member) || self.plan.frames < 2 {
@@ -186,7 +186,7 @@ impl NpzDocument {
         first.rposition(|&length| length == self.plan.frames)
     }
 
-    /// Writes the members, then the rate or the times where none of them says when frames are.
+    /// Writes the members; then the rate or the times, if no member contains when frames are.
     fn write_members(
         &self,
         outcomes: &[MemberOutcome<'_>],
@@ -258,8 +258,8 @@ impl NpzDocument {
 }
 
 impl Document for NpzDocument {
-    /// Whole frames of the rate from the first time on: arrays of frames have no room for a last
-    /// one that is shorter.
+    /// Whole frames of the rate from the first time on, because arrays of frames cannot store a shorter last
+    /// interval.
     fn times(&self, _clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
         let frames = SampleTimes::rate(rate).resolve(self.plan.tracks, self.span);
         let timeline = frames.map_err(|error| {
@@ -272,7 +272,7 @@ impl Document for NpzDocument {
         format.name == FORMAT.name
     }
 
-    /// The arrays that no layout of clips has.
+    /// The arrays that no layout of clips contains.
     fn other_contents(&self) -> Vec<String> {
         let is_key = |member_index: usize| {
             self.plan
@@ -378,7 +378,7 @@ impl Document for NpzDocument {
     }
 }
 
-/// The type of a rate: as it was, if it can hold the new one.
+/// The type of a rate: as before, if it can represent the new rate.
 fn rate_element(was: &Element, rate: Option<FrameRate>) -> Element {
     let is_whole = rate.is_some_and(|rate| rate.per_second().fract() == 0.0);
     let is_small = rate.is_some_and(|rate| rate.per_second() < 128.0);

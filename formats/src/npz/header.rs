@@ -1,27 +1,27 @@
 //! The header of an NPY array: element type, order and shape.
 //!
-//! Parsed here, whoever reads the array, because the header of a damaged or hostile file can be anything:
-//! the crate `npyz` multiplies shapes without a look at their size, allocates what a header says of its
-//! own length, and tries nested brackets twice at each level. Tests read with it what is written here.
+//! It is parsed here, not by a crate, because the header of a damaged or hostile file can contain anything: the crate
+//! `npyz` multiplies shapes without checking their size, allocates memory by the length that a header claims for
+//! itself, and parses nested brackets twice at each level. Tests read the written headers with it.
 
 use std::fmt;
 
-/// Headers are up to 64 KiB; `NumPy` itself refuses those over 10 000 bytes.
+/// The largest length of a header, 64 KiB; `NumPy` refuses headers over 10 000 bytes.
 const LONGEST: usize = 1 << 16;
 
-/// Bytes in front of the header's text at most.
+/// The largest number of bytes before the numbers.
 pub(crate) const LONGEST_START: usize = LONGEST + 12;
 
-/// What an array's bytes are.
+/// The type, order and shape of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ArrayHeader {
     pub(crate) element: Element,
-    /// Most significant byte first.
+    /// Whether the most significant byte is first.
     pub(crate) is_big_endian: bool,
-    /// The first axis is the fastest.
+    /// Whether the first axis is the fastest.
     pub(crate) is_fortran: bool,
     pub(crate) shape: Vec<usize>,
-    /// Where the numbers begin.
+    /// Offset of the numbers.
     pub(crate) start: usize,
 }
 
@@ -31,22 +31,22 @@ pub(crate) enum Element {
     F16,
     F32,
     F64,
-    /// Whole numbers of so many bytes: 1, 2, 4 or 8.
+    /// Signed integers of 1, 2, 4 or 8 bytes.
     Signed(usize),
-    /// Likewise; truth values are such of one byte.
+    /// Unsigned integers of 1, 2, 4 or 8 bytes; truth values have one byte.
     Unsigned(usize),
-    /// Text of so many UTF-32 characters.
+    /// Text with this number of UTF-32 characters.
     Unicode(usize),
-    /// Text of so many bytes.
+    /// Text with this number of bytes.
     Bytes(usize),
-    /// Pickled Python objects, which are never looked into.
+    /// Pickled Python objects, which are never read.
     Object,
-    /// Complex numbers, dates, records and all else, by `NumPy`'s name.
+    /// Complex numbers, dates, records and others, by their name in `NumPy`.
     Other(String),
 }
 
 impl Element {
-    /// Bytes of an element, where it is known.
+    /// Bytes of an element, if known.
     pub(crate) fn size(&self) -> Option<usize> {
         match *self {
             Self::F16 => Some(2),
@@ -83,7 +83,7 @@ impl fmt::Display for Element {
     }
 }
 
-/// `(4, 121, 4) f4`.
+/// Displays `(4, 121, 4) f4`.
 impl fmt::Display for ArrayHeader {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", shape_text(&self.shape), self.element)
@@ -100,7 +100,7 @@ pub(crate) fn shape_text(shape: &[usize]) -> String {
 }
 
 impl ArrayHeader {
-    /// How many numbers apart neighbours along each axis are.
+    /// For each axis, the distance between neighbours along it, in numbers.
     pub(crate) fn strides(&self) -> Vec<usize> {
         let mut strides = vec![1; self.shape.len()];
         let mut next = 1;
@@ -116,7 +116,7 @@ impl ArrayHeader {
         strides
     }
 
-    /// Elements as they are stored, in C order.
+    /// Converts stored elements to C order.
     pub(crate) fn in_c_order<T: Clone>(&self, stored: Vec<T>) -> Vec<T> {
         if !self.is_fortran || self.shape.len() < 2 {
             return stored;
@@ -134,10 +134,10 @@ impl ArrayHeader {
             .collect()
     }
 
-    /// Reads the header that `bytes` begin with.
+    /// Parses the header at the beginning of `bytes`.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// The error in it, as text.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Self, String> {
         let start = bytes.strip_prefix(b"\x93NUMPY");
         let rest = start.ok_or("it does not begin with `\\x93NUMPY`")?;
@@ -185,7 +185,7 @@ impl ArrayHeader {
         })
     }
 
-    /// Bytes of all elements; `None` if their size is unknown, or is more than there can be.
+    /// Bytes of all elements; `None` if their size is unknown or the product overflows.
     pub(crate) fn byte_count(&self) -> Option<usize> {
         let mut lengths = self.shape.iter();
         lengths.try_fold(self.element.size()?, |bytes, &length| {
@@ -193,8 +193,8 @@ impl ArrayHeader {
         })
     }
 
-    /// The header's bytes, little endian and in C order, as `NumPy` writes them: to a multiple of
-    /// 64 bytes.
+    /// The bytes of the header, for little-endian elements in C order, padded to a multiple of 64 bytes as by
+    /// `NumPy`.
     pub(crate) fn write(element: &Element, shape: &[usize]) -> Vec<u8> {
         let mark = if element.size() == Some(1) { '|' } else { '<' };
         let shape = shape_text(shape);
@@ -211,7 +211,7 @@ impl ArrayHeader {
     }
 }
 
-/// Takes a Python literal to pieces, as far as headers need it.
+/// Parses the Python literals of headers.
 struct Scanner<'a> {
     text: &'a str,
 }
@@ -273,7 +273,7 @@ impl<'a> Scanner<'a> {
         Ok(shape)
     }
 
-    /// The type, and whether it is big endian. A record is a list, which is passed over.
+    /// Parses the type, and returns whether it is big-endian. A record is a list, which is skipped.
     fn descr(&mut self) -> Result<(Element, bool), String> {
         if !self.take('[') {
             return element(self.string()?);

@@ -1,11 +1,11 @@
-//! Numbers for each frame, of which nothing is known, at other times: straight lines between them.
+//! Interpolates numbers of unknown meaning for each frame linearly.
 
 use std::io;
 
 use crate::npz::array::Array;
 
-/// Gives the numbers of an array at new times, in C order; `axis` is that of the frames, whose times
-/// are `times`. Before the first and after the last frame they hold.
+/// Passes the numbers of an array at `new_times` to `put`, in C order. `axis` is the axis of the frames, whose times
+/// are `times`. Before the first and after the last frame the numbers are constant.
 pub(super) fn resample(
     array: &Array<'_>,
     axis: usize,
@@ -34,7 +34,7 @@ pub(super) fn resample(
     Ok(())
 }
 
-/// The frame at or before a time, and how much of the way to the next one has passed.
+/// The frame at or before a time, and the fraction of the interval after it.
 fn frame_at(times: &[f64], time: f64) -> (usize, f64) {
     let after = times.partition_point(|&other| other <= time);
     match (after.checked_sub(1), times.get(after)) {

@@ -1,7 +1,7 @@
-//! Arrays that a person tells the meaning of: `rotations=keys:wxyz,time=t`.
+//! Arrays whose meaning a user specifies: `rotations=keys:wxyz,time=t`.
 //!
-//! `rotations`, `translations`, `scales`, `time`, `names`, `parents` and `fps` are what they say;
-//! any other name is that of a track, whose quaternions the array holds.
+//! `rotations`, `translations`, `scales`, `time`, `names`, `parents` and `fps` are the arrays of these data. Any
+//! other name is that of a track with the quaternions in the array.
 
 use tumble::Layout;
 
@@ -13,7 +13,7 @@ use crate::npz::header::shape_text;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, check_float};
 use crate::rotation_form::RotationForm;
 
-/// Names in a map that are no tracks.
+/// Names in a map that are not tracks.
 const ROLES: [&str; 7] = [
     "rotations",
     "translations",
@@ -24,7 +24,7 @@ const ROLES: [&str; 7] = [
     "fps",
 ];
 
-/// The plan that a map makes.
+/// Makes the plan of a map.
 pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<ArchivePlan, Diagnostic> {
     let mut plan = ArchivePlan::default();
     if let Some(time) = map.get("time") {
@@ -106,7 +106,7 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<ArchivePlan, Diagnost
     Ok(plan)
 }
 
-/// What the numbers of an array of rotations are.
+/// The form of the rotations in an array.
 fn rotations(entry: &Entry) -> KeyKind {
     match entry.form() {
         RotationForm::Quaternion(order) => KeyKind::Quaternion(order),
@@ -114,7 +114,7 @@ fn rotations(entry: &Entry) -> KeyKind {
     }
 }
 
-/// What is known of the axes of arrays before they are looked at.
+/// The known lengths of axes, before arrays are read.
 #[derive(Clone, Copy)]
 struct Lengths {
     frames: Option<usize>,
@@ -137,7 +137,7 @@ fn shape_of(archive: &Archive, member: usize) -> Result<&[usize], Diagnostic> {
     Ok(&archive.header(member)?.shape)
 }
 
-/// An array of one track (frames, numbers), or of several, whose axes are known by their lengths.
+/// An array of one track (frames, numbers), or of several, whose axes are recognised by their lengths.
 fn part(
     archive: &Archive,
     entry: &Entry,
@@ -213,8 +213,7 @@ fn part(
     Ok((part, frame.1))
 }
 
-/// Which axis is that of the frames: the one that is as long as the times are, or the one beside
-/// that of the names.
+/// The layout of an array: the axis of frames is as long as the times, or the other axis is as long as the names.
 fn layout_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code, String)> {
     let fits = |tracks: usize, frames: usize| {
         lengths.frames.is_none_or(|known| known == frames)

@@ -1,9 +1,9 @@
-//! NPZ, `NumPy`'s archives of arrays, and arrays alone (NPY): motion of SMPL bodies, of bodies in the
-//! world, Tumble's layout, and arrays whose meaning `--map` says.
+//! NPZ, archives of `NumPy` arrays, and single arrays (NPY): motion of SMPL bodies, motion of bodies in the world,
+//! Tumble's layout, and arrays whose meaning the option `--map` specifies.
 //!
 //! `archive` lists the arrays without unpacking them. `tumble_layout`, `smpl`, `world_bodies` or `mapped` recognises
-//! what they mean and makes a `plan` of it; `clip` reads the arrays of a plan as a clip. `document` keeps archive
-//! and plan, so that the file can be written again in its layout; `write` writes clips of other formats.
+//! their meaning and makes a `plan`; `clip` reads the arrays of a plan as a clip. `document` keeps the archive and
+//! the plan, so that the file can be written again in its layout; `write` writes clips of other formats.
 
 mod archive;
 pub(crate) mod array;
@@ -33,7 +33,7 @@ use crate::npz::document::NpzDocument;
 use crate::source::Source;
 use crate::warnings::Warnings;
 
-/// `NumPy`'s archives of arrays.
+/// The NPZ format: archives of `NumPy` arrays.
 pub static FORMAT: Format = Format {
     name: "npz",
     summary: "a NumPy archive: motion of AMASS and SMPL, or arrays of Tumble",
@@ -75,17 +75,17 @@ pub static FORMAT: Format = Format {
 /// Reads an NPZ file.
 ///
 /// # Errors
-/// The first fault that refuses it.
+/// When the file cannot be opened or is invalid; the first error is returned.
 fn open_npz(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
     read_npz(&file, source.into_bytes(options.limits.file)?, options)
 }
 
-/// Reads an NPZ file that is in memory; `file` is what messages call it.
+/// Reads the bytes of an NPZ file; `file` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses it.
+/// When the input is invalid; the first error is returned.
 pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let archive = Archive::open(file, bytes, options.limits)?;
     let mut warnings = Warnings::new(file);
@@ -119,19 +119,19 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     })
 }
 
-/// The numbers of an NPY file, whatever they mean.
+/// The numbers of an NPY file, without their meaning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NumberArray {
-    /// The length of each axis.
+    /// Length of each axis.
     pub shape: Vec<usize>,
-    /// All of them, the last axis fastest.
+    /// All numbers; the last axis is the fastest.
     pub values: Vec<f64>,
 }
 
 /// Reads the numbers of an NPY file.
 ///
 /// # Errors
-/// The first fault that refuses it; an array of anything but numbers is one.
+/// When the file cannot be opened, is invalid, or contains anything but numbers; the first error is returned.
 pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<NumberArray, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
@@ -154,18 +154,18 @@ pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<NumberArray, D
 /// Reads an NPY file.
 ///
 /// # Errors
-/// The first fault that refuses it.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub(crate) fn open_npy(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
     read_npy(&file, source.into_bytes(options.limits.file)?, options)
 }
 
-/// Reads an NPY file that is in memory: its array is called `arr_0`, and holds x y z w unless the map
-/// says otherwise.
+/// Reads the bytes of an NPY file; `file` is the input's name in messages. The array is called `arr_0`. It contains
+/// quaternions x y z w unless the options' `map` specifies otherwise.
 ///
 /// # Errors
-/// The first fault that refuses it.
+/// When the input is invalid; the first error is returned.
 pub fn read_npy(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let archive = Archive::single(file, bytes, options.limits);
     let mut warnings = Warnings::new(file);

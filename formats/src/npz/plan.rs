@@ -1,5 +1,5 @@
-//! What the arrays of a file mean: which of them hold the rotations of which tracks, and how. Every
-//! layout becomes a plan, from which clips are read, and by which files are written again.
+//! The meaning of the arrays of a file: which of them contain the rotations of which tracks, and in what form. Every
+//! layout becomes a plan, by which clips are read and files are written again.
 
 mod rate;
 mod unread;
@@ -18,52 +18,52 @@ use crate::npz::header::shape_text;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
-/// One clip, as arrays.
+/// One clip as arrays.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ArchivePlan {
     /// The clip's name.
     pub(crate) name: Option<String>,
     pub(crate) tracks: usize,
     pub(crate) frames: usize,
-    /// The arrays that hold keys. Those of rotations come first, in the order of their tracks.
+    /// The arrays that contain keys. Those of rotations are first, in the order of their tracks.
     pub(crate) parts: Vec<KeyArray>,
-    /// An entry for each track, or none.
+    /// The name of each track, or empty.
     pub(crate) names: Vec<String>,
-    /// Likewise.
+    /// The parent of each track, or empty.
     pub(crate) parents: Vec<Option<usize>>,
-    /// Likewise, and its translation in f64.
+    /// The rest transform of each track, with its translation in f64, or empty.
     pub(crate) rest: Vec<(Transform, DVec3)>,
-    /// The member of the times, seconds.
+    /// The member with the times in seconds.
     pub(crate) times: Option<TimeList>,
-    /// The member of the rate.
+    /// The member with the rate.
     pub(crate) rate_member: Option<usize>,
     pub(crate) rate: Option<FrameRate>,
-    /// What there is to say of two rates in the file that differ.
+    /// The message if the file contains two different rates.
     pub(crate) two_rates: Option<String>,
-    /// The times of all frames, those that are left out of the clip too.
+    /// The times of all frames, including those that are left out of the clip.
     pub(crate) all_times: Vec<f64>,
-    /// Members that say again what others say, or that the rate is compared with.
+    /// Members that repeat the data of others, or with which the rate is compared.
     pub(crate) compared: Vec<usize>,
-    /// Members that hold the same for all frames, whatever their shape looks like.
+    /// Members that do not depend on frames, whatever their shape.
     pub(crate) constants: Vec<usize>,
     pub(crate) is_world: bool,
     /// Why poses in the world cannot be computed.
     pub(crate) no_world: Option<String>,
-    /// A body of SMPL.
+    /// Whether the clip is the motion of an SMPL body.
     pub(crate) is_body: bool,
-    /// How each track's channels are interpolated, or nothing.
+    /// How the channels of each track are interpolated, or empty.
     pub(crate) channels: Vec<Channels>,
-    /// How BVH writes each track down, or nothing.
+    /// The BVH data of each track, or empty.
     pub(crate) bvh: Vec<BvhJoint>,
-    /// The layout is ours: what made the samples is written beside them.
+    /// Whether the layout is Tumble's, with the notes on how the samples were made.
     pub(crate) is_tumble_layout: bool,
 }
 
-/// Where the times of all frames are.
+/// The location of the times of all frames.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TimeList {
     pub(crate) member: usize,
-    /// The one of its columns, where it has several.
+    /// The column of the array, if it has several.
     pub(crate) column: usize,
 }
 
@@ -77,14 +77,14 @@ pub(crate) struct KeyArray {
     pub(crate) at: Strides,
 }
 
-/// What each key is.
+/// The form of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum KeyKind {
     /// A quaternion.
     Quaternion(ComponentOrder),
-    /// An axis of rotation, as long as the angle in radians.
+    /// A rotation vector in radians.
     RotationVector,
-    /// A rotation in a form that a map says, no quaternion.
+    /// A rotation in another form, which a map specifies.
     Form(RotationForm),
     Translation,
     Scale,
@@ -98,7 +98,7 @@ impl KeyKind {
         )
     }
 
-    /// Numbers of a key.
+    /// How many numbers a key has.
     pub(crate) fn width(self) -> usize {
         match self {
             Self::Quaternion(_) => 4,
@@ -109,12 +109,12 @@ impl KeyKind {
 }
 
 impl KeyArray {
-    /// All of an array: of shape (frames, numbers of all tracks), (frames, tracks, numbers), or,
-    /// track by track, (tracks, frames, numbers). `first` is the first of its tracks. Gives the
-    /// number of frames too.
+    /// All of an array: of shape (frames, numbers of all tracks), (frames, tracks, numbers), or, track by track,
+    /// (tracks, frames, numbers). `first` is the first of its tracks. Returns the number of frames too. `None` if
+    /// there is no such array.
     ///
     /// # Errors
-    /// When the shape is none of these, or the elements are no floats.
+    /// When the shape is none of these, or when the elements are not floats.
     pub(crate) fn of(
         archive: &Archive,
         name: &str,
@@ -180,7 +180,7 @@ impl KeyArray {
         Ok(Some((part, frames)))
     }
 
-    /// Where the key of a track is, as `NumPy` would index it.
+    /// The index of the key of a track, as in `NumPy`.
     pub(crate) fn index_text(&self, archive: &Archive, track: usize, frame: usize) -> String {
         let member = &archive.members[self.member];
         let part_track = track - self.tracks.start;
@@ -201,7 +201,7 @@ impl KeyArray {
     }
 }
 
-/// Refuses arrays of keys that are no floats.
+/// Refuses an array of keys that are not floats.
 pub(crate) fn check_float(archive: &Archive, member: usize) -> Result<(), Diagnostic> {
     let element = &archive.header(member)?.element;
     if element.is_float() {
@@ -213,7 +213,7 @@ pub(crate) fn check_float(archive: &Archive, member: usize) -> Result<(), Diagno
 }
 
 impl ArchivePlan {
-    /// Adds the keys of an array that has as many tracks and frames as the others.
+    /// Adds the keys of an array, which must have the same number of tracks and frames as the others.
     pub(crate) fn add(
         &mut self,
         archive: &Archive,
@@ -239,7 +239,7 @@ impl ArchivePlan {
         Ok(())
     }
 
-    /// The names of all tracks, from an array of texts.
+    /// Reads the names of all tracks from an array of texts.
     pub(crate) fn read_names(&mut self, archive: &Archive, name: &str) -> Result<(), Diagnostic> {
         let Some(member) = archive.find(name) else {
             return Ok(());
@@ -252,7 +252,7 @@ impl ArchivePlan {
         Ok(())
     }
 
-    /// The parents of all tracks, from an array of whole numbers, negative for roots.
+    /// Reads the parents of all tracks from an array of integers, which are negative for roots.
     pub(crate) fn read_parents(&mut self, archive: &Archive, name: &str) -> Result<(), Diagnostic> {
         let Some(member) = archive.find(name) else {
             return Ok(());
@@ -306,7 +306,7 @@ pub(crate) fn read_numbers(archive: &Archive, member: usize) -> Result<Vec<f64>,
     })
 }
 
-/// A track that is its own ancestor.
+/// A track that is among its ancestors, if there is one.
 fn circle(parents: &[Option<usize>]) -> Option<usize> {
     let mut is_done = vec![false; parents.len()];
     for track in 0..parents.len() {

@@ -1,19 +1,19 @@
-//! Rotation vectors: an axis, as long as the angle in radians. Each component may be any number, and
-//! an angle longer than π is one that the motion reached without a jump.
+//! Rotation vectors: their direction is the axis, and their length is the angle in radians. A component may be any
+//! number; an angle above π is one that the motion reached without a jump.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::{DQuat, DVec3, Quat};
 
-/// Terms of the series for angles up to 2π. The first one that is left out is below 2e-12, a
-/// ten-thousandth of what f32 tells apart.
+/// Number of terms of the series for angles up to 2π. The first omitted term is below 2e-12, a ten-thousandth of an
+/// f32 step.
 const TERMS: usize = 12;
 
-/// Enough of them for angles up to π/2, as most joints have: the next is below 5e-13.
+/// Number of terms for angles up to π/2, which most joints have. The first omitted term is below 5e-13.
 const SHORT_TERMS: usize = 7;
 
-/// The coefficients of cos √t and of sin √t / √t, side by side so that a vector of two serves both:
-/// 1/(2k)! and 1/(2k + 1)!, signs alternating.
+/// The coefficients of cos √t and sin √t / √t, in pairs, so that one vector of two serves both: 1/(2k)! and 1/(2k +
+/// 1)!, with alternating signs.
 const COEFFICIENTS: [[f64; 2]; TERMS] = {
     let mut list = [[1.0; 2]; TERMS];
     let mut k = 1;
@@ -51,8 +51,8 @@ pub(crate) fn exp(vector: [f64; 3]) -> DQuat {
     DQuat::from_xyzw(x * half_sinc, y * half_sinc, z * half_sinc, cos)
 }
 
-/// The rotation vector of a unit quaternion that is nearest to the one before it. Without one, the
-/// sign of the quaternion decides: angles over π are those of w < 0.
+/// The rotation vector of a unit quaternion that is nearest to the one before it. Without one before it, the sign of
+/// the quaternion decides: the angle is above π if w < 0.
 pub(crate) fn log(rotation: Quat, before: Option<DVec3>) -> DVec3 {
     let q = rotation.as_dquat();
     let (axis, w) = (DVec3::new(q.x, q.y, q.z), q.w);
@@ -76,7 +76,7 @@ pub(crate) fn log(rotation: Quat, before: Option<DVec3>) -> DVec3 {
     }
 }
 
-/// The rotation vector that is not longer than π; 0 where f32 knows no axis.
+/// The rotation vector with an angle up to π; 0 if the rotation in f32 is too small to have an axis.
 #[must_use]
 pub fn shortest(rotation: Quat) -> DVec3 {
     log(

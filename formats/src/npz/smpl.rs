@@ -1,4 +1,4 @@
-//! Motion of SMPL bodies, as AMASS has it: rotation vectors of all joints in rows, one a frame.
+//! Motion of SMPL bodies in the layout of AMASS: rotation vectors of all joints in rows, one for each frame.
 
 use tumble::Layout;
 
@@ -20,8 +20,7 @@ const HEAD: usize = 15;
 const WRISTS: [(&str, usize); 2] = [("left", 20), ("right", 21)];
 const FINGERS: [&str; 5] = ["index", "middle", "pinky", "ring", "thumb"];
 
-/// The arrays that hold the pose of a body in pieces, as AMASS calls them, in the order in which
-/// `poses` has them: pelvis, body, jaw, eyes, hands.
+/// The arrays of a pose in parts, by their names in AMASS, in the order of `poses`: pelvis, body, jaw, eyes, hands.
 const PIECES: [(&str, usize); 5] = [
     ("root_orient", 1),
     ("pose_body", 21),
@@ -30,7 +29,7 @@ const PIECES: [(&str, usize); 5] = [
     ("pose_hand", 30),
 ];
 
-/// The same as the models themselves call them. SMPL has two more joints in the body, the hands.
+/// The same arrays by their names in the models. SMPL has two more joints in the body, the hands.
 const MODEL_PIECES: [(&str, usize); 7] = [
     ("global_orient", 1),
     ("body_pose", 21),
@@ -41,16 +40,16 @@ const MODEL_PIECES: [(&str, usize); 7] = [
     ("right_hand_pose", 15),
 ];
 
-/// Joints of the body of SMPL itself, without the pelvis.
+/// Number of joints of the SMPL body without the pelvis.
 const SMPL_BODY: usize = 23;
 
-/// Where the root moves, by AMASS and by the models.
+/// The arrays with the translation of the root: in AMASS, and in the models.
 const ROOTS: [&str; 2] = ["trans", "transl"];
 
-/// Where such files say their rate.
+/// The arrays with the rate.
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "fps"];
 
-/// Where files of AMASS say how long they last, in seconds.
+/// The array with the duration in seconds, in files of AMASS.
 const LENGTH: &str = "mocap_time_length";
 
 /// Names and parents of joints.
@@ -97,7 +96,7 @@ impl Skeleton {
         }
     }
 
-    /// Of as many joints: SMPL has 24, SMPL-H 52, SMPL-X 55; 22 are those that all of them share.
+    /// The skeleton with this number of joints: SMPL has 24, SMPL-H 52, SMPL-X 55; all share 22.
     fn of(joints: usize) -> Option<Self> {
         let mut skeleton = Self::body();
         match joints {
@@ -118,8 +117,8 @@ impl Skeleton {
     }
 }
 
-/// The plan of a file of `poses`, or of `root_orient`, `pose_body` and perhaps more, which the models
-/// call `global_orient` and `body_pose`; `None` for another.
+/// The plan of a file with `poses`, or with `root_orient`, `pose_body` and perhaps others, which the models call
+/// `global_orient` and `body_pose`. `None` for other files.
 pub(crate) fn plan(
     archive: &Archive,
     warnings: &mut Warnings,
@@ -225,7 +224,7 @@ pub(crate) fn plan(
     Ok(Some(plan))
 }
 
-/// The names by which a file has its pose in pieces, if it has.
+/// The names by which a file contains its pose in parts, if it does.
 fn pieces_of(archive: &Archive) -> Option<&'static [(&'static str, usize)]> {
     let all: [&'static [_]; 2] = [&PIECES, &MODEL_PIECES];
     let has = |pieces: &&'static [(&str, usize)]| {
@@ -236,7 +235,7 @@ fn pieces_of(archive: &Archive) -> Option<&'static [(&'static str, usize)]> {
     all.into_iter().find(has)
 }
 
-/// The pieces that repeat what `poses` has, each with the first of its joints there.
+/// The arrays that repeat parts of `poses`, each with the index of its first joint there.
 pub(crate) fn repeated_pieces(joints: usize) -> impl Iterator<Item = (&'static str, usize)> {
     let has_face = joints == 55;
     let of_body = move |&(name, _): &(&str, usize)| match name {

@@ -1,4 +1,4 @@
-//! Our own layout: `rotations` (tracks, frames, x y z w) and what belongs to it.
+//! Tumble's layout: `rotations` (tracks, frames, x y z w), and related arrays.
 
 use glam::{DQuat, DVec3};
 use tumble::Layout;
@@ -10,7 +10,7 @@ use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, read_numbers};
 use crate::quaternion::ComponentOrder;
 
-/// Arrays of the layout that are no keys: what the clip is, in all frames.
+/// Arrays of the layout that do not contain keys: data of the clip that do not depend on frames.
 pub(crate) const CONSTANTS: [&str; 8] = [
     "name",
     "names",
@@ -22,17 +22,17 @@ pub(crate) const CONSTANTS: [&str; 8] = [
     END_SITES,
 ];
 
-/// How the rotation, the translation and the scale of each track are interpolated: `STEP`, `LINEAR`,
-/// or nothing for what rests.
+/// The array with the interpolation of rotation, translation and scale of each track: `STEP`, `LINEAR`, or empty for
+/// a channel at rest.
 pub(crate) const SAMPLERS: &str = "samplers";
 
-/// The channels of each track in BVH: `Zrotation Xrotation Yrotation`.
+/// The array with the BVH channels of each track: `Zrotation Xrotation Yrotation`.
 pub(crate) const BVH_CHANNELS: &str = "bvh_channels";
 
-/// The End Sites of BVH: the track that each belongs to, and x y z.
+/// The array with the End Sites of BVH: the track of each, and x y z.
 pub(crate) const END_SITES: &str = "end_sites";
 
-/// The plan of such a file; `None` for another.
+/// The plan of a file in this layout; `None` for other files.
 pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::TrackMajor);
     let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
@@ -76,7 +76,7 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
     Ok(Some(plan))
 }
 
-/// The texts of an array of so many, `None` where there is no such array.
+/// The texts of an array with `each` of them for each track; `None` if there is no such array.
 fn texts(
     archive: &Archive,
     plan: &mut ArchivePlan,
@@ -158,7 +158,7 @@ fn read_bvh(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic>
     Ok(())
 }
 
-/// Rest poses: for each track tx ty tz, x y z w, sx sy sz.
+/// Reads rest transforms: for each track tx ty tz, x y z w, sx sy sz.
 fn read_rest(
     archive: &Archive,
     member: usize,

@@ -1,5 +1,5 @@
-//! Motion of bodies in the world, as robot learning has it: `body_rotations` (frames, bodies,
-//! w x y z), `body_positions`, `body_names` and `fps`.
+//! Motion of bodies in the world, in a layout of robot learning: `body_rotations` (frames, bodies, w x y z),
+//! `body_positions`, `body_names` and `fps`.
 
 use tumble::Layout;
 
@@ -8,7 +8,7 @@ use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::quaternion::ComponentOrder;
 
-/// The plan of such a file; `None` for another.
+/// The plan of a file in this layout; `None` for other files.
 pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::FrameMajor);
     let quaternions = KeyKind::Quaternion(ComponentOrder::Wxyz);

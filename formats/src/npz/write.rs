@@ -1,4 +1,4 @@
-//! Samples as arrays in an archive: our own layout, for clips of any format.
+//! Writes samples as arrays in an archive, in Tumble's layout, for clips of any format.
 
 use std::io::{self, Cursor, Write};
 use std::ops::Range;
@@ -18,13 +18,13 @@ use crate::npz::plan::KeyKind;
 use crate::npz::{rotation_vector, tumble_layout};
 use crate::quaternion::ComponentOrder;
 
-/// An archive that is being made. It grows in memory, because a member's length and checksum come
-/// before its bytes.
+/// An archive that is being written. It grows in memory, because the length and the checksum of a member precede its
+/// bytes.
 pub(super) struct ArchiveWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
-/// Bytes that go to the archive at once.
+/// Number of bytes that are added to the archive at once.
 const PIECE: usize = 1 << 16;
 
 impl ArchiveWriter {
@@ -34,7 +34,7 @@ impl ArchiveWriter {
         }
     }
 
-    /// Begins a member of so many bytes.
+    /// Begins a member of `length` bytes.
     fn begin(&mut self, path: &str, length: usize, is_deflated: bool) -> io::Result<()> {
         let method = match is_deflated {
             true => CompressionMethod::Deflated,
@@ -47,13 +47,13 @@ impl ArchiveWriter {
         self.zip.start_file(path, options).map_err(io::Error::other)
     }
 
-    /// A member as it is.
+    /// Writes a member with these bytes.
     pub(super) fn bytes(&mut self, path: &str, bytes: &[u8], is_deflated: bool) -> io::Result<()> {
         self.begin(path, bytes.len(), is_deflated)?;
         self.zip.write_all(bytes)
     }
 
-    /// An array of numbers, which `fill` gives in C order.
+    /// Writes an array of numbers; `fill` supplies them in C order.
     pub(super) fn numbers(
         &mut self,
         path: &str,
@@ -83,7 +83,7 @@ impl ArchiveWriter {
         self.zip.write_all(&buffer)
     }
 
-    /// Texts as an array of UTF-32.
+    /// Writes texts as an array of UTF-32.
     pub(super) fn texts(&mut self, path: &str, texts: &[&str], shape: &[usize]) -> io::Result<()> {
         let longest = texts.iter().map(|text| text.chars().count()).max();
         let length = longest.unwrap_or(0).max(1);
@@ -95,14 +95,14 @@ impl ArchiveWriter {
         self.bytes(path, &bytes, false)
     }
 
-    /// Ends the archive and writes it.
+    /// Ends the archive and writes it to `out`.
     pub(super) fn finish(self, out: &mut dyn Write) -> io::Result<()> {
         let archive = self.zip.finish().map_err(io::Error::other)?;
         out.write_all(archive.get_ref())
     }
 }
 
-/// Gives the keys of some tracks at all samples, in C order.
+/// Passes the keys of some tracks at all samples to `put`, in C order.
 pub(super) fn keys(
     values: KeyKind,
     tracks: Range<usize>,
@@ -155,7 +155,7 @@ pub(super) fn keys(
     }
 }
 
-/// Refuses samples that are not as many as times and tracks make.
+/// Checks that the number of samples fits the times and the tracks.
 pub(super) fn check(sampled: &SampledClip<'_>, name: &str) -> Result<(), WriteError> {
     let (tracks, frames) = (sampled.clip.set.track_count(), sampled.times.len());
     let count = sampled.rotations.len();
@@ -166,10 +166,10 @@ pub(super) fn check(sampled: &SampledClip<'_>, name: &str) -> Result<(), WriteEr
     Err(Diagnostic::new(name, Code::Layout, message).into())
 }
 
-/// The arrays of our layout that are keys, or say when they are.
+/// The arrays of Tumble's layout that contain keys or their times.
 const KEYS: [&str; 5] = ["rotations", "translations", "scales", "times", "fps"];
 
-/// What a note is called among the arrays.
+/// The name of the array of a note.
 pub(super) fn note_name(note: &str) -> String {
     let is_reserved = KEYS.contains(&note) || tumble_layout::CONSTANTS.contains(&note);
     match is_reserved {
@@ -178,7 +178,7 @@ pub(super) fn note_name(note: &str) -> String {
     }
 }
 
-/// Writes what made the samples, a text each.
+/// Writes how the samples were made, one text array for each note.
 pub(super) fn notes(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::Result<()> {
     for (note, text) in sampled.notes {
         members.texts(&format!("{}.npy", note_name(note)), &[text], &[])?;
@@ -186,15 +186,19 @@ pub(super) fn notes(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> i
     Ok(())
 }
 
-/// Writes one clip in our own layout: `rotations` (tracks, frames, x y z w) in f32, `times` in f64,
-/// `fps` where there is a rate, `names` and `parents`; `translations` and `scales` (tracks, frames,
-/// 3), where tracks have them, translations in f64 where they count from an origin, which is added; `rest` (tracks, 10), as `tx ty tz x y z w sx sy sz`, where the
-/// skeleton has a rest pose; `samplers` (tracks, 3) where the clip says how its channels are
-/// interpolated; `bvh_channels` (tracks) and `end_sites` (sites, track x y z) of clips from BVH; and
-/// what made the samples.
+/// Writes one clip in Tumble's layout, with these arrays:
+///
+/// - `rotations` (tracks, frames, x y z w) in f32, `times` in f64, and `fps` if there is a rate;
+/// - `translations` and `scales` (tracks, frames, 3), if tracks have them; with origins, translations are f64 and the
+///   origins are added;
+/// - `names` and `name`, of the tracks and of the clip; `is_world`, if poses are relative to the world;
+/// - `parents`, and `rest` (tracks, 10) as `tx ty tz x y z w sx sy sz` if the skeleton has a rest pose;
+/// - `samplers` (tracks, 3), if the clip specifies how its channels are interpolated;
+/// - `bvh_channels` (tracks) and `end_sites` (sites, track x y z) of clips from BVH;
+/// - one text for each note on how the samples were made.
 ///
 /// # Errors
-/// When there is not one clip, or writing fails.
+/// When there is not exactly one clip, when the number of samples does not fit, or when writing fails.
 pub fn write_npz(
     clips: &[SampledClip<'_>],
     options: &MotionOptions,
@@ -270,7 +274,7 @@ pub(super) fn times(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> i
     })
 }
 
-/// Writes how channels are interpolated, where the clip says it. Samples of cubics are joined by lines.
+/// Writes how channels are interpolated, if the clip specifies it. Samples of cubics are joined by straight lines.
 fn samplers(members: &mut ArchiveWriter, clip: &Motion) -> io::Result<()> {
     let name = |sampler: Option<ChannelInterpolation>| match sampler {
         None => "",
@@ -291,7 +295,7 @@ fn samplers(members: &mut ArchiveWriter, clip: &Motion) -> io::Result<()> {
     }
 }
 
-/// Writes how BVH has the joints.
+/// Writes the BVH data of joints.
 fn bvh(members: &mut ArchiveWriter, joints: &[BvhJoint]) -> io::Result<()> {
     if joints.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! The columns of a Parquet file, decoded.
+//! Decodes the columns of a Parquet file.
 
 use std::sync::Arc;
 
@@ -20,10 +20,10 @@ use crate::parquet::{damaged, plain};
 use crate::table::arrays::{Gather, chosen};
 use crate::table::columns::{Column, ColumnNumbers, ColumnValues, RequestedColumn, Table};
 
-/// Rows that are decoded at once.
+/// Number of rows that are decoded at once.
 const BATCH: usize = 1 << 16;
 
-/// Fewer numbers than this are unpacked before another thread has woken up.
+/// Fewer numbers than this are unpacked faster by one thread.
 const MIN_PARALLEL_NUMBERS: usize = 1 << 16;
 
 /// A file whose pages have been checked.
@@ -33,14 +33,14 @@ pub(super) struct ParquetFile<'a> {
     pub(super) metadata: ArrowReaderMetadata,
 }
 
-/// A column, with its type.
+/// A column with its type.
 type TypedColumn<'a> = (&'a RequestedColumn, &'a DataType);
 
 impl ParquetFile<'_> {
-    /// Reads all columns, a batch of rows after the other.
+    /// Reads all columns, one batch of rows after another.
     ///
     /// # Errors
-    /// The first fault.
+    /// The first error.
     pub(super) fn read_together(
         &self,
         requested: &[TypedColumn<'_>],
@@ -70,9 +70,8 @@ impl ParquetFile<'_> {
         gather.finish()
     }
 
-    /// Reads columns of plain numbers each by itself, straight into the list that it becomes, and the
-    /// others together, on all threads if there are many; nothing where there is anything wrong or
-    /// missing.
+    /// Reads columns of plain numbers separately, directly into their lists, and the other columns together; on all
+    /// threads if there are many numbers. `None` if anything is invalid or missing.
     pub(super) fn read_apart(&self, requested: &[TypedColumn<'_>]) -> Option<Table> {
         let schema = self.metadata.parquet_schema();
         // The first leaf of each column.
@@ -140,7 +139,7 @@ impl ParquetFile<'_> {
         })
     }
 
-    /// The numbers of a column, if there is one in each row.
+    /// The numbers of a column, if each row has one.
     fn numbers(&self, leaf: usize) -> Option<ColumnNumbers> {
         match self.metadata.parquet_schema().column(leaf).physical_type() {
             Type::FLOAT => self.values::<FloatType>(leaf).map(ColumnNumbers::F32),
@@ -189,7 +188,7 @@ impl ParquetFile<'_> {
     }
 }
 
-/// Whether a column of this type is a list of numbers as they are stored.
+/// Whether a column of this type is a list of numbers in their stored form.
 fn is_plain(schema: &SchemaDescriptor, leaf: usize, data_type: &DataType) -> bool {
     let column = schema.column(leaf);
     let is_same = matches!(

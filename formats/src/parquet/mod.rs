@@ -28,7 +28,7 @@ use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
 use crate::table::plan::TablePlan;
 
-/// Parquet files.
+/// The Parquet format.
 pub static FORMAT: Format = Format {
     name: "parquet",
     summary: "a table in columns, a row for each key",
@@ -57,23 +57,23 @@ pub static FORMAT: Format = Format {
 
 const MAGIC: &[u8] = b"PAR1";
 
-/// The length of the metadata and the magic number, at the end.
+/// Length of the end of a file: the length of the metadata, and the magic number.
 const TAIL: usize = 8;
 
-/// Reads a file; `-` is standard input.
+/// Reads a Parquet file; `-` is standard input.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the file cannot be opened or is invalid; the first error is returned.
 pub fn open_parquet(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
     read_parquet(&name, source.into_bytes(options.limits.file)?, options)
 }
 
-/// Reads the bytes of a file; `name` is what messages call it.
+/// Reads the bytes of a Parquet file; `name` is the input's name in messages.
 ///
 /// # Errors
-/// The first fault that refuses the file.
+/// When the input is invalid; the first error is returned.
 pub fn read_parquet(
     name: &str,
     bytes: Vec<u8>,
@@ -85,7 +85,7 @@ pub fn read_parquet(
     clips(&table, &plan, options)
 }
 
-/// Refuses what does not end as Parquet files do.
+/// Refuses bytes that do not end as Parquet files do.
 fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     let refuse = |message: String| Err(Diagnostic::new(name, Code::TableDamaged, message));
     if !bytes.starts_with(MAGIC) {
@@ -112,7 +112,7 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     Ok(())
 }
 
-/// The refusal of what cannot be decoded.
+/// The error of a file that cannot be decoded.
 fn damaged(name: &str, error: &dyn Display) -> Diagnostic {
     let message = format!("{error}; the file is damaged, or written in a way that is not read");
     Diagnostic::new(name, Code::TableDamaged, message)

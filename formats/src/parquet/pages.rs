@@ -1,5 +1,5 @@
-//! What a Parquet file claims, held against its length before anything is decoded. The crate makes
-//! room for a page by the length in the page's header, up to 2 GiB for a header of 20 bytes.
+//! Compares the sizes that a Parquet file claims with its length, before anything is decoded. The crate `parquet`
+//! allocates memory for a page by the length in its header, up to 2 GiB for a header of 20 bytes.
 
 use std::ops::Range;
 
@@ -10,24 +10,24 @@ use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::text::lines::Limits;
 
-/// A file holds at most so many numbers a byte. Equal numbers are packed closest: a page of
-/// 2^20 of them may have 100 bytes, but the times beside them differ and take a byte each.
+/// The largest number of numbers for each byte of a file. Equal numbers compress best: a page of 2^20 of them may
+/// have 100 bytes, but the times beside them differ and need a byte each.
 const MAX_NUMBERS_PER_BYTE: u64 = 1024;
 
-/// A page may be this long whatever it is packed into; writers begin a new one after 1 MiB.
+/// The largest length of a page that is allowed whatever its compressed length. Writers begin a new page after 1 MiB.
 const FREE_PAGE: u64 = 16 << 20;
 
-/// A longer page is at most this many times as long as what it is packed into.
+/// The largest ratio of the length of a longer page to its compressed length.
 const MAX_PAGE_RATIO: u64 = 64;
 
-/// Bytes that a number takes: as it is decoded, in its column, and as a part of a key.
+/// Bytes of memory of a number: while it is decoded, in its column, and in a key.
 const NUMBER: usize = 32;
 
 /// Checks the pages of some columns.
 ///
 /// # Errors
-/// When they lie outside the file, are compressed in a way that is not read, or claim more numbers
-/// or bytes than the file can hold, or than its memory does.
+/// When they lie outside the file, are compressed in an unsupported way, or claim more numbers or bytes than the file
+/// can contain or the memory budget allows.
 pub(crate) fn check_pages(
     name: &str,
     bytes: &[u8],
@@ -114,7 +114,7 @@ fn check_compression(name: &str, path: &str, found: Compression) -> Result<(), D
     }
 }
 
-/// Where the pages of a column are.
+/// The range of a column's pages in the file.
 pub(super) fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range<usize>> {
     let start = column
         .dictionary_page_offset()
@@ -124,14 +124,14 @@ pub(super) fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range
     (end <= length).then_some(start..end)
 }
 
-/// What the header of a page says.
+/// The header of a page.
 pub(super) struct PageSizes {
-    /// Bytes of the header, and of the page behind it.
+    /// Bytes of the header, and of the page after it.
     pub(super) header: usize,
     pub(super) compressed: usize,
     pub(super) uncompressed: u64,
     pub(super) values: u64,
-    /// Whether it is a data page (version 1) of values that are not encoded.
+    /// Whether it is a data page (version 1) with plain values.
     pub(super) is_plain: bool,
 }
 
@@ -229,7 +229,7 @@ impl Compact<'_> {
     }
 
     fn skip(&mut self, kind: u8, depth: u32) -> Option<()> {
-        /// Page headers nest two deep.
+        /// The deepest nesting that is read; page headers nest two deep.
         const DEEPEST: u32 = 8;
         if depth > DEEPEST {
             return None;

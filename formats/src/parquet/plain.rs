@@ -1,9 +1,8 @@
-//! Pages of numbers as they lie in memory, packed by zstd or not at all: they are unpacked into the list
-//! that they become.
+//! Reads pages of plain numbers, compressed by zstd or not at all, directly into the list that they become.
 //!
-//! The crate makes a compressor and a decompressor for each column of each group of rows. Both ask the
-//! processor what it can do, and each question leaves a virtual machine: for small files that took a
-//! third of the time of reading them.
+//! The crate `parquet` makes a compressor and a decompressor for each column of each group of rows. Each of them
+//! queries the features of the processor, and each query exits a virtual machine: for small files this was a third of
+//! the reading time.
 
 use std::cell::RefCell;
 
@@ -14,12 +13,12 @@ use zstd::bulk::Decompressor;
 use crate::parquet::pages::page;
 
 thread_local! {
-    /// Of each thread, for all files that it reads.
+    /// The decompressor of each thread, for all files that it reads.
     static ZSTD: RefCell<Decompressor<'static>> = RefCell::default();
 }
 
-/// Appends the numbers of all pages of a column in a group of rows; nothing where one of them is
-/// packed or encoded in another way, or is damaged. Of a column that may have nulls there must be none.
+/// Appends the numbers of all pages of a column in a group of rows; `None` if a page is compressed or encoded in
+/// another way, contains a null, or is damaged.
 pub(super) fn append<T: Pod>(
     mut pages: &[u8],
     compression: Compression,
@@ -69,8 +68,8 @@ fn unpack(compression: Compression, packed: &[u8], to: &mut [u8]) -> Option<()> 
     Some(())
 }
 
-/// What follows the definition levels of a page, if none of its values is a null: their length, and
-/// runs of the level 1, each with a varint of twice its length (Parquet's "RLE/bit-packing hybrid").
+/// The bytes after the definition levels of a page, if none of its values is null. The levels are a length, and runs
+/// of the level 1, each with a varint of twice its length (Parquet's "RLE/bit-packing hybrid").
 fn behind_levels(page: &[u8], count: u64) -> Option<&[u8]> {
     let (length, rest) = page.split_first_chunk::<4>()?;
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;

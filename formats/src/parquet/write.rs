@@ -1,4 +1,4 @@
-//! Tables as Parquet: zstd, a group of rows for each part of a table.
+//! Writes tables as Parquet, compressed by zstd, with a group of rows for each part of a table.
 
 use std::io::{self, Write};
 
@@ -12,14 +12,14 @@ use parquet::schema::types::ColumnPath;
 
 use crate::table::rows::{Head, RowSink};
 
-/// Rows of a group, which is packed in memory before it is written: up to 30 MB of rotations.
+/// Number of rows of a group, which is compressed in memory before it is written: up to 30 MB of rotations.
 const GROUP: usize = 1 << 20;
 
-/// Writes Parquet as rows come.
+/// Writes Parquet while rows arrive.
 pub(crate) struct ParquetSink<'a> {
     out: &'a mut dyn Write,
-    /// Writes to memory, which is emptied after each group: the crate wants a writer that may be
-    /// sent to another thread.
+    /// Writes to memory, which is emptied after each group, because the crate needs a writer that can be sent to
+    /// another thread.
     writer: ArrowWriter<Vec<u8>>,
 }
 
@@ -45,7 +45,7 @@ impl<'a> ParquetSink<'a> {
         })
     }
 
-    /// Hands on what is written so far.
+    /// Writes the bytes that are ready.
     fn drain(&mut self) -> io::Result<()> {
         self.writer.sync()?;
         let buffer = self.writer.inner_mut();

@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::path::{PathFormat, PathPoints};
 use crate::text::number;
 
-/// Points as text.
+/// The CSV format of paths: points as text.
 pub static FORMAT: PathFormat = PathFormat {
     name: "csv",
     summary: "one point per row, with the columns `t,x,y,z,ux,uy,uz`; the time `t` and the upward direction \
@@ -16,7 +16,7 @@ pub static FORMAT: PathFormat = PathFormat {
     read_bytes: |file, bytes| Ok(vec![read_text(file, bytes)?]),
 };
 
-/// Columns by their names, of which those of `t` and of the ups may be missing.
+/// Names of the columns; those of the time and of the upward directions may be missing.
 const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
 
 /// Whether the first line names the columns of points.

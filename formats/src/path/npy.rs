@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::npy;
 use crate::path::{PathFormat, PathPoints};
 
-/// Arrays of `NumPy`.
+/// The NPY format of paths: `NumPy` arrays.
 pub static FORMAT: PathFormat = PathFormat {
     name: "npy",
     summary: "a NumPy array of floats of shape (tracks, points, 3), without times",

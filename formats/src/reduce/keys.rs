@@ -1,4 +1,4 @@
-//! The keys of a clip for given tolerances, joint after joint.
+//! Finds the keys of a clip within tolerances, joint by joint.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reduce::{
@@ -10,9 +10,9 @@ use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::reduce::{ReduceMotionError, Reduction, Tolerances};
 use crate::sample::ChannelMethods;
 
-/// What an evaluation in f32 adds to an angle at most, radians.
+/// The largest error in radians that an f32 evaluation adds to an angle.
 const ROUNDING: f64 = 4e-7;
-/// The same of vectors, as a part of their size.
+/// The largest error that an f32 evaluation adds to a vector, relative to its length.
 const VECTOR_ROUNDING: f64 = 4e-7;
 
 impl Reduction<'_> {
@@ -51,7 +51,7 @@ impl Reduction<'_> {
         Ok(reduced)
     }
 
-    /// The clip with a key for each sample, of channels that move; of vectors with no more digits than the bound of
+    /// The clip with a key for each sample in channels that move. Vectors have only as many digits as the bound of
     /// distances needs.
     pub(super) fn all(&self) -> Result<Motion, ReduceMotionError> {
         let joints = self.parents.len();
@@ -102,7 +102,7 @@ impl Reduction<'_> {
         Ok(all)
     }
 
-    /// The keys of each joint's rotations, each joint after its parent.
+    /// The keys of each joint's rotations, in an order in which parents come before their children.
     fn rotations(
         &self,
         tolerances: &Tolerances,
@@ -145,7 +145,7 @@ impl Reduction<'_> {
         Ok(rotations)
     }
 
-    /// Pushes all joints with keys at the same times.
+    /// Adds all joints with keys at the same times.
     fn push_together(
         &self,
         reduced: &mut Motion,
@@ -206,7 +206,7 @@ impl Reduction<'_> {
             .collect()
     }
 
-    /// The samples of a channel that has keys, and how near its curve has to be.
+    /// The samples of a channel that has keys, and the tolerance of its curve.
     fn vectors(
         &self,
         channel: Channel,
@@ -273,7 +273,8 @@ impl Reduction<'_> {
         Ok(quats.map(|quat| quat.as_dquat().normalize()).collect())
     }
 
-    /// How a joint's channels are keyed in the clip: one that says nothing keys all that has keys.
+    /// The interpolation of a joint's channels in the clip; where it is not specified, every channel with keys has
+    /// one.
     fn sampler(&self, joint: usize) -> Channels {
         let keyed = |channel| {
             self.clip
@@ -291,7 +292,7 @@ impl Reduction<'_> {
         }
     }
 
-    /// The sampler of a channel with few keys; nothing for a curve that no file names.
+    /// The interpolation of a channel with few keys; `None` for a curve that files cannot name.
     fn reduced(&self, sampler: Option<ChannelInterpolation>) -> Option<ChannelInterpolation> {
         match (sampler?, self.options.curve) {
             (ChannelInterpolation::Step, _) => Some(ChannelInterpolation::Step),
@@ -353,7 +354,7 @@ impl Reduction<'_> {
 }
 
 impl Tolerances {
-    /// How far the rotation of a joint may be from the curve in f64.
+    /// The tolerance of a joint's rotation against the curve in f64.
     fn angle(&self, joint: usize) -> f64 {
         (self.angles[joint] - ROUNDING).max(0.0)
     }
@@ -362,7 +363,7 @@ impl Tolerances {
 /// The channels of vectors.
 const CHANNELS: [Channel; 2] = [Channel::Translation, Channel::Scale];
 
-/// Gives a channel that stands still a key at the last sample too.
+/// Adds a key at the last sample to a constant channel.
 fn lengthen(keys: &mut ReducedKeys<DQuat>, last: usize) {
     if let ([only], &[value]) = (&keys.indices[..], &keys.keys[..])
         && *only < last
@@ -373,7 +374,7 @@ fn lengthen(keys: &mut ReducedKeys<DQuat>, last: usize) {
     }
 }
 
-/// The keys of a channel that holds each until the next one: where the value changes.
+/// The keys of a channel with steps: one at each change of the value.
 fn steps<T: Copy + PartialEq + Default>(samples: &[T]) -> ReducedKeys<T> {
     let changes = |&sample: &usize| sample == 0 || samples[sample] != samples[sample - 1];
     let mut keys = ReducedKeys::default();

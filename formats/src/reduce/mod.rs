@@ -1,10 +1,9 @@
-//! Clips with few keys, whose poses stay near those of dense samples: at every sample each joint is
-//! within an angle and a distance, in the world where the clip has a skeleton.
+//! Reduces the keys of clips. The poses stay near those of dense samples: at every sample, each joint is within an
+//! angle and a distance of the original, in the world if the clip has a skeleton.
 //!
-//! Joints are reduced from the root on. The target of a joint is relative to its parent as that
-//! has become, so that angles do not add up along a chain. Distances do: where one is beyond its bound,
-//! the tolerances of the joints above it shrink, and all is done again. Whether the bounds hold is found
-//! by evaluating the keys as `eval` does.
+//! Joints are reduced from the root on. The target of a joint is relative to its reduced parent, so that angles do
+//! not add up along a chain. Distances do add up: if a joint exceeds its bound, the tolerances of this joint and its
+//! ancestors shrink, and all keys are computed again. Bounds are checked by evaluating the keys as `eval` does.
 
 mod keys;
 
@@ -20,41 +19,42 @@ use crate::motion::{ChannelInterpolation, Motion, carry_key_data};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::{HierarchyError, WorldPose, parents_first, world};
 
-/// How near the reduced clip stays.
+/// The bounds and options of a reduction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReduceOptions {
-    /// The curve that joins the keys.
+    /// The curve through the keys.
     pub curve: ReducedCurve,
-    /// The largest angle, radians.
+    /// The largest angle, in radians.
     pub angle: f64,
-    /// The largest distance [default: what the angle amounts to at the end of the longest chain of
-    /// joints, at least of length 1].
+    /// The largest distance, in the file's unit of length. By default it is the arc of the angle at a radius of
+    /// `shell` plus the length of the longest chain of joints, which counts as 1 or more.
     pub distance: Option<f64>,
-    /// Points so far from each joint, along its axes, stay within the distance too.
+    /// Points at this distance from each joint, in both directions along its axes, stay within the largest distance
+    /// too.
     pub shell: f64,
-    /// All joints have keys at the same times, as most formats hold them; else each channel at times of
-    /// its own, as glTF does.
+    /// Whether all joints get keys at the same times, as most formats store them. Otherwise each channel gets
+    /// separate times, as glTF stores them.
     pub together: bool,
-    /// Rotations will have few bits ([`MotionOptions::quantize`](crate::format::MotionOptions::quantize)):
-    /// errors are those of what is read of them.
+    /// The quantization with which rotations will be written
+    /// ([`MotionOptions::quantize`](crate::format::MotionOptions::quantize)); errors then include it.
     pub quantize: Option<Quantization>,
 }
 
-/// A reduced clip, and how far it is from the samples.
+/// A reduced clip and its errors against the samples.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Reduced {
     /// The clip with few keys, in f32.
     pub clip: Motion,
-    /// Keys of all channels before and after.
+    /// Number of keys of all channels, before and after.
     pub keys: [usize; 2],
-    /// The times of the samples, seconds.
+    /// Times of the samples, in seconds.
     pub times: Vec<f64>,
-    /// The bounds: radians, and a length.
+    /// The bounds: the angle in radians, and the distance.
     pub bounds: [f64; 2],
-    /// At each sample the largest angle and the largest distance of all joints.
+    /// For each sample, the largest angle and the largest distance of all joints.
     pub errors: Vec<[f64; 2]>,
-    /// Of both the largest: its joint and its sample.
+    /// For the largest angle and for the largest distance: the joint and the sample.
     pub worst: [(usize, usize); 2],
 }
 
@@ -62,53 +62,54 @@ pub struct Reduced {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReduceMotionError {
-    /// The samples were not evaluated.
+    /// The samples could not be evaluated.
     #[error(transparent)]
     Evaluating(#[from] Error),
-    /// The options or the samples.
+    /// An option or the samples are invalid.
     #[error(transparent)]
     Reducing(#[from] ReduceError),
-    /// The joints make no hierarchy.
+    /// The parents of the joints do not make a hierarchy.
     #[error(transparent)]
     Hierarchy(#[from] HierarchyError),
-    /// The clip refused its keys.
+    /// The reduced keys are not valid.
     #[error(transparent)]
     Keys(#[from] TrackError),
-    /// Keys at the same times are joined by curves.
+    /// Keys at the same times were requested, and a joint has steps; keys at the same times are joined by curves.
     #[error(
         "joint {joint} (`{name}`) holds each key until the next one, so that its keys stay at their own \
          times; write .glb"
     )]
     Steps {
-        /// The first such joint, from 0.
+        /// Index of the first such joint, from 0.
         joint: usize,
-        /// Its name.
+        /// Name of that joint.
         name: String,
     },
-    /// A bound is less than what f32 holds.
+    /// A bound is smaller than the precision with which keys are stored.
     #[error(
         "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \
          {kept}: give a larger one"
     )]
     TooSmall {
-        /// The largest that was found.
+        /// The largest error with all samples as keys.
         found: f64,
-        /// What was asked for.
+        /// The requested bound.
         bound: f64,
-        /// `rad`, or `of the file's unit of length`.
+        /// The unit of both: `rad`, or `of the file's unit of length`.
         unit: &'static str,
-        /// What rotations are kept in: `f32`, or `of 16 bits`.
+        /// How rotations are stored: `f32`, or `of 16 bits`.
         kept: &'static str,
     },
 }
 
-/// How often tolerances shrink; each time to nine tenths of what would have been enough, or less.
+/// How often tolerances shrink, each time to 95 % or less.
 const ROUNDS: usize = 60;
 
-/// Takes keys out of a clip.
+/// Reduces the keys of a clip.
 ///
 /// # Errors
-/// When a bound is no number from 0, or less than f32 holds; when the joints make no hierarchy.
+/// When a bound is not a finite number of 0 or more, or is smaller than the stored precision; when the parents do not
+/// make a hierarchy; when joints with steps should get keys at the same times; when the clip cannot be evaluated.
 pub fn reduce(
     clip: &Motion,
     engine: &Engine,
@@ -139,8 +140,8 @@ pub fn reduce(
     }
 }
 
-/// All samples as keys, in steps as coarse as the bounds allow: where many keys are needed these are smaller, once
-/// meshopt has compressed them, than fewer keys at times of their own. Nothing where 16 bits are too few.
+/// Makes all samples keys, quantized by the coarsest steps that the bounds allow. If many keys are needed, these are
+/// smaller after meshopt's compression than fewer keys with separate times. `None` if 16 bits are not exact enough.
 ///
 /// # Errors
 /// As [`reduce`].
@@ -180,15 +181,15 @@ pub fn quantize_all(
     Ok(Some(best))
 }
 
-/// The finest steps; those of 0 are 10 degrees apart.
+/// The level of the finest steps; those of level 0 are about 10 degrees apart.
 const FINEST: u32 = 10;
 
-/// Each is of a bit more than the one before, from 6 on.
+/// The quantization of a level. Each level has one bit more than the one before; level 0 has 6.
 fn filtered(level: u32) -> Quantization {
     Quantization::Filtered((1 << (5 + level.min(FINEST))) - 1)
 }
 
-/// How far the curve of each joint may be from what it is to be.
+/// The tolerance of each joint's curve.
 struct Tolerances {
     angles: Vec<f64>,
     /// Of translations.
@@ -205,16 +206,16 @@ struct Reduction<'a> {
     times: Vec<f64>,
     samples: Samples,
     poses: Vec<WorldPose>,
-    /// The joints, each after its parent.
+    /// The joints, in an order in which parents come before their children.
     order: Vec<usize>,
     parents: Vec<Option<usize>>,
 }
 
-/// How far each joint of a reduced clip is away at most, and each sample.
+/// The largest errors of a reduced clip, of each joint and of each sample.
 struct MeasuredErrors {
     /// By joint: angle and distance.
     joints: Vec<[f64; 2]>,
-    /// By sample.
+    /// By sample: angle and distance.
     samples: Vec<[f64; 2]>,
     worst: [(usize, usize); 2],
 }
@@ -269,7 +270,7 @@ impl<'a> Reduction<'a> {
         lengths.into_iter().fold(0.0, f64::max)
     }
 
-    /// How far a clip is from the samples, as `eval` evaluates it.
+    /// The errors of a clip against the samples, evaluated as `eval` does.
     fn measure(&self, reduced: &Motion) -> Result<MeasuredErrors, ReduceMotionError> {
         let frames = SampleTimes::at(self.times.clone());
         let quantized = self.options.quantize.map(|bits| quantized(reduced, bits));
@@ -311,7 +312,7 @@ impl<'a> Reduction<'a> {
         Ok(measured)
     }
 
-    /// Shrinks the tolerances where bounds do not hold; whether any does not.
+    /// Reduces the tolerances where bounds are exceeded; returns whether any is.
     fn tighten(&self, found: &MeasuredErrors, tolerances: &mut Tolerances) -> bool {
         let mut factors = vec![1.0f64; self.parents.len()];
         for (joint, &[angle, distance]) in found.joints.iter().enumerate() {
@@ -378,7 +379,7 @@ impl MeasuredErrors {
     }
 }
 
-/// A clip as it is read when its rotations were written with few bits.
+/// The clip that is read back after its rotations were written with a quantization.
 fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackError> {
     let mut short = clip.without_tracks();
     for (index, track) in clip.set.tracks().enumerate() {
@@ -406,7 +407,7 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
     Ok(short)
 }
 
-/// Poses in the world, or relative to the parents where those cannot be computed.
+/// Poses in the world, or relative to the parents if those cannot be computed.
 fn poses(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
     if clip.no_world.is_none() {
         return world(clip, samples);

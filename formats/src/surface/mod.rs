@@ -1,5 +1,5 @@
-//! Files of surfaces, on which routes lie and bodies stand: meshes of polygons, and nets of control points. A
-//! format is a file that names it in a `FORMAT`, and a line in the table [`SURFACES`].
+//! Files of surfaces, on which routes lie and bodies stand: meshes of polygons, and nets of control points. To add a
+//! format, write a module with a `FORMAT`, and add it to the table [`SURFACES`].
 
 pub mod net;
 pub mod obj;
@@ -16,33 +16,32 @@ use crate::text::lines::Limits;
 
 /// A file format of surfaces.
 pub struct SurfaceFormat {
-    /// The name by which programs call it, and the extension of its files.
+    /// Name of the format in options and messages, which is also the extension of its files.
     pub name: &'static str,
-    /// What is read of it, in a few words.
+    /// A short description of the contents that are read.
     pub summary: &'static str,
     /// Other extensions of its files.
     pub extensions: &'static [&'static str],
-    /// What its files hold.
+    /// The kind of surface in its files.
     pub kind: SurfaceKind,
     /// Reads the bytes of a file.
     pub read_bytes: ReadSurface,
 }
 
-/// Reads the bytes of a file: what messages call it, its bytes, the folder where the files are that it
-/// names (they are not read without one), and how much is read at most.
+/// A function that reads the bytes of a file. Its arguments are the input's name in messages, the bytes, the folder
+/// of the files that the input names (without a folder they are not read), and the largest sizes that are read.
 pub type ReadSurface = fn(&str, Vec<u8>, Option<&Path>, Limits) -> Result<Surface, Diagnostic>;
 
-/// What a surface is made of.
+/// A kind of surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SurfaceKind {
-    /// Polygons.
+    /// A mesh of polygons.
     Mesh,
     /// The control points of a Bézier surface.
     Net,
 }
 
-/// What a file of a surface holds. Nothing of it is checked but that it could be read: whether corners are
-/// there, say.
+/// The surface in a file. It is not checked; a polygon may name vertices that do not exist, for example.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Surface {
     /// A mesh.
@@ -54,24 +53,24 @@ pub enum Surface {
 /// The polygons of a mesh.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Polygons {
-    /// Of the vertices.
+    /// Positions of the vertices.
     pub positions: Vec<DVec3>,
-    /// The vertices of all polygons, one polygon after another.
+    /// Vertex indices of all polygons, one polygon after another.
     pub corners: Vec<u32>,
-    /// Where each polygon ends among the corners; empty where all are triangles.
+    /// For each polygon, the index after its last corner in `corners`; empty if all polygons are triangles.
     pub ends: Vec<usize>,
-    /// What is odd about the file.
+    /// Warnings about the file.
     pub warnings: Vec<Diagnostic>,
 }
 
 impl Polygons {
-    /// Adds a polygon of any number of vertices, behind others that were added so.
+    /// Adds a polygon of any number of vertices. All polygons of the mesh must have been added by this function.
     pub fn push(&mut self, corners: impl IntoIterator<Item = u32>) {
         self.corners.extend(corners);
         self.ends.push(self.corners.len());
     }
 
-    /// The vertices of each polygon.
+    /// The vertex indices of each polygon.
     pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
         let triangles = self.corners.chunks_exact(3);
         let triangles = triangles.take(if self.ends.is_empty() { usize::MAX } else { 0 });
@@ -84,16 +83,16 @@ impl Polygons {
 /// A net of control points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlNet {
-    /// How many rows it has.
+    /// Number of rows.
     pub rows: usize,
-    /// How many points a row has.
+    /// Number of points in a row.
     pub columns: usize,
     /// The points, row by row.
     pub points: Vec<DVec3>,
 }
 
 impl SurfaceFormat {
-    /// The format that the extension of a file tells, in any case.
+    /// The format with the extension of this path; case is ignored.
     #[must_use]
     pub fn of(path: &Path) -> Option<&'static Self> {
         let extension = path.extension()?.to_str()?;
@@ -104,12 +103,12 @@ impl SurfaceFormat {
         })
     }
 
-    /// The extensions of its files.
+    /// All extensions of its files.
     pub fn endings(&self) -> impl Iterator<Item = &'static str> {
         std::iter::once(self.name).chain(self.extensions.iter().copied())
     }
 
-    /// The extensions of all files of a kind, for messages: `.obj, .ply`.
+    /// The extensions of all formats of a kind, for messages: `.obj, .ply`.
     #[must_use]
     pub fn endings_of(kind: SurfaceKind) -> String {
         let all = SURFACES.iter().filter(|format| format.kind == kind);
@@ -118,10 +117,10 @@ impl SurfaceFormat {
         endings.join(", ")
     }
 
-    /// Reads a file in this format; no pipe.
+    /// Reads a file in this format, but not a pipe.
     ///
     /// # Errors
-    /// When the file cannot be read or has a fault.
+    /// When the file cannot be opened or is invalid.
     pub fn open(&self, path: &Path, limits: Limits) -> Result<Surface, Diagnostic> {
         let source = Source::open(path, false)?;
         let name = source.name.clone();

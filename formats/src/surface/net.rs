@@ -1,4 +1,4 @@
-//! Nets of control points in NPY.
+//! Reads nets of control points in NPY.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use crate::diagnostic::Diagnostic;
 use crate::npy::read_numbers;
 use crate::surface::{ControlNet, Surface, SurfaceFormat, SurfaceKind};
 
-/// Arrays of `NumPy`.
+/// The NPY format of surfaces: a net of control points.
 pub static FORMAT: SurfaceFormat = SurfaceFormat {
     name: "npy",
     summary: "a NumPy array of shape (m, n, 3): the control points of a Bézier surface",
@@ -15,10 +15,10 @@ pub static FORMAT: SurfaceFormat = SurfaceFormat {
     read_bytes: |name, bytes, _, _| Ok(Surface::Net(read_net(name, &bytes)?)),
 };
 
-/// The control points of a net; `name` is what messages call the file.
+/// Reads the control points of a net; `name` is the file's name in messages.
 ///
 /// # Errors
-/// When the bytes are no array of floats of shape (m, n, 3).
+/// When the bytes are not an array of floats of shape (rows, columns, 3).
 pub fn read_net(name: &str, bytes: &[u8]) -> Result<ControlNet, Diagnostic> {
     let array = read_numbers(name, bytes, |shape| match shape {
         [_, _, 3] => Ok(()),

@@ -1,4 +1,4 @@
-//! Meshes in OBJ.
+//! Reads meshes in OBJ.
 
 use std::io::{BufReader, Cursor};
 
@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
 
-/// Meshes as text.
+/// The OBJ format: meshes as text.
 pub static FORMAT: SurfaceFormat = SurfaceFormat {
     name: "obj",
     summary: "OBJ: the faces of all objects and groups",
@@ -16,9 +16,9 @@ pub static FORMAT: SurfaceFormat = SurfaceFormat {
     read_bytes: |name, bytes, _, _| Ok(Surface::Mesh(read_obj(name, &bytes)?)),
 };
 
-/// The lines of an OBJ file that say positions and faces, with the corners' positions alone: what a mesh
-/// needs. Lines that `\` continues are one line. Objects, groups, materials, texture coordinates and
-/// normals are passed over, whether they are right or not.
+/// The lines of an OBJ file with positions and faces, and of the corners only the positions: this is all that a mesh
+/// needs. Lines that `\` continues are joined. Objects, groups, materials, texture coordinates and normals are left
+/// out, valid or not.
 fn vertices_and_faces(text: &[u8]) -> Vec<u8> {
     let mut lines = Vec::with_capacity(text.len());
     let mut whole: Vec<u8> = Vec::new();
@@ -50,10 +50,10 @@ fn vertices_and_faces(text: &[u8]) -> Vec<u8> {
     lines
 }
 
-/// The faces of all objects and groups of an OBJ file; `name` is what messages call it.
+/// Reads the faces of all objects and groups of an OBJ file; `name` is the file's name in messages.
 ///
 /// # Errors
-/// When the text has a fault.
+/// When the text is invalid.
 pub fn read_obj(name: &str, text: &[u8]) -> Result<Polygons, Diagnostic> {
     let options = tobj::LoadOptions {
         ignore_points: true,

@@ -1,4 +1,4 @@
-//! Meshes in PLY.
+//! Reads meshes in PLY.
 
 use std::io::Cursor;
 
@@ -9,7 +9,7 @@ use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
 
-/// Meshes as text or binary.
+/// The PLY format: meshes as text or binary.
 pub static FORMAT: SurfaceFormat = SurfaceFormat {
     name: "ply",
     summary: "PLY, text or binary: `x`, `y` and `z` of its vertices, `vertex_indices` of its faces",
@@ -73,11 +73,11 @@ fn indices(property: &Property) -> Option<Vec<i64>> {
     })
 }
 
-/// The vertices and faces of a PLY file, as text or binary: `x`, `y` and `z` of its vertices and
-/// `vertex_indices` (or `vertex_index`) of its faces. `name` is what messages call it.
+/// Reads the vertices and faces of a PLY file, text or binary: `x`, `y` and `z` of its vertices, and `vertex_indices`
+/// (or `vertex_index`) of its faces. `name` is the file's name in messages.
 ///
 /// # Errors
-/// When the bytes have a fault.
+/// When the bytes are invalid.
 pub fn read_ply(name: &str, bytes: &[u8]) -> Result<Polygons, Diagnostic> {
     let refuse = |reason: String| {
         let message = format!("the PLY file cannot be read: {reason}; export it again");

@@ -1,4 +1,4 @@
-//! Arrow arrays, which Parquet is read as too, appended to columns.
+//! Appends Arrow arrays, to which Parquet is also decoded, to columns.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,17 +19,17 @@ use crate::table::columns::{
     Column, ColumnNeed, ColumnNumbers, ColumnValues, RequestedColumn, Table, wrong_type,
 };
 
-/// Takes the rows of a table as they come.
+/// Collects the rows of a table while they arrive.
 pub(crate) struct Gather {
     table: Table,
     known: Vec<KnownWords>,
 }
 
-/// The words of a column that were met before.
+/// The words of a column that occurred before.
 #[derive(Default)]
 struct KnownWords {
     codes: HashMap<String, u32>,
-    /// The last dictionary and the codes of its words: batches mostly share one.
+    /// The last dictionary and the codes of its words, because batches usually share one.
     last: Option<(ArrayRef, Vec<u32>)>,
 }
 
@@ -37,7 +37,7 @@ impl Gather {
     /// For the requested columns, each with its type.
     ///
     /// # Errors
-    /// When a type is not what its column needs.
+    /// When a column does not have the type that it needs.
     pub(crate) fn new<'a>(
         file: &str,
         requested: impl IntoIterator<Item = (&'a RequestedColumn, &'a DataType)>,
@@ -67,10 +67,10 @@ impl Gather {
         })
     }
 
-    /// Appends the rows of a batch with the requested columns, in their order.
+    /// Appends the rows of a batch that contains the requested columns in their order.
     ///
     /// # Errors
-    /// When a column is of another type than was said, or a number does not fit.
+    /// When a column is of another type than before, or when a number does not fit.
     pub(crate) fn push(&mut self, batch: &[&dyn Array], rows: usize) -> Result<(), Diagnostic> {
         let columns = self
             .table
@@ -112,10 +112,10 @@ impl Gather {
         Ok(())
     }
 
-    /// The table, once there are no more rows.
+    /// The table, after the last row.
     ///
     /// # Errors
-    /// When a column is shorter than the others.
+    /// When columns have different lengths.
     pub(crate) fn finish(self) -> Result<Table, Diagnostic> {
         let mut columns = self.table.columns.iter();
         if let Some(short) = columns.find(|column| column.len() != self.table.rows) {
@@ -140,7 +140,7 @@ pub(crate) fn chosen<'a>(batch: &'a RecordBatch, indices: &[usize]) -> Option<Ve
         .collect()
 }
 
-/// An empty column for a type; nothing if the type does not serve.
+/// An empty column for a type; `None` if the type is not usable.
 fn values(data_type: &DataType, need: ColumnNeed) -> Option<ColumnValues> {
     let numbers = numbers(data_type);
     match (need, data_type) {
@@ -204,7 +204,7 @@ fn is_text(data_type: &DataType) -> bool {
     }
 }
 
-/// Appends an array to what is of its type; nothing if it is of another.
+/// Appends an array to values of its type; `None` if it is of another type.
 fn append(
     values: &mut ColumnValues,
     known: &mut KnownWords,
@@ -276,7 +276,7 @@ fn append_stamps(stamps: &mut Vec<i64>, array: &dyn Array) -> Option<()> {
     }
 }
 
-/// The code of a word, a new one if need be.
+/// The code of a word, which is new if necessary.
 fn code(words: &mut Vec<String>, known: &mut KnownWords, word: &str) -> u32 {
     if let Some(&code) = known.codes.get(word) {
         return code;
@@ -287,7 +287,7 @@ fn code(words: &mut Vec<String>, known: &mut KnownWords, word: &str) -> u32 {
     code
 }
 
-/// Rows without a word are given the first; the column is refused for them.
+/// Appends words. Rows without a word get the first one, and the column is refused for them later.
 fn append_words(
     codes: &mut Vec<u32>,
     words: &mut Vec<String>,

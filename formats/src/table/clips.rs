@@ -1,5 +1,5 @@
-//! From columns to clips: rows are shared out to clips and tracks, keys become unit quaternions at
-//! increasing times.
+//! Makes clips of columns: rows are assigned to clips and tracks, and keys become unit quaternions at increasing
+//! times.
 
 mod keys;
 
@@ -23,10 +23,10 @@ use crate::table::skeleton;
 use crate::table::times::{RowTimes, times};
 use crate::warnings::Warnings;
 
-/// Makes clips of a table that holds what its plan wants.
+/// Makes the clips of a table that contains the columns of its plan.
 ///
 /// # Errors
-/// The first fault, if the table is of one clip; in one of several it refuses that clip alone.
+/// The first error if the table is of one clip. In a table of several clips, an error refuses one clip only.
 pub(crate) fn clips(
     table: &Table,
     plan: &TablePlan,
@@ -95,31 +95,31 @@ pub(crate) fn clips(
     Ok(loaded)
 }
 
-/// One clip of a table: some of its rows, or all.
+/// One clip of a table: all of its rows, or some.
 pub(crate) struct TableClip<'a> {
     pub(crate) table: &'a Table,
     times: &'a RowTimes,
     rows: Option<&'a [u32]>,
-    /// The track of each row of the table, and the names of the tracks; none in a table of one.
+    /// The track of each row of the table, and the names of the tracks; `None` in a table of one track.
     tracks: Option<&'a (Vec<u32>, Vec<String>)>,
     pub(crate) options: &'a ReadOptions,
 }
 
-/// What becomes of a clip's rows.
+/// The assignment of a clip's rows.
 pub(crate) struct SharedRows<'a> {
     pub(crate) tracks: Vec<TableTrack<'a>>,
-    /// Places of rows among those of the clip; tracks have parts of this list.
+    /// Indices of rows among those of the clip; each track has a range of this list.
     order: Vec<u32>,
     /// The times of tracks.
     lists: Vec<Vec<f64>>,
 }
 
-/// Where the keys of one track come from.
+/// The source of the keys of one track.
 pub(crate) struct TableTrack<'a> {
     name: String,
     pub(crate) parts: &'a Parts,
     range: Range<usize>,
-    /// Which of the lists of times is its own.
+    /// The index of its list of times.
     list: usize,
 }
 
@@ -197,7 +197,7 @@ impl TableClip<'_> {
         Ok(motion)
     }
 
-    /// Every row to every track: those of a wide table.
+    /// Assigns every row to every track, in a wide table.
     fn share_all<'a>(&self, tracks: &'a [(String, Parts)]) -> SharedRows<'a> {
         let track = |(name, parts): &'a (String, Parts)| TableTrack {
             name: name.clone(),
@@ -213,7 +213,7 @@ impl TableClip<'_> {
         }
     }
 
-    /// Takes from each track the rows in which a number of it is missing.
+    /// Removes from each track the rows in which one of its numbers is missing.
     fn leave_out_gaps(
         &self,
         plan: &TablePlan,
@@ -264,7 +264,7 @@ impl TableClip<'_> {
         Ok(())
     }
 
-    /// Each row to the track that a column names.
+    /// Assigns each row to the track that a column names.
     fn share_out<'a>(&self, parts: &'a Parts) -> SharedRows<'a> {
         let (codes, names) = match (self.tracks, self.rows) {
             (None, _) => (Cow::Owned(vec![0; self.len()]), vec![String::new()]),
@@ -316,7 +316,7 @@ impl TableClip<'_> {
             .collect()
     }
 
-    /// Drops keys that are given twice; refuses times that decrease.
+    /// Removes repeated keys, and refuses times that decrease.
     fn increasing(
         &self,
         plan: &TablePlan,

@@ -1,15 +1,15 @@
-//! The columns of a table, whatever file they came from, and where a fault in them is.
+//! The columns of a table of any file format, and the locations of errors in them.
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::TimeUnit;
 
-/// What a column has to hold.
+/// The kind of values that a column must contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum ColumnNeed {
     Number,
     Whole,
-    /// Text, or whole numbers that serve as names.
+    /// Text, or integers that serve as names.
     Name,
     Time,
     List,
@@ -18,21 +18,21 @@ pub(crate) enum ColumnNeed {
 /// A column that is to be read.
 #[derive(Debug)]
 pub(crate) struct RequestedColumn {
-    /// What the file calls it.
+    /// Its name in the file.
     pub(crate) name: String,
     /// Its index among all columns of the file.
     pub(crate) index: usize,
     pub(crate) need: ColumnNeed,
 }
 
-/// Columns of one length.
+/// Columns of equal length.
 pub(crate) struct Table {
-    /// What messages call the input.
+    /// The input's name in messages.
     pub(crate) file: String,
-    /// As many as the plan wants, in its order.
+    /// The columns of the plan, in its order.
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: usize,
-    /// The text, where the table was one: for locations by line and column.
+    /// The text, if the table is text, for locations by line and column.
     pub(crate) text: Option<Text>,
 }
 
@@ -46,26 +46,26 @@ pub(crate) struct Column {
     pub(crate) null: Option<usize>,
 }
 
-/// What a column holds.
+/// The values of a column.
 pub(crate) enum ColumnValues {
     Numbers(ColumnNumbers),
-    /// Times as text has them, in seconds, and the most decimals that one of them has.
+    /// Times in seconds as in the text, and the largest number of decimals.
     Decimals(Vec<Decimal>, u32),
-    /// Points in time, counted from a day of their own.
+    /// Points in time, relative to a day of the file's choice.
     Stamps(Vec<i64>, TimeUnit),
-    /// Each row is one of the words.
+    /// A word for each row, by its index.
     Words {
         codes: Vec<u32>,
         words: Vec<String>,
     },
-    /// Row `i` ends before number `ends[i]`.
+    /// A list for each row: row `i` ends before index `ends[i]`.
     Lists {
         ends: Vec<usize>,
         numbers: ColumnNumbers,
     },
 }
 
-/// Numbers of the type that the file has them in.
+/// Numbers of the type in the file.
 pub(crate) enum ColumnNumbers {
     F32(Vec<f32>),
     F64(Vec<f64>),
@@ -91,7 +91,7 @@ impl ColumnNumbers {
     }
 }
 
-/// What finds the line and the column of a cell again.
+/// Finds the line and the column of a cell.
 pub(crate) type Text = Box<dyn Fn(usize, usize) -> Location + Sync>;
 
 impl Table {
@@ -99,7 +99,7 @@ impl Table {
         Diagnostic::new(&self.file, code, message)
     }
 
-    /// How many numbers the list of the first row has, of a column of lists.
+    /// The length of the list in the first row of a column of lists.
     pub(crate) fn list_length(&self, column: usize) -> Option<usize> {
         match &self.columns.get(column)?.values {
             ColumnValues::Lists { ends, .. } => ends.first().copied(),
@@ -107,7 +107,7 @@ impl Table {
         }
     }
 
-    /// Where a cell is.
+    /// The location of a cell.
     pub(crate) fn location(&self, column: usize, row: usize) -> Location {
         let column = &self.columns[column];
         match &self.text {
@@ -116,7 +116,7 @@ impl Table {
         }
     }
 
-    /// Refuses a cell.
+    /// An error about a cell.
     pub(crate) fn refuse_at(
         &self,
         column: usize,
@@ -129,7 +129,7 @@ impl Table {
         refusal
     }
 
-    /// Refuses the first null of any column; of numbers not where gaps are bridged, as they are NaN then.
+    /// Refuses the first null of any column; with `bridges_gaps` not those of numbers, which are NaN then.
     pub(crate) fn check_nulls(&self, bridges_gaps: bool) -> Result<(), Diagnostic> {
         let is_float = |column: &Column| {
             matches!(
@@ -172,14 +172,14 @@ impl Column {
 #[derive(Clone, Copy)]
 pub(crate) struct CellReader<'a> {
     pub(crate) numbers: &'a ColumnNumbers,
-    /// Where the lists of the rows end, in a column of lists.
+    /// The ends of the lists of the rows, in a column of lists.
     pub(crate) ends: Option<&'a [usize]>,
     /// The index of the number in each list.
     pub(crate) item: usize,
 }
 
 impl CellReader<'_> {
-    /// Reads nothing.
+    /// A reader of no column.
     pub(crate) const NONE: Self = Self {
         numbers: &ColumnNumbers::Whole(Vec::new()),
         ends: None,
@@ -195,7 +195,7 @@ impl CellReader<'_> {
     }
 }
 
-/// Numbers of each row from several columns, as slices where they are all of one type.
+/// The numbers of each row from several columns; they are slices if all columns are of one type.
 pub(crate) enum Cells<'a, const N: usize> {
     F32([&'a [f32]; N]),
     F64([&'a [f64]; N]),
@@ -233,7 +233,7 @@ fn slices<'a, T, const N: usize>(
     Some(lists)
 }
 
-/// The refusal of a column whose type does not serve.
+/// The error of a column whose type is not usable.
 pub(crate) fn wrong_type(file: &str, column: &str, found: &str, need: ColumnNeed) -> Diagnostic {
     let expected = match need {
         ColumnNeed::Number => "numbers",

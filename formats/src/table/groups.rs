@@ -1,4 +1,4 @@
-//! Rows shared out to what a column names.
+//! Groups rows by the values of a column.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
 
-/// The distinct values of a column in the order in which they come up, and which each row has.
+/// The distinct values of a column in the order of their first rows, and the index of the value of each row.
 pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
     match &table.columns[column].values {
         ColumnValues::Words { codes, words } => {
@@ -27,14 +27,14 @@ pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
     }
 }
 
-/// Numbers the distinct values in the order in which they come up. Those whose slot is small are
-/// found in a list, which is quicker than a map.
+/// Assigns indices to distinct values in the order in which they occur. Values with a small slot are found in a list,
+/// which is faster than a map.
 pub(crate) fn numbered<T: Copy + Eq + Hash>(
     values: impl Iterator<Item = T>,
     slot_of: impl Fn(T) -> usize,
 ) -> (Vec<u32>, Vec<T>) {
     const SMALL: usize = 1 << 16;
-    /// There are fewer rows than this.
+    /// No value has this index, because there are fewer rows.
     const NONE: u32 = u32::MAX;
     let mut small: Vec<u32> = Vec::new();
     let mut large: HashMap<T, u32> = HashMap::new();
@@ -64,8 +64,8 @@ pub(crate) fn numbered<T: Copy + Eq + Hash>(
     (codes.collect(), distinct)
 }
 
-/// The indices of a list's entries sorted by code, those of equal ones in their order, and the range
-/// of each code among them.
+/// The indices of a list's entries sorted by code, with those of equal codes in their order, and the range of each
+/// code.
 pub(crate) fn rows_by_code(codes: &[u32], count: usize) -> (Vec<u32>, Vec<Range<usize>>) {
     let mut next = vec![0usize; count];
     for &code in codes {

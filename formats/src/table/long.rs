@@ -1,4 +1,4 @@
-//! Results as a long table: a row for each rotation, `frame`, `time`, `track`, then its numbers.
+//! Writes results as a long table: a row for each rotation, with `frame`, `time`, `track` and its numbers.
 
 use std::collections::HashMap;
 use std::io;
@@ -16,7 +16,7 @@ use crate::quaternion::ComponentOrder;
 use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, invalid, names};
 use crate::table::skeleton;
 
-/// Begins a table of a result's rotations.
+/// Begins the table of a result's rotations.
 pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
     result: &ResultShape<'a>,
     begin: impl FnOnce(Head) -> io::Result<S>,
@@ -51,14 +51,14 @@ pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
     }))
 }
 
-/// Writes rotations as they come.
+/// Writes rotations while they arrive.
 struct Rotations<'a, S> {
     sink: S,
     batch: Batch,
     timeline: &'a Timeline,
     layout: Layout,
     encoding: Encoding,
-    /// Quaternions are to have w first.
+    /// Whether w is the first component of quaternions.
     is_w_first: bool,
     tracks: usize,
     written: usize,
@@ -116,7 +116,7 @@ impl<S: RowSink> ResultWriter for Rotations<'_, S> {
     }
 }
 
-/// Writes poses, whose numbers are f32; positions that count from an origin are f64.
+/// Writes poses with f32 numbers; positions with an origin are f64.
 pub(crate) fn write_poses<S: RowSink>(
     poses: &Poses<'_>,
     begin: impl FnOnce(Head) -> io::Result<S>,
@@ -154,11 +154,10 @@ pub(crate) fn write_poses<S: RowSink>(
     sink.finish()
 }
 
-/// Writes sampled clips, one after another. Several clips, and one that has a name, have it in the
-/// column `clip`.
+/// Writes sampled clips, one after another. Several clips, or one with a name, have it in the column `clip`.
 ///
 /// # Errors
-/// When writing fails, or a clip's lists are not of one length.
+/// When writing fails, or when the lengths of a clip's lists do not fit.
 pub(crate) fn write_motion<S: RowSink>(
     clips: &[SampledClip<'_>],
     order: Option<ComponentOrder>,
@@ -219,7 +218,7 @@ pub(crate) fn write_motion<S: RowSink>(
     Ok(sink.finish()?)
 }
 
-/// The names of the tracks of all clips, each once, and which each track has.
+/// The names of the tracks of all clips, each once, and the index of the name of each track.
 fn track_names(clips: &[SampledClip<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
     let mut code_of = HashMap::new();
     let mut all = Vec::new();
@@ -236,7 +235,7 @@ fn track_names(clips: &[SampledClip<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
     (Arc::new(StringArray::from_iter_values(all)), codes)
 }
 
-/// What is said of the clips; of each apart where there are several that differ.
+/// The notes on the clips; those of several clips are separate if they differ.
 fn notes(clips: &[SampledClip<'_>]) -> Vec<(String, String)> {
     let mut notes: Vec<(String, String)> = Vec::new();
     for (index, sampled) in clips.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Tables of keys: Parquet, Arrow IPC and CSV are three ways to write the same columns.
+//! Tables of keys: Parquet, Arrow IPC and CSV are three forms of the same columns.
 //!
-//! A format reads the names of its columns; the [`plan`] says which of them are what; the
-//! format then reads those into [columns], and [clips] makes clips of them.
+//! A format reads the names of its columns, and the [`plan`] assigns a meaning to them. The format then reads the
+//! columns of the plan ([`columns`]), and [`clips`] makes clips of them.
 
 #[cfg(feature = "parquet")]
 pub(crate) mod arrays;
@@ -26,8 +26,8 @@ use crate::diagnostic::{Code, Diagnostic};
 #[cfg(feature = "parquet")]
 use crate::guarded::guarded;
 
-/// What `decode` makes of a file by another crate's decoders, which assert what a damaged `part` of
-/// it does not keep. Nothing that they have touched is used after that.
+/// The result of `decode`, which calls decoders of other crates. Their assertions fail if `part` of a file is
+/// damaged; this becomes an error. Values that they have modified are not used afterwards.
 #[cfg(feature = "parquet")]
 pub(crate) fn decoded<T>(
     name: &str,

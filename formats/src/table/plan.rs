@@ -1,4 +1,4 @@
-//! Which columns of a table are what, by their names and by what `--map` says of them.
+//! Assigns a meaning to the columns of a table, by their names and by the option `--map`.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -11,34 +11,33 @@ use crate::rotation_form::RotationForm;
 use crate::table::columns::{ColumnNeed, RequestedColumn, Table};
 use crate::warnings::listed;
 
-/// Columns that tell the tracks of long tables apart.
+/// Columns with the track of a row, in long tables.
 const TRACK: [&str; 3] = ["track", "joint", "body"];
 
-/// Columns that tell clips apart.
+/// Columns with the clip of a row.
 const CLIP: [&str; 3] = ["clip", "clip_id", "motion_id"];
 
-/// Columns that count rows.
+/// Columns with the number of a row.
 const COUNTED: [&str; 3] = ["frame", "frame_index", "index"];
 
-/// The columns that are read, and what becomes of them. Columns are given by their indices in
-/// `columns`.
+/// The columns that are read, and their use. Columns are indices in `columns`.
 #[derive(Debug)]
 pub(crate) struct TablePlan {
     pub(crate) columns: Vec<RequestedColumn>,
-    /// The times; of frames where `is_frames`.
+    /// The column of times, or of frames if `is_frames`.
     pub(crate) time: usize,
     pub(crate) is_frames: bool,
-    /// What tells clips apart, and what goes before its values in their names.
+    /// The column of clips, and the prefix of its values in the names of clips.
     pub(crate) clip: Option<(usize, &'static str)>,
     pub(crate) rows: RowLayout,
     /// The names of the columns that are not read.
     pub(crate) left_out: Vec<String>,
-    /// What the file says of itself beside its rows.
+    /// The metadata of the file.
     #[cfg(feature = "parquet")]
     pub(crate) notes: Vec<(String, String)>,
 }
 
-/// What a row is.
+/// The meaning of a row.
 #[derive(Debug)]
 pub(crate) enum RowLayout {
     /// A key of the track that a column names.
@@ -47,14 +46,14 @@ pub(crate) enum RowLayout {
         parts: Box<Parts>,
         is_world: bool,
     },
-    /// A key of every track, each with its name.
+    /// A key of every track; with the name of each.
     Times {
         tracks: Vec<(String, Parts)>,
         is_world: bool,
     },
 }
 
-/// Where the numbers of a track's keys are.
+/// The columns of the numbers of a track's keys.
 #[derive(Debug)]
 pub(crate) struct Parts {
     pub(crate) rotation: RotationCells,
@@ -62,12 +61,12 @@ pub(crate) struct Parts {
     pub(crate) scale: Option<[CellSource; 3]>,
 }
 
-/// Where the numbers of rotations are.
+/// The columns of the numbers of rotations.
 #[derive(Debug)]
 pub(crate) enum RotationCells {
-    /// Of quaternions, x y z w.
+    /// Quaternions x y z w.
     Quaternion([CellSource; 4]),
-    /// Of rotations in another form, as many as it takes.
+    /// Rotations in another form, with as many numbers as it needs.
     Other(RotationForm, Vec<CellSource>),
 }
 
@@ -80,19 +79,19 @@ impl RotationCells {
     }
 }
 
-/// Where a number of a row is: a column, or an item in the list of a column.
+/// The location of a number in a row: a column, or an index in the list of a column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CellSource {
     pub(crate) column: usize,
     pub(crate) item: Option<usize>,
-    /// How many numbers the list must have, where it is taken as a whole.
+    /// The required length of the list, if all of it is used.
     pub(crate) whole: Option<usize>,
 }
 
-/// The names of a file's columns, after `--map` has given some of them other names.
+/// The names of a file's columns, some of which `--map` has changed.
 struct ColumnNames<'a> {
     file: &'a str,
-    /// The columns of each name; a second one makes the name useless.
+    /// The columns with each name; a name with several columns is not usable.
     seen: HashMap<String, Vec<usize>>,
     file_columns: &'a [String],
     requested: Vec<RequestedColumn>,
@@ -161,7 +160,7 @@ impl ColumnNames<'_> {
         Ok(None)
     }
 
-    /// All columns of these names, or none of them.
+    /// The columns with all of these names; `None` if there are none of them.
     fn group<const N: usize>(
         &mut self,
         prefix: &str,
@@ -194,7 +193,7 @@ impl ColumnNames<'_> {
         Ok(Some(cells))
     }
 
-    /// The columns of one track; whether its translations are in the world.
+    /// The columns of one track, and whether its translations are relative to the world.
     fn parts(&mut self, prefix: &str) -> Result<(Parts, bool), Diagnostic> {
         // Trajectories call their rotations qx qy qz qw, and may call their positions x y z.
         let is_pose = self.find(&format!("{prefix}qw"))?.is_some();
@@ -225,7 +224,7 @@ impl ColumnNames<'_> {
 }
 
 impl TablePlan {
-    /// What is not read: columns, and parts of the lists of others.
+    /// The names of data that is not read: columns, and parts of lists.
     pub(crate) fn left_out(&self, table: &Table) -> Option<String> {
         let mut all: Vec<String> = self
             .left_out
@@ -254,7 +253,7 @@ impl TablePlan {
         listed(all)
     }
 
-    /// Where the numbers of all tracks are.
+    /// The locations of the numbers of all tracks.
     fn cells(&self) -> impl Iterator<Item = &CellSource> {
         let parts: Vec<&Parts> = match &self.rows {
             RowLayout::Keys { parts, .. } => vec![parts],
@@ -269,7 +268,7 @@ impl TablePlan {
     /// The plan for a file with columns of these names.
     ///
     /// # Errors
-    /// When times or rotations are not among them, or `--map` names others.
+    /// When times or rotations are not among them, or when `--map` names a column that does not exist.
     pub(crate) fn of(
         file: &str,
         file_columns: &[String],
@@ -333,7 +332,7 @@ impl TablePlan {
     }
 }
 
-/// Gives columns the names that `--map` has for them; gives the entries that are lists' parts.
+/// Renames columns as `--map` specifies; returns the entries that are parts of lists.
 fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
     let parsed: Result<Map, _> = map.parse();
     let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
@@ -368,7 +367,7 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<Vec<Entry>, Diagnost
     Ok(lists)
 }
 
-/// Whether a column may have this name; other targets are tracks.
+/// Whether a column may have this name; other names are tracks.
 fn is_column(target: &str) -> bool {
     const WHOLE: [&str; 4] = ["time", "timestamp", "t", "frame_index"];
     const NUMBERS: [&str; 17] = [
@@ -490,7 +489,7 @@ fn list_rows(names: &mut ColumnNames<'_>, lists: &[Entry]) -> Result<RowLayout, 
     })
 }
 
-/// The columns from one name to another, `first..last`, where no column is called so.
+/// The columns from one name to another, `first..last`, unless a column has this name.
 fn column_range(names: &ColumnNames<'_>, source: &str) -> Option<Range<usize>> {
     let index = |column: &str| {
         names
@@ -505,8 +504,7 @@ fn column_range(names: &ColumnNames<'_>, source: &str) -> Option<Range<usize>> {
     Some(index(first)?..index(last)? + 1)
 }
 
-/// The cells of the numbers that an entry takes from a list: the first of it, or its part; or of
-/// neighbouring columns.
+/// The cells of the numbers that an entry takes: the first ones of a list, a part of it, or neighbouring columns.
 fn cells(
     names: &mut ColumnNames<'_>,
     entry: &Entry,

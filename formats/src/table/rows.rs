@@ -1,7 +1,6 @@
-//! Rows of a long table, gathered into batches for formats that take them so.
+//! Collects rows of a long table in batches, for formats that need batches.
 //!
-//! A result of any length takes the memory of one batch, and a file does not depend on the windows
-//! in which the result came.
+//! A result of any length takes the memory of one batch, and the file does not depend on the windows of the result.
 
 use std::io;
 use std::sync::Arc;
@@ -17,21 +16,21 @@ use tumble::{ComponentType, Encoding, TrackSet};
 
 use crate::names::distinct_names;
 
-/// Rows of a batch: 2 MB of rotations.
+/// Number of rows of a batch: 2 MB of rotations.
 const BATCH: usize = 1 << 16;
 
-/// What a table is to be, for a format that begins to write it.
+/// The description of a table for a format that begins to write it.
 pub(crate) struct Head {
     pub(crate) schema: SchemaRef,
-    /// What made it: `("method", "slerp")`.
+    /// How the table was made: `("method", "slerp")`.
     pub(crate) notes: Vec<(String, String)>,
 }
 
-/// A format that takes the rows of a table.
+/// A format that writes the rows of a table.
 pub(crate) trait RowSink {
     fn write(&mut self, batch: &RecordBatch) -> io::Result<()>;
 
-    /// Ends a part of the table that may be read by itself.
+    /// Ends a part of the table that can be read by itself.
     fn end_part(&mut self) -> io::Result<()>;
 
     fn finish(self) -> io::Result<()>;
@@ -46,7 +45,7 @@ pub(crate) struct Batch {
     pub(crate) numbers: Vec<ComponentColumn>,
     /// The names of all tracks, the same for every batch.
     track_names: ArrayRef,
-    /// The clip of the rows that come, and the names of all clips.
+    /// The clip of the following rows, and the names of all clips.
     pub(crate) clip: Option<(i32, ArrayRef)>,
 }
 
@@ -76,7 +75,7 @@ impl ComponentColumn {
         }
     }
 
-    /// Of coordinates: f64 where some count from an origin.
+    /// For coordinates: f64 if some have an origin.
     pub(crate) fn of_positions(has_origins: bool) -> Self {
         match has_origins {
             true => Self::F64(Vec::new()),
@@ -84,7 +83,7 @@ impl ComponentColumn {
         }
     }
 
-    /// Takes a number, which is of f32 unless the column is wider.
+    /// Appends a number, which is an f32 unless the column is f64.
     pub(crate) fn push_number(&mut self, number: f64) {
         match self {
             Self::F64(list) => list.push(number),
@@ -92,7 +91,7 @@ impl ComponentColumn {
         }
     }
 
-    /// Takes a number of an encoding, in the machine's byte order.
+    /// Appends a number of an encoding, in the machine's byte order.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         match self {
             Self::F64(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
@@ -116,7 +115,7 @@ pub(crate) fn invalid(message: impl Into<String>) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, message.into())
 }
 
-/// A dictionary column's type.
+/// The type of a dictionary column.
 fn names_type() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
@@ -132,7 +131,7 @@ fn dictionary(codes: Vec<i32>, names: &ArrayRef) -> io::Result<ArrayRef> {
 }
 
 impl Batch {
-    /// For a table whose numbers are called so.
+    /// For a table with components of these names.
     pub(crate) fn new(
         components: impl IntoIterator<Item = (String, ComponentColumn)>,
         track_names: ArrayRef,
@@ -178,7 +177,7 @@ impl Batch {
         self.frames.len() >= BATCH
     }
 
-    /// Hands on the rows that there are.
+    /// Passes the collected rows to `sink`.
     pub(crate) fn flush(&mut self, sink: &mut impl RowSink) -> io::Result<()> {
         if self.frames.is_empty() {
             return Ok(());

@@ -1,4 +1,4 @@
-//! The parents of joints, beside the rows of a table: as JSON in the metadata of Parquet and Arrow.
+//! The parents of joints beside the rows of a table: JSON in the metadata of Parquet and Arrow.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::distinct_names;
 
-/// The key of the metadata; that of one clip of several may have its number behind it, `skeleton.1`.
+/// The key of the metadata; for one clip of several, its number may follow: `skeleton.1`.
 pub(crate) const KEY: &str = "skeleton";
 
 /// The skeleton of a clip, by the names of its tracks in the table.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct SkeletonNote {
     tracks: Vec<String>,
-    /// For each track the index of its parent; none for a root.
+    /// For each track, the index of its parent; `None` for a root.
     parents: Vec<Option<usize>>,
-    /// Where each rests in its parent's frame.
+    /// For each track, its rest position relative to its parent.
     offsets: Vec<[f64; 3]>,
 }
 
-/// What the metadata says of a clip's skeleton; nothing where no joint has a parent, and all rest at 0.
+/// The metadata of a clip's skeleton; `None` if no joint has a parent and all rest at 0.
 pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String)> {
     let clip = sampled.clip;
     if !clip.has_hierarchy() {
@@ -39,7 +39,7 @@ pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String
     Some((KEY, text))
 }
 
-/// Gives the clip of this index the skeleton that the metadata says, if it is of these tracks.
+/// Sets the skeleton of the clip with this index from the metadata, if it has these tracks.
 pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(String, String)]) {
     let find = |key: &str| notes.iter().find(|(known, _)| known == key);
     let note = find(&format!("{KEY}.{index}")).or_else(|| find(KEY));

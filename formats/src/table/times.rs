@@ -1,4 +1,4 @@
-//! A column of times as seconds.
+//! Converts a column of times to seconds.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
@@ -9,23 +9,23 @@ use crate::table::plan::TablePlan;
 /// Times of all rows.
 pub(crate) struct RowTimes {
     pub(crate) seconds: Vec<f64>,
-    /// The type that the file has them in; `None` if they are exact as they are.
+    /// The type of the times in the file; `None` if they are exact.
     pub(crate) precision: Option<Precision>,
-    /// The whole second that they are counted from.
+    /// The whole second from which they count.
     pub(crate) offset: i64,
 }
 
-/// Whole numbers this far from 0 are no seconds: the year 5138 as a Unix time.
+/// Integers above this are not seconds: it is the year 5138 as a Unix time.
 const MAX_SECONDS: u64 = 100_000_000_000;
 
-/// Stamps that begin this many seconds from 0 are counted from the whole second of the first:
-/// an f64 of Unix seconds is 0.2 µs wide, one that starts at 0 keeps nanoseconds for 104 days.
+/// If the first stamp is at least this many seconds from 0, stamps count from its whole second: the step of an f64 of
+/// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
 const OFFSET_LIMIT: u64 = 1_000_000;
 
 /// The times of a table's rows.
 ///
 /// # Errors
-/// When they are whole numbers of a unit that nobody says, or frames before the first.
+/// When they are integers without a known unit, or frames before the first one.
 pub(crate) fn times(
     table: &Table,
     plan: &TablePlan,
@@ -104,7 +104,8 @@ pub(crate) fn times(
     }
 }
 
-/// Times in f64. Those that begin far from 0 were rounded there: 1.7e9 s to a quarter of a microsecond.
+/// Times in f64. Those that begin at a large distance from 0 were rounded there: 1.7e9 s to a quarter of a
+/// microsecond.
 fn doubles(mut seconds: Vec<f64>) -> RowTimes {
     let first = seconds
         .iter()

@@ -1,9 +1,9 @@
-//! Lists that grow without a copy, for inputs of unknown length.
+//! Lists that grow without copies, for inputs of unknown length.
 
 use bytemuck::Zeroable;
 
-/// Rows of `width` values, in blocks that become larger: what there is is never moved while
-/// more comes, and a block goes when its values are at their places.
+/// Rows of `width` values, in blocks of increasing size. Values do not move while rows are added, and a block is
+/// freed when its values have been moved to the result.
 pub(crate) struct Blocks<T> {
     width: usize,
     blocks: Vec<Vec<T>>,
@@ -20,7 +20,7 @@ impl<T: Copy + Zeroable> Blocks<T> {
         }
     }
 
-    /// Values of a row.
+    /// Number of values in a row.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
@@ -43,7 +43,7 @@ impl<T: Copy + Zeroable> Blocks<T> {
         self.blocks.last()?.last().copied()
     }
 
-    /// Whole rows.
+    /// Number of complete rows.
     pub(crate) fn rows(&self) -> usize {
         self.blocks
             .iter()
@@ -51,7 +51,7 @@ impl<T: Copy + Zeroable> Blocks<T> {
             .sum()
     }
 
-    /// All values, one column behind the other.
+    /// All values, one column after another.
     pub(crate) fn into_columns(self) -> Vec<T> {
         let rows = self.rows();
         // Memory that is not touched before it is needed.

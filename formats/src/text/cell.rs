@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-/// A text as a cell. Spreadsheets take cells that begin with `=`, `+`, `-` or `@` for formulas, which may
-/// run programs: they, and what such a cell looks like already, get a quote in front, which spreadsheets do
-/// not show. Numbers are no texts.
+/// A text as a cell. Spreadsheets interpret cells that begin with `=`, `+`, `-` or `@` as formulas, which may run
+/// programs. Such cells, and texts that look like escaped cells, get a leading quote, which spreadsheets do not
+/// display. This is not for numbers.
 pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
     match is_formula(text.trim_start_matches(QUOTE)) {
         true => Cow::Owned(format!("{QUOTE}{text}")),
@@ -12,7 +12,7 @@ pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// What a cell of text says: see [`text_cell`].
+/// The text of a cell that [`text_cell`] wrote.
 pub(crate) fn cell_text(cell: &str) -> &str {
     match cell.strip_prefix(QUOTE) {
         Some(text) if is_formula(text.trim_start_matches(QUOTE)) => text,

@@ -1,17 +1,16 @@
-//! Text line by line: line ends, encodings, and characters that do not belong.
+//! Reads text line by line: line ends, encodings, and characters that do not belong in it.
 
 use std::io::{BufRead, Read};
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::source::MAX_BYTES;
 
-/// Lines of one input, with their numbers; what is remarkable about them collects
-/// in `warnings`.
+/// The lines of one input, with their numbers; warnings about them are collected in `warnings`.
 pub(crate) struct Lines<R> {
     file: String,
     reader: R,
     limits: Limits,
-    /// Whether the text may hold names and remarks in any language, not numbers alone.
+    /// Whether the text may contain names and comments in any language, not only numbers.
     names: bool,
     buffer: Vec<u8>,
     /// The number of the line in `buffer`, from 1.
@@ -19,25 +18,25 @@ pub(crate) struct Lines<R> {
     read: u64,
     crlf: u64,
     lf: u64,
-    /// Whether the line in `buffer` ended with a line end.
+    /// Whether the line in `buffer` has a line end.
     pub(crate) ended: bool,
     pub(crate) warnings: Vec<Diagnostic>,
 }
 
-/// How much of an input is read before it is refused.
+/// The largest sizes of an input that is read; a larger input is refused.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Bytes of one line.
+    /// Length of one line in bytes.
     pub line: u64,
-    /// Bytes of the whole input.
+    /// Length of the whole input in bytes.
     pub file: u64,
-    /// Bytes of memory that reading it may take beside the input itself [default:
-    /// [`FACTOR`](crate::budget::FACTOR) times its length and [`BASE`](crate::budget::BASE)].
+    /// Memory in bytes that reading may take in addition to the input [default: [`FACTOR`](crate::budget::FACTOR)
+    /// times the length of the input, plus [`BASE`](crate::budget::BASE)].
     pub memory: Option<u64>,
 }
 
 impl Default for Limits {
-    /// 64 MiB and 16 GiB.
+    /// 64 MiB for a line, 16 GiB for an input, and the default memory.
     fn default() -> Self {
         Self {
             line: 1 << 26,
@@ -47,7 +46,7 @@ impl Default for Limits {
     }
 }
 
-/// First bytes of formats that end up under the name `.dat`.
+/// The first bytes of other formats in files named `.dat`.
 const SIGNATURES: [(&[u8], &str); 6] = [
     (b"\x1f\x8b", "gzip; unpack it first"),
     (b"\x93NUMPY", "NPY; export the keys as text"),
@@ -61,7 +60,7 @@ const SIGNATURES: [(&[u8], &str); 6] = [
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl<R: BufRead> Lines<R> {
-    /// Text of numbers. Looks at the first bytes and skips a byte-order mark.
+    /// For text of numbers. Checks the first bytes and skips a byte-order mark.
     pub(crate) fn new(file: &str, reader: R, limits: Limits) -> Result<Self, Diagnostic> {
         let (mut lines, start) = Self::start(file, reader, limits)?;
         if let Some((_, name)) = SIGNATURES
@@ -79,15 +78,15 @@ impl<R: BufRead> Lines<R> {
         Ok(lines)
     }
 
-    /// Text that may hold names or remarks beside its numbers: letters of any language may occur,
-    /// and a byte-order mark, which says that they do.
+    /// For text with names or comments, in which letters of any language may occur, and a byte-order mark, which
+    /// announces them.
     pub(crate) fn with_names(file: &str, reader: R, limits: Limits) -> Result<Self, Diagnostic> {
         let (mut lines, _) = Self::start(file, reader, limits)?;
         lines.names = true;
         Ok(lines)
     }
 
-    /// The lines behind a byte-order mark, and the first bytes with it.
+    /// The lines after a byte-order mark, and the first bytes with it.
     fn start(file: &str, mut reader: R, limits: Limits) -> Result<(Self, Vec<u8>), Diagnostic> {
         let start = reader
             .fill_buf()
@@ -116,8 +115,8 @@ impl<R: BufRead> Lines<R> {
         Ok((lines, start))
     }
 
-    /// The next line without its end; `None` at the end of the input. Give it back
-    /// ([`Lines::reuse`]), and the one after it needs no memory of its own.
+    /// The next line without its end; `None` at the end of the input. Return the line by [`Lines::reuse`]; the next
+    /// one then needs no new memory.
     pub(crate) fn next(&mut self) -> Result<Option<String>, Diagnostic> {
         self.buffer.clear();
         self.number += 1;
@@ -144,13 +143,13 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(line.unwrap_or_default()))
     }
 
-    /// Takes back the memory of a line.
+    /// Reuses the memory of a line.
     pub(crate) fn reuse(&mut self, line: String) {
         self.buffer = line.into_bytes();
     }
 
-    /// Appends bytes to the buffer, up to the end of a line or one more than a line may
-    /// have; how many. The buffer grows by quarters: a long line is not held twice.
+    /// Appends bytes to the buffer, up to the end of a line or to one more than a line may have; returns how many.
+    /// The buffer grows by quarters, so that a long line is not copied to twice its memory.
     fn read_line(&mut self) -> std::io::Result<u64> {
         let limit = self.limits.line + 1;
         let mut count = 0;
@@ -172,7 +171,7 @@ impl<R: BufRead> Lines<R> {
         Ok(count)
     }
 
-    /// A refusal at a column of the current line.
+    /// An error at a column of the current line.
     pub(crate) fn refuse(&self, column: u64, code: Code, message: String) -> Diagnostic {
         Diagnostic {
             file: self.file.clone(),
@@ -186,7 +185,7 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// A refusal of the input as a whole.
+    /// An error about the input as a whole.
     pub(crate) fn refuse_whole(&self, code: Code, message: String) -> Diagnostic {
         Diagnostic {
             location: None,
@@ -194,7 +193,7 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// A refusal at the end of the input: on the last line, unless that has ended.
+    /// An error at the end of the input: on the last line, unless that has a line end.
     pub(crate) fn refuse_end(&self, code: Code, message: String) -> Diagnostic {
         let mut refusal = self.refuse(1, code, message);
         if let Some(Location::Text { line, .. }) = &mut refusal.location {
@@ -203,7 +202,7 @@ impl<R: BufRead> Lines<R> {
         refusal
     }
 
-    /// Counts a warning; the first of each code keeps its location and message.
+    /// Counts a warning; the first of each code determines the location and the message.
     pub(crate) fn warn(&mut self, column: u64, code: Code, message: impl Into<String>) {
         match self.warnings.iter_mut().find(|w| w.code == code) {
             Some(known) => known.count += 1,
@@ -233,7 +232,7 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// Where the first character is that does not belong into the line.
+    /// The offset of the first character that does not belong in the line.
     fn first_odd(&self) -> Option<usize> {
         // Without a branch for each byte the compiler compares many at once.
         let all_plain = |bytes: &[u8]| bytes.iter().fold(true, |all, &byte| all & is_plain(byte));
@@ -301,7 +300,7 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
-/// Printable ASCII and tabs.
+/// Whether a byte is printable ASCII or a tab.
 fn is_plain(byte: u8) -> bool {
     byte == b'\t' || (b' '..=b'~').contains(&byte)
 }
@@ -310,8 +309,7 @@ fn io_error(file: &str, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(file, Code::Open, format!("cannot be read: {error}"))
 }
 
-/// The tokens of a line with their columns, both from 1; columns are right where all before them
-/// is ASCII.
+/// The tokens of a line with their columns, from 1. Columns are right if everything before them is ASCII.
 pub(crate) fn tokens(line: &str) -> impl Iterator<Item = (u64, &str)> {
     let is_blank = |byte: u8| byte == b' ' || byte == b'\t';
     let bytes = line.as_bytes();

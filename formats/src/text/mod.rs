@@ -1,4 +1,4 @@
-//! Text files: lines, numbers and columns, read as a stream.
+//! Reads text files as a stream: lines, numbers and columns.
 
 pub(crate) mod blocks;
 pub(crate) mod cell;

@@ -1,25 +1,25 @@
-//! Numbers as `.dat` files have them, strictly: what is not plainly a decimal
-//! number is refused with a hint at what it looks like.
+//! Parses numbers as in `.dat` files, strictly: an error contains a hint if the text looks like something else than a
+//! decimal number.
 
 use crate::diagnostic::Code;
 
-/// No number needs more characters.
+/// The largest length of a number in characters.
 const MAX_LENGTH: usize = 64;
 
-/// A number that is kept, perhaps as 0.
+/// A parsed number, which may have become 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Number {
     pub(crate) value: f64,
-    /// It was not 0 but is too small for f32.
+    /// Whether it is not 0 but too small for f32.
     pub(crate) vanished: bool,
-    /// Digits that it is written with.
+    /// How many digits the text has.
     pub(crate) digits: usize,
 }
 
-/// Why a token is no number: code and message.
+/// Why a token is not a number: code and message.
 pub(crate) type Refusal = (Code, String);
 
-/// Reads one token.
+/// Parses one token.
 pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
     if token.len() > MAX_LENGTH {
         let start: String = token.chars().take(16).collect();
@@ -59,18 +59,18 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
     })
 }
 
-/// What a decimal number is made of.
+/// The parts of a decimal number.
 #[derive(Clone, Copy)]
 struct DecimalParts {
-    /// All of them, the exponent's too.
+    /// Number of digits, including those of the exponent.
     digits: usize,
-    /// No digit of the mantissa is another than 0.
+    /// Whether the mantissa is 0.
     zero: bool,
-    /// The digits of the mantissa as one number, if they are at most 19.
+    /// The digits of the mantissa as an integer, if there are 19 or fewer.
     mantissa: u64,
-    /// How many of them come behind the point.
+    /// How many of these digits are after the point.
     decimals: usize,
-    /// There are more than 19, or an exponent.
+    /// Whether there are more than 19, or an exponent.
     is_long: bool,
 }
 
@@ -81,9 +81,9 @@ const POWERS: [f64; 23] = [
 ];
 
 impl DecimalParts {
-    /// The number's magnitude, where one division gives it: with both sides exact in f64 the
-    /// quotient is the correctly rounded number (Clinger, *How to Read Floating Point Numbers
-    /// Accurately*, 1990). Takes a third of the time of a parser for all numbers.
+    /// The number's magnitude, if one division computes it. If both operands are exact in f64, the quotient is
+    /// correctly rounded (Clinger, *How to Read Floating Point Numbers Accurately*, 1990). This takes a third of the
+    /// time of a general parser.
     fn exact_quotient(self) -> Option<f64> {
         let power = POWERS.get(self.decimals)?;
         let exact = !self.is_long && self.mantissa <= 1 << f64::MANTISSA_DIGITS;
@@ -91,8 +91,7 @@ impl DecimalParts {
     }
 }
 
-/// `[+-] digits [. digits] [e [+-] digits]`, with a digit on either side of the
-/// point; nothing for what is no such number.
+/// Parses `[+-] digits [. digits] [e [+-] digits]`, with a digit on either side of the point; `None` for other texts.
 fn decimal(token: &str) -> Option<DecimalParts> {
     let signed = |bytes: &[u8], at: usize| usize::from(matches!(bytes.get(at), Some(b'+' | b'-')));
     let bytes = token.as_bytes();
@@ -168,7 +167,7 @@ fn refuse(token: &str) -> Refusal {
     (Code::Number, format!("`{token}` is not a number; {hint}"))
 }
 
-/// A sign in the middle that no exponent explains, or a second point.
+/// Whether a text has a sign in the middle that is not an exponent's, or a second point.
 fn is_glued(lower: &str) -> bool {
     let signs = lower
         .char_indices()

@@ -1,4 +1,4 @@
-//! How each vertex is reached, and at which vertices paths may bend.
+//! How paths arrive at each vertex, and the vertices at which paths may bend.
 
 use std::f64::consts::TAU;
 
@@ -6,38 +6,38 @@ use crate::exact::fan::Fan;
 use crate::mesh::links::NONE;
 use crate::mesh::surface::Surface;
 
-/// A vertex with so much less than a full angle about it can be a source too: rounding decides
-/// whether a flat one has less.
+/// A vertex whose angle is less than a full angle by this can still be a source, because rounding decides this for a
+/// flat vertex.
 const SLACK: f64 = 1e-9;
 
-/// How the best path so far comes to a vertex.
+/// How the best known path arrives at a vertex.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Arrival {
-    /// Along the edge from this vertex; from none at the start.
+    /// Along the edge from this vertex; `NONE` at the start.
     Edge(u32),
-    /// Straight on from a window.
+    /// Straight from a window.
     Window {
         trail: u32,
-        /// By which the window entered the face.
+        /// The half-edge through which the window entered the face.
         half_edge: u32,
-        /// At the vertex, from the face's left edge to where the path comes from.
+        /// Angle at the vertex, from the left edge of the face to the direction from which the path comes.
         angle: f64,
-        /// The vertex is within the window, which went on at both sides.
+        /// Whether the vertex is within the window, which continued on both sides of it.
         is_inside: bool,
     },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum VertexKind {
-    /// Less than a full angle: no shortest path passes.
+    /// Less than a full angle: no shortest path passes the vertex.
     Convex,
-    /// A full angle: paths pass straight on.
+    /// A full angle: paths pass the vertex without bending.
     Flat,
-    /// More than that, or on a boundary, or where surfaces meet: paths bend.
+    /// More than a full angle, or a vertex on a boundary or where surfaces meet: paths may bend at it.
     Source,
 }
 
-/// The best path to each vertex so far.
+/// The best known path to each vertex.
 pub(super) struct Arrivals {
     lengths: Vec<f64>,
     arrivals: Vec<Arrival>,
@@ -45,7 +45,7 @@ pub(super) struct Arrivals {
 }
 
 impl Arrivals {
-    /// At first the paths along edges.
+    /// Begins with the paths along edges.
     pub(super) fn new(surface: &Surface, lengths: Vec<f64>, before: &[u32]) -> Self {
         let kind = |vertex| {
             let fan = Fan::about(surface, vertex);
@@ -75,7 +75,7 @@ impl Arrivals {
         self.arrivals[vertex as usize] = arrival;
     }
 
-    /// Whether paths leave the vertex that do not pass it within a window.
+    /// Whether paths begin at the vertex that do not pass it within a window.
     pub(super) fn is_source(&self, vertex: u32) -> bool {
         match self.kinds[vertex as usize] {
             VertexKind::Convex => false,

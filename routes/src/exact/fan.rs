@@ -7,24 +7,24 @@ use crate::exact::window::Shape;
 use crate::mesh::links::{MANY, NONE, at, next, previous};
 use crate::mesh::surface::Surface;
 
-/// Paths may turn by so much less than 180°, rad: rounding must leave no gap.
+/// Angle in radians by which paths may bend less than 180°, so that rounding leaves no gap.
 const SLACK: f64 = 1e-8;
 
 /// The faces about a vertex, in order.
 pub(super) struct Fan {
     wedges: Vec<Wedge>,
     is_closed: bool,
-    /// The faces are one fan, closed or open, and every edge has at most two faces.
+    /// Whether the faces are one fan, closed or open, and every edge has one or two faces.
     is_simple: bool,
 }
 
-/// A face's angle at the vertex.
+/// The angle of a face at the vertex.
 struct Wedge {
-    /// Of the face at the vertex.
+    /// The corner of the face at the vertex.
     corner: u32,
-    /// The end of the edge that it begins with.
+    /// The other end of the edge at which it begins.
     first: u32,
-    /// Where it begins and ends, rad.
+    /// The angles at which it begins and ends, in radians.
     from: f64,
     to: f64,
 }
@@ -113,7 +113,7 @@ impl Fan {
         self.wedges.last().map_or(0.0, |wedge| wedge.to)
     }
 
-    /// The directions with at least 180° on either side of where a path comes from.
+    /// The directions that differ by at least 180° on either side from the direction from which a path comes.
     pub(super) fn sector(&self, surface: &Surface, arrival: Arrival) -> Sector {
         if !self.is_simple {
             return Sector::All;
@@ -169,8 +169,8 @@ impl Fan {
         }
     }
 
-    /// The parts of the edge opposite a corner that lie in the sector, measured along its half-edge,
-    /// whose shape is given.
+    /// The parts of the edge opposite a corner that lie in the sector, measured along its half-edge, whose shape is
+    /// `shape`.
     pub(super) fn intervals(
         &self,
         surface: &Surface,

@@ -1,13 +1,12 @@
-//! The shortest path over the surface.
+//! Finds the shortest path over the surface.
 //!
-//! A shortest path is straight within the triangles that it crosses once they are unfolded into a
-//! plane, and bends only at vertices with more than a full angle about them, or on the boundary
-//! (Mitchell, Mount and Papadimitriou, 1987). So *windows* are carried over the surface: all straight
-//! paths from one such vertex through one sequence of edges, which end on one interval of the last
-//! edge. Of the windows that contain the corner opposite, one may go on through both other edges (Chen
-//! and Han, 1996); windows behind which another vertex is a nearer source are dropped (Xin and Wang,
-//! 2009), and the others leave a heap by the least length that a path through them to the goal can
-//! have.
+//! A shortest path is straight within the triangles that it crosses, once they are unfolded into a plane. It bends
+//! only at vertices with more than a full angle around them, or on the boundary (Mitchell, Mount and Papadimitriou,
+//! 1987). Therefore *windows* are propagated over the surface: a window contains all straight paths from one such
+//! vertex through one sequence of edges that end on one interval of the last edge. Of the windows that contain the
+//! opposite corner, one may continue through both other edges (Chen and Han, 1996). Windows behind which another
+//! vertex is a nearer source are dropped (Xin and Wang, 2009). The others are taken from a heap in the order of the
+//! least length that a path through them to the goal can have.
 
 mod arrivals;
 mod fan;
@@ -27,14 +26,14 @@ use crate::exact::window::{Shape, Window, hypotenuse};
 use crate::mesh::links::{MANY, NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
 
-/// Windows that are kept at most, to trace the path back: 8 bytes each, and 80 for each that
-/// waits in the heap; together with the mesh less than 1 GiB.
+/// The largest number of windows that are kept to trace the path back: 8 bytes each, and 80 for each window in the
+/// heap. Together with the mesh this is less than 1 GiB.
 pub(crate) const MAX_WINDOWS: usize = 1 << 26;
-/// Windows that wait at most.
+/// The largest number of windows in the heap.
 const MAX_WAITING: usize = 4_000_000;
 
-/// Corners are taken to be within a window that ends so near to them, in parts of the edge; and
-/// lengths that differ by less, in parts of the whole, are equal.
+/// A corner counts as within a window that ends this near to it, relative to the edge. Lengths that differ by less,
+/// relative to the whole, are equal.
 const TOLERANCE: f64 = 1e-12;
 
 /// An event in the heap: a window by its index, or a vertex.
@@ -44,10 +43,10 @@ enum Event {
     Window(u32),
 }
 
-/// The shortest path from start to goal, which lie on one piece.
+/// The shortest path from start to goal, which lie on the same piece.
 ///
 /// # Errors
-/// When it would take more windows than may be kept.
+/// When it needs more windows than may be kept.
 pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     find_path_within(task, MAX_WINDOWS)
 }
@@ -64,12 +63,13 @@ fn find_path_within(task: &Task<'_>, max_windows: usize) -> Result<Vec<Spot>, Ro
     ))
 }
 
-/// Of the windows that enter through a half-edge and contain the corner opposite, the shortest there.
+/// The window with the shortest path to the opposite corner, of all windows that enter through a half-edge and
+/// contain it.
 #[derive(Debug, Clone, Copy)]
 struct Occupant {
-    /// From the start to the corner.
+    /// Length from the start to the corner.
     length: f64,
-    /// Where the ray to the corner enters.
+    /// The point at which the ray to the corner enters, along the half-edge.
     entry: f64,
 }
 
@@ -84,7 +84,7 @@ struct Search<'a> {
     free: Vec<u32>,
     heap: BinaryHeap<Reverse<(Distance, Event)>>,
     trail: Trail,
-    /// Lengths that differ by less are equal.
+    /// Lengths that differ by less than this are equal.
     same: f64,
 }
 
@@ -163,7 +163,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Keeps an arrival that is shorter than those before it.
+    /// Stores an arrival that is shorter than those before it.
     fn arrive(&mut self, vertex: u32, length: f64, arrival: Arrival) {
         if length < self.arrivals.length(vertex) {
             self.arrivals.set(vertex, length, arrival);
@@ -173,7 +173,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// All paths that go on from a vertex.
+    /// Creates the windows of all paths that continue from a vertex.
     fn leave_vertex(&mut self, vertex: u32) {
         let length = self.arrivals.length(vertex);
         let arrival = self.arrivals.arrival(vertex);
@@ -209,7 +209,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Carries a window over its face, to both other edges.
+    /// Propagates a window over its face, to both other edges.
     fn propagate(&mut self, window: &Window) {
         let faces = &self.surface.faces;
         let half_edge = window.half_edge;
@@ -265,9 +265,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Of two windows that enter through one edge and contain the corner opposite, the one that is
-    /// longer there goes on to one side only: on the other side of the shorter one's ray its paths
-    /// would have to cross that ray, and be longer behind it (Chen and Han, 1996).
+    /// Compares two windows that enter through one edge and contain the opposite corner. The one that is longer there
+    /// continues on one side only: on the other side of the shorter one's ray its paths would have to cross that ray,
+    /// and would be longer after it (Chen and Han, 1996). Returns whether a window continues on each side.
     fn occupy(&mut self, half_edge: u32, length: f64, entry: f64, near: f64) -> (bool, bool) {
         let occupant = &mut self.occupants[half_edge as usize];
         if length < occupant.length {
@@ -280,8 +280,8 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// Hands a window on to the faces beyond its edge. Its half-edge is that of the face which it
-    /// comes from; it is measured from the end that is the start of a twin which runs in the opposite direction.
+    /// Passes a window to the neighbouring faces at its edge. The window's half-edge is that of the face from which
+    /// it comes. It is measured from the end that is the start of a twin in the opposite direction.
     fn cross(&mut self, window: Window) {
         let bound = self.bound(&window);
         if bound.is_nan() || bound > self.arrivals.length(self.goal) {
@@ -327,8 +327,8 @@ impl<'a> Search<'a> {
             .push(Reverse((Distance(bound), Event::Window(index))));
     }
 
-    /// The least length that a path through the window to the goal can have: the goal is rotated
-    /// about the edge into the plane of the window.
+    /// The least length that a path through the window to the goal can have: the goal is rotated about the edge into
+    /// the plane of the window.
     fn bound(&self, window: &Window) -> f64 {
         let from = self.surface.corner(next(window.half_edge));
         let to = self.surface.corner(window.half_edge);

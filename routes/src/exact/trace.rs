@@ -1,4 +1,5 @@
-//! From the goal back to the start: windows are unfolded once more, and crossed by straight lines.
+//! Traces the path from the goal back to the start: windows are unfolded once more, and straight lines through them
+//! are intersected with edges.
 
 use glam::DVec2;
 
@@ -7,11 +8,11 @@ use crate::exact::window::Shape;
 use crate::mesh::links::{NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
 
-/// Where each window came from.
+/// The predecessor of each window.
 #[derive(Debug, Default)]
 pub(super) struct Trail {
-    /// The window before, or [`NONE`] for a source, and the half-edge by which the window enters
-    /// its face, or the source's vertex.
+    /// The window before, or [`NONE`] for a source; and the half-edge through which the window enters its face, or
+    /// the vertex of the source.
     links: Vec<(u32, u32)>,
 }
 
@@ -20,7 +21,7 @@ impl Trail {
         self.links.len()
     }
 
-    /// A source.
+    /// Adds a source.
     pub(super) fn root(&mut self, vertex: u32) -> u32 {
         self.push(NONE, vertex)
     }
@@ -30,7 +31,7 @@ impl Trail {
         self.links.len() as u32 - 1
     }
 
-    /// The source of a window, and the half-edges from there to it.
+    /// The source of a window, and the half-edges from it to the window.
     fn back(&self, window: u32) -> (u32, Vec<u32>) {
         let mut half_edges = Vec::new();
         let (mut parent, mut item) = self.links[window as usize];
@@ -71,8 +72,8 @@ pub(super) fn trace_path(
     path
 }
 
-/// Where the straight line from a source to the corner opposite the last half-edge crosses the
-/// edges, each of which enters the face beyond the one before.
+/// The points where the straight line from a source to the corner opposite the last half-edge crosses the edges, each
+/// of which leads to the next face.
 fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
     let faces = &surface.faces;
     let Some(&first) = half_edges.first() else {

@@ -5,17 +5,17 @@ use glam::DVec2;
 use crate::mesh::links::{next, previous};
 use crate::mesh::surface::Surface;
 
-/// `√(x² + y²)`. Systems round their own `hypot` differently.
+/// `√(x² + y²)`, because the `hypot` of different systems rounds differently.
 pub(super) fn hypotenuse(x: f64, y: f64) -> f64 {
     DVec2::new(x, y).length()
 }
 
-/// A face in a plane: the half-edge from the origin along x, the corner opposite at positive y.
+/// A face in a plane: the half-edge is on the x axis from the origin, and the opposite corner has a positive y.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
-    /// Of the half-edge.
+    /// Length of the half-edge.
     pub(super) length: f64,
-    /// Of the corner opposite.
+    /// Coordinates of the opposite corner.
     pub(super) x: f64,
     pub(super) y: f64,
 }
@@ -33,8 +33,8 @@ impl Shape {
         }
     }
 
-    /// Where a ray from the corner opposite meets the edge, rotated by `from_start` of the face's
-    /// `angle` there from the start of the edge to its end, rad.
+    /// The point at which a ray from the opposite corner meets the edge. `from_start` is the angle in radians from
+    /// the start of the edge to the ray; `angle` is the face's angle at that corner.
     pub(super) fn met_by(&self, from_start: f64, angle: f64) -> f64 {
         let start = hypotenuse(self.x, self.y) * libm::sin(from_start.max(0.0));
         let end =
@@ -42,14 +42,14 @@ impl Shape {
         self.length * start / (start + end)
     }
 
-    /// From the right corner to the point `along` the left edge, which is so long.
+    /// Distance from the right corner to the point `along` the left edge, whose length is `length`.
     pub(super) fn right_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
         hypotenuse(self.length - part * self.x, part * self.y)
     }
 
-    /// From the left corner to the point so far along the edge from the corner opposite to the right
-    /// one, which is so long.
+    /// Distance from the left corner to the point `along` the edge from the opposite corner to the right one, whose
+    /// length is `length`.
     pub(super) fn left_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
         hypotenuse(
@@ -59,30 +59,30 @@ impl Shape {
     }
 }
 
-/// An interval of an edge, and the source that is seen through it.
+/// An interval of an edge, and the source that is visible through it.
 ///
-/// The half-edge runs along x from the origin, the source lies at `(x, -y)`, and the window goes
-/// on towards positive y, so that the start of the half-edge is on its left.
+/// The half-edge is on the x axis from the origin, the source is at `(x, -y)`, and the window continues towards
+/// positive y, so that the start of the half-edge is on its left.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub(super) half_edge: u32,
-    /// Its index in the trail is that of the window that it comes from.
+    /// Index of its predecessor in the trail.
     pub(super) parent: u32,
     pub(super) low: f64,
     pub(super) high: f64,
     pub(super) x: f64,
     pub(super) y: f64,
-    /// From the start to the source.
+    /// Length from the start to the source.
     pub(super) length: f64,
 }
 
 impl Window {
-    /// From the source to a point of the edge.
+    /// Distance from the source to a point of the edge.
     pub(super) fn distance(&self, along: f64) -> f64 {
         hypotenuse(along - self.x, self.y)
     }
 
-    /// The same, measured from the other end of its edge.
+    /// The same window, measured from the other end of its edge.
     pub(super) fn mirrored(&self, length: f64) -> Self {
         Self {
             low: length - self.high,
@@ -92,14 +92,14 @@ impl Window {
         }
     }
 
-    /// Whether each of its points is nearer by way of an end of its edge, which are `left` and
-    /// `right` from the start (Xin and Wang, 2009, the first two tests).
+    /// Whether each of its points is nearer through an end of its edge. The lengths from the start to these ends are
+    /// `left` and `right` (Xin and Wang, 2009, the first two tests).
     pub(super) fn is_behind(&self, left: f64, right: f64, edge: f64, same: f64) -> bool {
         left + self.high < self.length + self.distance(self.high) - same
             || right + edge - self.low < self.length + self.distance(self.low) - same
     }
 
-    /// Between the left edge of the face and the path to the source, at the corner opposite.
+    /// Angle at the opposite corner between the left edge of the face and the path to the source.
     pub(super) fn angle_at_corner(&self, shape: &Shape) -> f64 {
         let corner = DVec2::new(shape.x, shape.y);
         let source = DVec2::new(self.x, -self.y);
@@ -107,8 +107,7 @@ impl Window {
         libm::atan2(to_source.perp_dot(edge), to_source.dot(edge)).abs()
     }
 
-    /// The part that reaches the left edge, measured from the left corner. The half-edge is that of this
-    /// face.
+    /// The part that reaches the left edge, measured from the left corner. Its half-edge is that of this face.
     pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let length = hypotenuse(shape.x, shape.y);
         let along = DVec2::new(shape.x, shape.y) / length;
@@ -134,8 +133,7 @@ impl Window {
         })
     }
 
-    /// The part that reaches the right edge, measured from the corner opposite. The half-edge is that of this
-    /// face.
+    /// The part that reaches the right edge, measured from the opposite corner. Its half-edge is that of this face.
     pub(super) fn through_right(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let corner = DVec2::new(shape.x, shape.y);
         let edge = DVec2::new(shape.length, 0.0) - corner;
@@ -164,7 +162,7 @@ impl Window {
         })
     }
 
-    /// The least length from the start through the window to a goal at `(x, y)` beyond the edge.
+    /// The least length from the start through the window to a goal at `(x, y)` on the other side of the edge.
     pub(super) fn bound(&self, x: f64, y: f64) -> f64 {
         let height = self.y + y;
         let crossing = match height > 0.0 {

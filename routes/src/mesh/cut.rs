@@ -1,5 +1,4 @@
-//! Polygons are cut into triangles that use all their corners, also those in the middle of a side, and
-//! that stay within the polygon.
+//! Cuts polygons into triangles that stay within the polygon and use all corners, also those in the middle of a side.
 
 use glam::{DVec2, DVec3};
 
@@ -26,8 +25,8 @@ pub(super) enum Uncut {
     TooMany,
 }
 
-/// Cuts the polygon in its plane. A convex one is cut from its first corner on; of another, ears are cut
-/// off: triangles between neighbouring corners that no other corner touches.
+/// Cuts the polygon in its plane. A convex polygon is cut from its first corner. From other polygons ears are cut
+/// off: triangles at three consecutive corners that no other corner touches.
 pub(super) fn cut(corners: &[DVec3]) -> Result<Triangulation, Uncut> {
     let count = corners.len();
     let at = |corner: usize| corners[corner % count] - corners[0];
@@ -98,7 +97,7 @@ fn is_convex(flat: &[DVec2]) -> bool {
     is_left_everywhere && (1..count - 1).all(|i| orientation(at(0), at(i), at(i + 1)) > 0)
 }
 
-/// The ears of a polygon that goes round to the left, until nothing is left of it.
+/// The ears of a polygon that winds to the left, until no corner is left.
 fn ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
     let mut left: Vec<usize> = (0..flat.len()).collect();
     let mut triangles = Vec::with_capacity(flat.len() - 2);

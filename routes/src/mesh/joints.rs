@@ -1,5 +1,5 @@
-//! Corners that lie on the side of another face, as where a large face lies beside two small ones: the
-//! side is cut there, so that routes can cross it.
+//! Finds corners that lie on the side of another face, for example where a large face lies beside two small ones. The
+//! side is divided there, so that routes can cross it.
 
 use std::ops::Range;
 
@@ -10,8 +10,7 @@ use crate::mesh::links::{Links, NONE};
 /// Corners in a leaf of the tree.
 const LEAF: usize = 8;
 
-/// The corners on open sides, for each side of a face that is open: `(face, side)`, and the corners on it
-/// from its start to its end.
+/// For each open side of a face that has corners on it: `(face, side)`, and these corners from its start to its end.
 pub(super) fn on_open_sides(
     positions: &[DVec3],
     faces: &[[u32; 3]],
@@ -100,7 +99,7 @@ fn ends(faces: &[[u32; 3]], face: usize, side: usize) -> [u32; 2] {
     [faces[face][side], faces[face][(side + 1) % 3]]
 }
 
-/// Boxes about halves of the corners, halved again.
+/// A tree of boxes around halves of the corners.
 struct CornerTree {
     corners: Vec<u32>,
     boxes: Vec<(DVec3, DVec3)>,
@@ -166,7 +165,7 @@ impl CornerTree {
         }
     }
 
-    /// Whether the line passes through a box that is wider by `distance`: by slabs.
+    /// Whether the line meets a box that is enlarged by `distance`, by the method of slabs.
     fn meets(&self, node: usize, [a, b]: [DVec3; 2], distance: f64) -> bool {
         let (low, high) = self.boxes[node];
         let (low, high) = (low - distance, high + distance);

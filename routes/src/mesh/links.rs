@@ -1,19 +1,19 @@
-//! Adjacency: the other side of each edge, and the corners at each vertex.
+//! Adjacency of triangles: the other side of each edge, and the corners at each vertex.
 
-/// There is nothing: an edge is on the boundary.
+/// No half-edge: the edge is on the boundary.
 pub(crate) const NONE: u32 = u32::MAX;
-/// There is more than one: an edge of three faces or more.
+/// More than one half-edge: the edge has three or more faces.
 pub(crate) const MANY: u32 = u32::MAX - 1;
 
-/// The neighbourhood of the triangles of a mesh.
+/// The adjacency of the triangles of a mesh.
 ///
-/// A *half-edge* `3f + k` runs from corner `k` of face `f` to the next; the corner opposite is
-/// `k + 2` modulo 3. The same number names the corner `k` of face `f`.
+/// A *half-edge* `3f + k` is from corner `k` of face `f` to the next corner; the opposite corner is `k + 2` modulo 3.
+/// The same number is that of corner `k` of face `f`.
 #[derive(Debug, Clone)]
 pub(crate) struct Links {
-    /// For each half-edge the one of the other face on the same edge, [`NONE`] or [`MANY`].
+    /// For each half-edge, the one of the other face at the same edge, [`NONE`] or [`MANY`].
     twins: Vec<u32>,
-    /// Where the corners of each vertex begin in `corners`; one more than there are vertices.
+    /// For each vertex, the index of its first corner in `corners`; one more entry than vertices.
     starts: Vec<u32>,
     /// The corners, vertex by vertex.
     corners: Vec<u32>,
@@ -42,8 +42,8 @@ pub(crate) fn at(faces: &[[u32; 3]], corner: u32) -> u32 {
     faces[(corner / 3) as usize][(corner % 3) as usize]
 }
 
-/// For each half-edge the one on the other side. Half-edges are sorted by their ends, so that an edge of
-/// thousands of faces takes no longer than thousands of edges.
+/// For each half-edge, the one on the other side. Half-edges are sorted by their ends, so that an edge of thousands
+/// of faces takes as long as thousands of edges.
 fn twins(faces: &[[u32; 3]]) -> Vec<u32> {
     let ends = |half_edge: u32| {
         let (a, b) = (at(faces, half_edge), at(faces, next(half_edge)));
@@ -87,8 +87,8 @@ impl Links {
         links
     }
 
-    /// The half-edges of all faces on the edge of this one, itself among them. They are searched at
-    /// the end of the edge with fewer corners, so that the hub of a fan costs nothing.
+    /// The half-edges of all faces at the edge of this one, including itself. They are searched at the end of the
+    /// edge with fewer corners, so that the centre of a fan costs nothing.
     pub(crate) fn on_edge<'a>(
         &'a self,
         faces: &'a [[u32; 3]],
@@ -122,7 +122,7 @@ impl Links {
         &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 
-    /// The vertices that share an edge with this one; those inside the surface come twice.
+    /// The vertices that share an edge with this one; those at inner edges occur twice.
     pub(crate) fn neighbours<'a>(
         &'a self,
         faces: &'a [[u32; 3]],

@@ -17,42 +17,44 @@ use crate::mesh::surface::Surface;
 use crate::mesh::tree::FaceTree;
 use crate::mesh::weld::Welded;
 
-/// The most triangles of a mesh: corners are counted in 32 bits.
+/// The largest number of triangles of a mesh: their corners are numbered in 32 bits.
 pub const MAX_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
 
 /// A surface of triangles, on which routes are found.
 ///
-/// Vertices at equal positions are one, and so are faces with the same corners: a sheet that is modelled
-/// from both sides is one sheet. A side on which a corner of another face lies is cut there. Faces wind alike within each piece, the way that most of
-/// them had.
+/// Vertices at equal positions are merged, and so are faces with the same corners: a sheet that is modelled from both
+/// sides is one sheet. An open side is divided where a corner of another face lies on it. Within each piece, faces
+/// are wound alike, in the direction that the majority of them had.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     pub(crate) surface: Surface,
     pub(crate) tree: FaceTree,
-    /// The largest extent along an axis.
+    /// Largest extent along an axis.
     pub(crate) size: f64,
     pub(crate) has_branches: bool,
-    /// For each vertex the piece that it belongs to.
+    /// The piece of each vertex.
     pub(crate) pieces: Vec<u32>,
-    /// For each piece its triangles.
+    /// The number of triangles of each piece.
     pub(crate) piece_sizes: Vec<usize>,
     warnings: Vec<MeshWarning>,
 }
 
 impl Mesh {
-    /// Of positions and triangles, each three of the positions.
+    /// Makes a mesh of positions and triangles, each of three indices of positions.
     ///
     /// # Errors
-    /// When there are no triangles, an index or a position is none, or a triangle has no area.
+    /// When there are no triangles or too many, when an index is out of range, when a coordinate is not finite or
+    /// exceeds 1e75, or when a triangle has no area.
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
         Self::of_polygons(positions, triangles.iter().map(<[u32; 3]>::as_slice))
     }
 
-    /// Of positions and polygons, each some of the positions in their order round it. Polygons are cut
-    /// into triangles within them, whether they are convex or not.
+    /// Makes a mesh of positions and polygons, each of the indices of positions around it. Polygons are cut into
+    /// triangles within them, whether they are convex or not.
     ///
     /// # Errors
-    /// As [`Mesh::new`], and when the sides of a polygon cross each other.
+    /// As [`Mesh::new`], when a polygon has fewer than three corners, when its sides cross each other, or when it has
+    /// too many corners and is not convex.
     pub fn of_polygons<'a>(
         positions: &[DVec3],
         polygons: impl IntoIterator<Item = &'a [u32]>,
@@ -60,11 +62,12 @@ impl Mesh {
         Self::welded(positions, polygons, 0.0)
     }
 
-    /// As [`Mesh::of_polygons`]; positions within a distance of each other become the first of them: for
-    /// seams whose two sides differ by rounding. Triangles that lose their area by it are dropped.
+    /// Makes a mesh as [`Mesh::of_polygons`] does, and merges positions within `distance` of each other into the
+    /// first of them, for seams whose two sides differ by rounding. Triangles that lose their area by this are
+    /// dropped.
     ///
     /// # Errors
-    /// As [`Mesh::of_polygons`], and when the distance is negative or no number.
+    /// As [`Mesh::of_polygons`], and when the distance is negative or not finite.
     pub fn welded<'a>(
         positions: &[DVec3],
         polygons: impl IntoIterator<Item = &'a [u32]>,
@@ -113,32 +116,32 @@ impl Mesh {
         &self.warnings
     }
 
-    /// The vertices that triangles use, each position once.
+    /// Positions of the vertices that triangles use; each position occurs once.
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
         &self.surface.positions
     }
 
-    /// The triangles, as three of [`Mesh::positions`] each.
+    /// The triangles, each of three indices of [`Mesh::positions`].
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.surface.faces
     }
 
-    /// The unit normal at each vertex: the mean of its faces', weighted by their angles there.
-    /// `None` where the surface has one side.
+    /// The unit normal at each vertex: the mean of the normals of its faces, weighted by their angles at the vertex;
+    /// 0 where they cancel out. `None` if the surface has only one side.
     #[must_use]
     pub fn normals(&self) -> Option<&[DVec3]> {
         self.surface.normals.as_deref()
     }
 
-    /// The largest extent along an axis.
+    /// Largest extent along an axis.
     #[must_use]
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// The triangles of each piece of the surface; pieces share no vertex.
+    /// Number of triangles of each piece of the surface; pieces share no vertex.
     #[must_use]
     pub fn pieces(&self) -> &[usize] {
         &self.piece_sizes
@@ -151,7 +154,7 @@ impl Mesh {
     }
 }
 
-/// The piece of each vertex, and the triangles of each piece.
+/// The piece of each vertex, and the number of triangles of each piece.
 fn pieces(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<usize>) {
     let mut parents: Vec<u32> = (0..vertices as u32).collect();
     fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
@@ -186,7 +189,7 @@ fn pieces(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<usize>) {
     (pieces, sizes)
 }
 
-/// The normals of the vertices, weighted by the faces' angles there: they do not depend on how flat
+/// The normals of the vertices, weighted by the angles of the faces there, so that they do not depend on how flat
 /// parts are cut into triangles (Thürmer and Wüthrich, 1998).
 fn normals(positions: &[DVec3], faces: &[[u32; 3]]) -> Vec<DVec3> {
     let mut sums = vec![DVec3::ZERO; positions.len()];

@@ -4,19 +4,19 @@ use glam::DVec3;
 
 use crate::mesh::links::{Links, at};
 
-/// A mesh that was checked, perhaps with start and goal added as vertices.
+/// A checked mesh, perhaps with start and goal added as vertices.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     pub(crate) positions: Vec<DVec3>,
-    /// Their corners, alike all round where the surface has two sides.
+    /// The vertices of each face, wound alike if the surface has two sides.
     pub(crate) faces: Vec<[u32; 3]>,
-    /// Of the vertices; none where the surface has one side.
+    /// Normals of the vertices; `None` if the surface has only one side.
     pub(crate) normals: Option<Vec<DVec3>>,
     pub(crate) links: Links,
 }
 
-/// A point on an edge: the fraction of the distance from one vertex to the other; a vertex itself where
-/// the two are the same.
+/// A point on an edge: the fraction of the distance from one vertex to the other. If both vertices are the same, the
+/// point is this vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spot {
     pub(crate) from: u32,
@@ -51,7 +51,7 @@ impl Surface {
         between(&self.positions, spot)
     }
 
-    /// The unit normal there, zero where the normals of the faces cancel out.
+    /// The unit normal at a spot; 0 where the normals of the faces cancel out.
     pub(crate) fn normal(&self, spot: Spot) -> Option<DVec3> {
         let normals = self.normals.as_ref()?;
         Some(between(normals, spot).normalize_or_zero())

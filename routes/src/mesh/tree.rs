@@ -1,14 +1,14 @@
-//! The nearest triangle: a tree of boxes.
+//! Finds the nearest triangle by a tree of boxes.
 
 use glam::DVec3;
 
 use crate::mesh::surface::Surface;
 use crate::triangle::{blend, nearest_weights};
 
-/// Triangles in a leaf.
+/// Number of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// Boxes about halves of the triangles, halved again.
+/// A tree of boxes around halves of the triangles.
 #[derive(Debug, Clone)]
 pub(crate) struct FaceTree {
     /// A complete binary tree: the halves of box `i` are `2i + 1` and `2i + 2`.
@@ -76,8 +76,8 @@ impl FaceTree {
         (high - low).max_element()
     }
 
-    /// The nearest point of the surface that the tree was made of; of several at the same distance,
-    /// that of the face with the lowest number.
+    /// The nearest point of the surface of which the tree was made; of several at the same distance, that of the face
+    /// with the lowest index.
     pub(crate) fn nearest(&self, surface: &Surface, point: DVec3) -> Nearest {
         let mut best = Nearest {
             face: usize::MAX,

@@ -1,5 +1,5 @@
-//! Faces as a file has them become triangles between different points: equal ones are welded, polygons
-//! are cut, faces that lie on each other become one, and sides are cut at corners that lie on them.
+//! Converts the faces of a file to triangles between different points: equal points are welded, polygons are cut,
+//! faces on each other are merged, and sides are divided at corners that lie on them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -17,15 +17,16 @@ pub(super) struct Welded {
     pub(super) warnings: Vec<MeshWarning>,
 }
 
-/// Beyond this squares of areas are no finite numbers.
+/// The largest coordinate: for larger ones, squares of areas are not finite.
 const LARGEST: f64 = 1e75;
-/// A corner lies on a side that is nearer than this fraction of the mesh's size: positions in f32 are
-/// rounded by that much.
+/// A corner lies on a side if their distance is less than this fraction of the mesh's size, to which f32 positions
+/// are rounded.
 const ON_SIDE: f64 = 1e-7;
-/// Open sides that are nearer to a corner than this fraction are a seam that somebody may want welded.
+/// Open sides at less than this distance from a corner, relative to the mesh's size, are a seam that may need
+/// welding.
 const SEAM: f64 = 1e-5;
 
-/// Counts, and keeps the first face.
+/// A counter that keeps the first face.
 #[derive(Default)]
 struct Count {
     count: usize,
@@ -41,7 +42,7 @@ impl Count {
     }
 }
 
-/// Positions nearer to each other than `tolerance` become the first of them.
+/// Merges positions within `tolerance` of each other into the first of them, and makes triangles.
 pub(super) fn weld<'a>(
     input: &[DVec3],
     polygons: impl IntoIterator<Item = &'a [u32]>,
@@ -234,7 +235,7 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// The same list for the same polygon, wherever it begins and in either direction.
+/// The same list for the same polygon, whatever its first corner and its direction.
 fn canonical(corners: &[u32]) -> Vec<u32> {
     let count = corners.len();
     let from =
@@ -249,19 +250,19 @@ fn canonical(corners: &[u32]) -> Vec<u32> {
         .unwrap_or_default()
 }
 
-/// The vertices, positions and faces so far.
+/// The vertices, positions and faces that are welded.
 struct Welding<'a> {
     input: &'a [DVec3],
     tolerance: f64,
-    /// For cells of the tolerance's size, or exact positions, the first vertices there.
+    /// The first vertices in each cell of the size of the tolerance, or at each exact position.
     cells: HashMap<[u64; 3], Vec<u32>>,
-    /// For each input vertex the first at its position.
+    /// For each input vertex, the first one at its position.
     firsts: Vec<u32>,
-    /// For each of these its number among those that triangles use.
+    /// For each of these, its index among the vertices that triangles use.
     numbers: HashMap<u32, u32>,
     positions: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
-    /// The triangles and polygons so far, to drop doubles.
+    /// The triangles and polygons that were added, to find duplicates.
     triangles: HashSet<[u32; 3]>,
     polygons: HashSet<Vec<u32>>,
 }
@@ -329,7 +330,7 @@ impl<'a> Welding<'a> {
         first
     }
 
-    /// The number of a first vertex among those that triangles use.
+    /// The index of a first vertex among those that triangles use.
     fn vertex(&mut self, vertex: u32) -> u32 {
         let position = self.input[vertex as usize];
         *self.numbers.entry(vertex).or_insert_with(|| {

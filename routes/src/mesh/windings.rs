@@ -1,17 +1,17 @@
-//! Faces are wound alike: neighbours run through their common edge in opposite directions.
+//! Winds faces alike: neighbours run through their common edge in opposite directions.
 
 use crate::mesh::links::{Links, MANY, NONE, at};
 
 /// The result of [`wind_alike`].
 pub(super) struct Rewinding {
-    /// Triangles that were reversed.
+    /// Number of triangles that were reversed.
     pub(super) count: usize,
-    /// Not all can be wound alike: a Möbius strip.
+    /// Whether faces cannot be wound alike, as in a Möbius strip.
     pub(super) is_one_sided: bool,
 }
 
-/// Reverses triangles until neighbours agree, as few in each piece as will do. Edges of three faces
-/// part the pieces.
+/// Reverses triangles until neighbours agree, and as few in each piece as possible. Edges of three faces separate
+/// pieces.
 pub(super) fn wind_alike(vertices: usize, faces: &mut [[u32; 3]]) -> Rewinding {
     let links = Links::new(vertices, faces);
     // Whether a face runs against the first of its piece; unknown at first.

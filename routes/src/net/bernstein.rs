@@ -1,4 +1,4 @@
-//! Bernstein's polynomials, and the derivatives of a surface at a point.
+//! Bernstein polynomials, and the derivatives of a surface at a point.
 
 use glam::{DVec2, DVec3};
 

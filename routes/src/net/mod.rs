@@ -11,11 +11,11 @@ use crate::mesh::Mesh;
 use crate::net::bernstein::Derivatives;
 use crate::route::{By, Route};
 
-/// Control points along one side at most: polynomials of higher degree lose their digits.
+/// The largest number of control points along a side: polynomials of higher degree lose digits.
 pub const MAX_POINTS: usize = 32;
-/// Facets along one side at most.
+/// The largest number of facets along a side.
 pub const MAX_FACETS: usize = 10_000;
-/// Points of a line in (u, v), without the first.
+/// Number of points of a line in (u, v), without the first.
 const LINE_STEPS: usize = 256;
 
 /// A Bézier surface over the unit square: `u` runs along the first axis of its control points, `v`
@@ -31,41 +31,41 @@ pub struct Net {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NetError {
-    /// Too few control points, or too many.
+    /// There are too few or too many control points along a side.
     #[error("the net has {rows} x {columns} control points; each side has 2 to {MAX_POINTS}")]
     Shape {
-        /// Along u.
+        /// Number of points along u.
         rows: usize,
-        /// Along v.
+        /// Number of points along v.
         columns: usize,
     },
-    /// Another number of points than rows times columns.
+    /// The number of points is not rows times columns.
     #[error("{found} control points are given for {rows} x {columns}")]
     Count {
-        /// Along u.
+        /// Number of points along u.
         rows: usize,
-        /// Along v.
+        /// Number of points along v.
         columns: usize,
-        /// How many are given.
+        /// Number of points that were passed.
         found: usize,
     },
-    /// A control point is NaN or infinite, or beyond 1e75.
+    /// A coordinate of a control point is NaN or infinite, or its magnitude exceeds 1e75.
     #[error("control point ({row}, {column}) is {point}; coordinates must be numbers below 1e75")]
     NotFinite {
-        /// Along u, from 0.
+        /// Index along u, from 0.
         row: usize,
-        /// Along v, from 0.
+        /// Index along v, from 0.
         column: usize,
         /// The control point.
         point: DVec3,
     },
-    /// No facets, or too many.
+    /// There are no facets, or too many.
     #[error("{facets} facets along a side are out of range; give 1 to {MAX_FACETS}")]
     Facets {
-        /// How many were asked for.
+        /// Requested number of facets along a side.
         facets: usize,
     },
-    /// The facets are no mesh.
+    /// The facets do not make a mesh.
     #[error("the facets of the net do not make a valid mesh: {0}")]
     Mesh(#[from] MeshError),
     /// There is no route on the facets.
@@ -76,29 +76,30 @@ pub enum NetError {
 /// How a route on a surface is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NetBy {
-    /// The straight line in (u, v), carried over to the surface; not the shortest path.
+    /// The straight line in (u, v), mapped to the surface; this is not the shortest path.
     Line,
-    /// The shortest path on so many by so many squares of two triangles each. They lie below the
-    /// surface or above it by an error that falls with the square of their number.
+    /// The shortest path on a mesh of n × n squares of two triangles each, where n is this number. The distance of
+    /// the mesh from the surface decreases with the square of n.
     Facets(usize),
 }
 
-/// The point of a surface that is nearest to another.
+/// The point of a surface that is nearest to another point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnNet {
-    /// Where it is in the unit square.
+    /// Its parameters (u, v) in the unit square.
     pub uv: DVec2,
-    /// Where it is in space.
+    /// Its position.
     pub point: DVec3,
-    /// How far from the other.
+    /// Distance from the other point.
     pub distance: f64,
 }
 
 impl Net {
-    /// Of `rows` × `columns` control points, row by row.
+    /// Makes a net of `rows` × `columns` control points, row by row.
     ///
     /// # Errors
-    /// When there are too few or too many, or one is no point.
+    /// When a side has fewer than 2 or more than [`MAX_POINTS`] points, when the number of points is not `rows` times
+    /// `columns`, or when a coordinate is not finite or exceeds 1e75.
     pub fn new(rows: usize, columns: usize, points: Vec<DVec3>) -> Result<Self, NetError> {
         let sides = 2..=MAX_POINTS;
         if !sides.contains(&rows) || !sides.contains(&columns) {
@@ -133,8 +134,8 @@ impl Net {
         self.derivatives(uv).point
     }
 
-    /// The unit normal at (u, v), in the direction of the derivative by u × that by v. At a side
-    /// that is collapsed to a point it is that of a point beside it.
+    /// The unit normal at (u, v), in the direction of the derivative by u × the derivative by v. On a side that is
+    /// collapsed to a point, it is the normal at a point beside it.
     #[must_use]
     pub fn normal(&self, uv: DVec2) -> DVec3 {
         let at = |uv| {
@@ -148,13 +149,14 @@ impl Net {
         }
     }
 
-    /// The nearest point of the surface. At a collapsed side any of its (u, v) will do.
+    /// The point of the surface that is nearest to `point`. On a side that is collapsed to a point, (u, v) is any of
+    /// its parameters.
     #[must_use]
     pub fn nearest(&self, point: DVec3) -> OnNet {
         nearest::nearest(self, point)
     }
 
-    /// The largest extent of the control points along an axis.
+    /// Largest extent of the control points along an axis.
     #[must_use]
     pub fn size(&self) -> f64 {
         let low = self
@@ -170,10 +172,10 @@ impl Net {
         (high - low).max_element()
     }
 
-    /// The surface as `facets` × `facets` squares of two triangles each.
+    /// The surface as a mesh of `facets` × `facets` squares of two triangles each.
     ///
     /// # Errors
-    /// When there are none or too many, or they are no mesh.
+    /// When `facets` is 0 or exceeds [`MAX_FACETS`], or when the facets do not make a mesh.
     pub fn facets(&self, facets: usize) -> Result<Mesh, NetError> {
         if !(1..=MAX_FACETS).contains(&facets) {
             return Err(NetError::Facets { facets });
@@ -195,7 +197,7 @@ impl Net {
         Ok(Mesh::new(&positions, &triangles)?)
     }
 
-    /// A vertex of facets: along a collapsed side always the same, without rounding.
+    /// A vertex of the facets. On a side that is collapsed to a point, it is always the same, without rounding.
     fn vertex(&self, uv: DVec2) -> DVec3 {
         let side = |at: f64, count: usize, stride: usize, across: usize, step: usize| {
             let first = match at {
@@ -217,7 +219,7 @@ impl Net {
     /// The route between the points of the surface that are nearest to `from` and `to`.
     ///
     /// # Errors
-    /// When a point is none, or the facets are no mesh.
+    /// When a point is not finite, when the facets do not make a mesh, or when there is no route on them.
     pub fn route(&self, from: DVec3, to: DVec3, by: NetBy) -> Result<Route, NetError> {
         for point in [from, to] {
             if !point.is_finite() {
@@ -237,7 +239,7 @@ impl Net {
         }
     }
 
-    /// The straight line in (u, v); its length is that of the curve on the surface.
+    /// The straight line in (u, v). Its length is that of the curve on the surface.
     fn line(&self, [from, to]: [DVec2; 2], off: [f64; 2]) -> Route {
         if from == to {
             return Route {
@@ -261,7 +263,7 @@ impl Net {
         }
     }
 
-    /// The point of a facet that stands for (u, v).
+    /// The point of a facet at (u, v).
     fn on_facet(&self, uv: DVec2, facets: usize) -> DVec3 {
         let scaled = uv * facets as f64;
         let cell = scaled.floor().min(DVec2::splat(facets as f64 - 1.0));
@@ -275,7 +277,8 @@ impl Net {
     }
 }
 
-/// By Gauss and Legendre with 5 points, halved until the halves agree with the whole.
+/// An integral by the rule of Gauss and Legendre with 5 points. Intervals are halved until the halves agree with the
+/// whole.
 fn integral(function: &impl Fn(f64) -> f64, from: f64, to: f64, depth: u32) -> f64 {
     const NODES: [(f64, f64); 5] = [
         (0.0, 128.0 / 225.0),

@@ -1,4 +1,4 @@
-//! The nearest point of a Bézier surface: halving, then Newton's method.
+//! Finds the nearest point of a Bézier surface, by halving and then by Newton's method.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,14 +9,14 @@ use crate::edges::Distance;
 use crate::net::bernstein::Derivatives;
 use crate::net::{Net, OnNet};
 
-/// Parts that are looked at, at most: about the centre of a sphere none can be dropped.
+/// The largest number of parts that are searched: around the centre of a sphere none can be dropped.
 const MAX_PARTS: usize = 2000;
-/// Parts are not halved any more when they are so small in u and v.
+/// Size in u and v at which parts are not halved any more.
 const SMALLEST: f64 = 1.0 / 256.0;
-/// Steps of Newton's method, which doubles the digits each time, and of halving a step.
+/// Number of steps of Newton's method, which doubles the digits each time, and of halvings of a step.
 const STEPS: usize = 60;
 
-/// A part of the surface, with control points of its own.
+/// A part of the surface with the control points of this part.
 struct NetPart {
     net: Net,
     low: DVec2,
@@ -75,7 +75,7 @@ impl Net {
     }
 }
 
-/// Both halves along the longer side, by de Casteljau's means.
+/// Both halves along the longer side, by de Casteljau's algorithm.
 fn halves(part: &NetPart) -> [NetPart; 2] {
     let NetPart { net, low, high } = part;
     let along_u = high.x - low.x >= high.y - low.y;
@@ -119,8 +119,7 @@ fn halves(part: &NetPart) -> [NetPart; 2] {
     ]
 }
 
-/// From a point in the square to the nearest one at which no direction within the square leads
-/// nearer to the point.
+/// The nearest point from `start` on: one at which no direction within the square leads nearer to `point`.
 fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
     let mut uv = start;
     let mut here = net.derivatives(uv);
@@ -161,8 +160,8 @@ fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
     }
 }
 
-/// Newton's step for the square of the distance, in the coordinates that may change: one at its
-/// bound that would leave the square is held.
+/// Newton's step for the square of the distance, in the coordinates that may change. A coordinate at its bound that
+/// would leave the square does not change.
 fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
     let away = here.point - point;
     let slope = DVec2::new(away.dot(here.u), away.dot(here.v));

@@ -1,21 +1,21 @@
-//! The staircase with the least delay.
+//! Finds the staircase with the least delay.
 
 use glam::DVec2;
 
 use crate::walkers::region::{Region, StraightMotion};
 use crate::walkers::{Mover, Plan, Walker, WalkerError};
 
-/// What a mover does after its last time.
+/// Whether a mover exists after its last time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stay {
     Leaves,
     Remains,
 }
 
-/// Between distances where the obstacles change, the route is cut into so many steps; walkers wait at
-/// the ends of steps only.
+/// The number of steps into which the route is divided between distances where the obstacles change. Walkers wait
+/// only at the ends of steps.
 const STEPS: usize = 16;
-/// Delays nearer than this part to each other are the same: regions that touch leave no gap.
+/// Delays that differ by less than this, relatively, are equal: regions that touch leave no gap.
 const SAME: f64 = 1e-10;
 
 /// A closed interval of delays.
@@ -133,8 +133,8 @@ fn regions(
     regions
 }
 
-/// The distances at which the walker may wait: at the points of the route, where obstacles begin and
-/// end, and between.
+/// The distances at which the walker may wait: at the points of the route, where obstacles begin and end, and
+/// between.
 fn wait_points(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
     let end = stops[stops.len() - 1];
     let ends = regions.iter().flat_map(|(low, high, _)| [low.x, high.x]);
@@ -163,7 +163,7 @@ fn wait_points(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
     distances
 }
 
-/// The open intervals of delays that some region blocks between two distances, apart and in order.
+/// The open intervals of delays that regions block between two distances, disjoint and in order.
 fn blocked(regions: &[(DVec2, DVec2, Region)], from: f64, to: f64) -> Vec<Interval> {
     let near = regions
         .iter()
@@ -198,7 +198,7 @@ fn gaps(blocked: &[Interval]) -> Vec<Interval> {
     gaps
 }
 
-/// By waiting: in each gap all from the least that is reached.
+/// The delays that are reached by waiting: in each gap, all from the least reached one.
 fn raised(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     let raise = |(low, high): Interval| {
         let within =
@@ -209,7 +209,7 @@ fn raised(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     gaps(blocked).into_iter().filter_map(raise).collect()
 }
 
-/// By walking: what is reached, without what is blocked.
+/// The delays that are reached by walking: the reached ones that are not blocked.
 fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     let gaps = gaps(blocked);
     let mut left = Vec::new();
@@ -230,7 +230,7 @@ fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     left
 }
 
-/// When the walker is where.
+/// The times at which the walker is at each point.
 fn timed(walker: &Walker, stops: &[f64], wait_points: &[f64], delays: &[(f64, f64)]) -> Plan {
     let points = &walker.route.points;
     let at = |distance: f64| {

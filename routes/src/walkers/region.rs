@@ -1,35 +1,35 @@
-//! Where two bodies on straight stretches touch, in terms of the distance walked and the delay.
+//! The distances walked and the delays at which two bodies on straight stretches touch.
 
 use glam::{DVec2, DVec3, Vec2Swizzles};
 
-/// Distances within this part of the sum of radii are equal to it: bodies may touch.
+/// Distances that differ by less than this from the sum of the radii, relatively, are equal to it: bodies may touch.
 const TOUCH: f64 = 1e-12;
 
-/// The obstacle of one stretch of another body on one stretch of a route: all (s, w) at which the
-/// distance is below `reach`, a convex region.
+/// The obstacle that one stretch of another body is for one stretch of a route: all (s, w) at which the distance of
+/// the bodies is below `reach`. This is a convex region.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
-    /// The distance is that of `offset + along * s + by_delay * w` from the origin.
+    /// The distance of the bodies is the length of `offset + along * s + by_delay * w`.
     offset: DVec3,
     along: DVec3,
     by_delay: DVec3,
     reach: f64,
-    /// Of the other's stretch, seconds.
+    /// Start and end of the other body's stretch, in seconds.
     from: f64,
     to: f64,
     /// Seconds for each unit of distance.
     slowness: f64,
-    /// The ends of the route's stretch.
+    /// Start and end of the route's stretch.
     pub(super) start: f64,
     pub(super) end: f64,
 }
 
-/// A body on a straight stretch: where it is at a parameter, and how that changes with it.
+/// A body on a straight stretch: its position at a parameter, and the derivative by it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StraightMotion {
     pub(super) from: f64,
     pub(super) to: f64,
-    /// At the parameter 0.
+    /// Position at parameter 0.
     pub(super) origin: DVec3,
     pub(super) rate: DVec3,
 }
@@ -57,7 +57,8 @@ impl StraightMotion {
 }
 
 impl Region {
-    /// Of a stretch of the route, which is walked at 1 / `slowness`, and one of another body.
+    /// The region of a stretch of the route, which is walked at the speed 1 / `slowness`, and a stretch of another
+    /// body.
     pub(super) fn new(
         segment: StraightMotion,
         other: StraightMotion,
@@ -77,11 +78,11 @@ impl Region {
         }
     }
 
-    /// The least and the largest s and w of the region between two distances on the route; `None` where
-    /// it is empty there.
+    /// The smallest and the largest s and w of the region between two distances on the route; `None` if it is empty
+    /// there.
     ///
-    /// A linear function is extreme on a convex region where its boundary turns in that direction, or in one
-    /// of its corners: the curve's with the lines that bound it, or those with each other.
+    /// On a convex region, a linear function has its extremes where the boundary is perpendicular to its gradient, or
+    /// at a corner: of the curve with the lines that bound it, or of two of these lines.
     pub(super) fn extent(&self, start: f64, end: f64) -> Option<(DVec2, DVec2)> {
         let (start, end) = (start.max(self.start), end.min(self.end));
         if start > end {
@@ -140,12 +141,12 @@ impl Region {
         Some((low, high))
     }
 
-    /// Between the middles of both bodies.
+    /// Distance between the centres of both bodies.
     fn distance(&self, at: DVec2) -> f64 {
         (self.offset + at.x * self.along + at.y * self.by_delay).length()
     }
 
-    /// Where `offset + x * rate` is `reach` long.
+    /// The x at which `offset + x * rate` has the length `reach`.
     fn roots(&self, offset: DVec3, rate: DVec3) -> Vec<f64> {
         let square = rate.length_squared();
         if square == 0.0 {

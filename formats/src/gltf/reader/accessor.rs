@@ -1,4 +1,4 @@
-//! Accessors: bytes as numbers.
+//! Reads accessors: bytes as numbers.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::gltf::reader::GltfReader;
@@ -69,7 +69,7 @@ impl Elements<'_> {
         }
     }
 
-    /// What `number` makes of the bytes of each component.
+    /// The numbers that `number` makes of the bytes of each component.
     fn each<const SIZE: usize>(&self, number: impl Fn([u8; SIZE]) -> f64) -> Vec<f64> {
         let used = self.width * SIZE;
         let mut numbers = Vec::with_capacity(self.count * self.width);
@@ -87,7 +87,7 @@ impl Elements<'_> {
     }
 }
 
-/// What glTF calls elements of so many components.
+/// The name in glTF of elements with this number of components.
 fn kind(width: usize) -> &'static str {
     match width {
         1 => "SCALAR",
@@ -99,10 +99,10 @@ fn kind(width: usize) -> &'static str {
 }
 
 impl<'a> GltfReader<'a> {
-    /// An accessor that `from`, a pointer, names.
+    /// An accessor; `from` is the JSON pointer of the value that names it.
     ///
     /// # Errors
-    /// When there is no such accessor, or it lacks something.
+    /// When there is no such accessor, or when it lacks a property.
     pub(in crate::gltf) fn accessor(
         &self,
         index: usize,
@@ -111,12 +111,11 @@ impl<'a> GltfReader<'a> {
         self.json.entry("accessors", index, from)
     }
 
-    /// The numbers of an accessor whose elements have `width` components, one element after
-    /// another; `from` points at what names it.
+    /// The numbers of an accessor whose elements have `width` components, one element after another; `from` is the
+    /// JSON pointer of the value that names it.
     ///
     /// # Errors
-    /// When it is of another type, its bytes are missing, or it is sparse at elements that it does
-    /// not have.
+    /// When the accessor is of another type, when its bytes are missing, or when its sparse indices are out of range.
     pub(in crate::gltf) fn numbers(
         &self,
         index: usize,
@@ -175,10 +174,10 @@ impl<'a> GltfReader<'a> {
         Ok(numbers)
     }
 
-    /// The indices of an accessor of unsigned integers, without sparse ones.
+    /// The indices of an accessor of unsigned integers, which must not be sparse.
     ///
     /// # Errors
-    /// When it is of another type, or its bytes are missing.
+    /// When the accessor is of another type, or when its bytes are missing.
     pub(in crate::gltf) fn indices(
         &self,
         index: usize,
@@ -188,7 +187,7 @@ impl<'a> GltfReader<'a> {
         self.whole_numbers(index, accessor, 1, from)
     }
 
-    /// As [`GltfReader::indices`], of elements that have `width` of them.
+    /// As [`GltfReader::indices`], for elements of `width` numbers.
     ///
     /// # Errors
     /// As there.
@@ -279,8 +278,8 @@ impl<'a> GltfReader<'a> {
         Ok(())
     }
 
-    /// Elements of a buffer view: the view, the offset of the first and how many; their type; where
-    /// they are described, and where the view is named.
+    /// Elements of a buffer view: `(view, offset, count)` is the view, the offset of the first element and their
+    /// number; `(pointer, named)` are the JSON pointers of their description and of the name of the view.
     fn elements(
         &self,
         (view, offset, count): (usize, u64, u64),

@@ -1,4 +1,4 @@
-//! The binary data of a new glTF file: what lies where, and its bytes.
+//! The binary data of a new glTF file: its layout, and its bytes.
 
 use std::io::{self, Write};
 
@@ -10,7 +10,7 @@ use crate::gltf::write_new::json::{
 };
 use crate::gltf::write_new::samples::{ClipSamples, Property};
 
-/// What an accessor gives.
+/// The data of an accessor.
 pub(super) enum AccessorData<'a> {
     /// Inverse bind matrices.
     Matrices(Vec<[f32; 16]>),
@@ -22,12 +22,12 @@ pub(super) enum AccessorData<'a> {
     Keys(Property, Vec<f32>),
     /// Rotations of 16 bits a component.
     Quantized(Vec<i16>),
-    /// Rotations from which meshopt's filter decodes such.
+    /// Rotations of few bits, which meshopt's filter decodes to 16 bits for each component.
     Filtered(Vec<[u8; 8]>),
 }
 
 impl AccessorData<'_> {
-    /// The type of the values, bytes of each, and their number.
+    /// The type of the values, the bytes of each, and their number.
     fn shape(&self) -> (&'static str, u64, usize) {
         match self {
             Self::Matrices(matrices) => ("MAT4", 64, matrices.len()),
@@ -41,7 +41,7 @@ impl AccessorData<'_> {
         }
     }
 
-    /// The same, its rotations in few bits if it has some.
+    /// The same data with quantized rotations, if it contains rotations.
     pub(super) fn quantized(self, quantization: Quantization) -> Self {
         let of = |rotations: &mut dyn Iterator<Item = [f32; 4]>| match quantization {
             Quantization::Components => Self::Quantized(rotations.flat_map(quantized).collect()),
@@ -79,7 +79,7 @@ impl AccessorData<'_> {
     }
 }
 
-/// Numbers as a file has them: little-endian.
+/// The bytes of numbers in a file, little-endian.
 fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(4 * N * values.size_hint().0);
     for number in values.flatten() {
@@ -88,8 +88,8 @@ fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
     bytes
 }
 
-/// All binary data, in the order of its accessors. Every value is of f32 or four of 16 bits, so everything is
-/// aligned to 4 bytes.
+/// All binary data, in the order of its accessors. Every value is of f32 or of four 16-bit numbers, so that
+/// everything is aligned to 4 bytes.
 #[derive(Default)]
 pub(super) struct Binary<'a> {
     data: Vec<AccessorData<'a>>,
@@ -98,13 +98,13 @@ pub(super) struct Binary<'a> {
 }
 
 impl<'a> Binary<'a> {
-    /// Bytes of all.
+    /// Number of bytes.
     pub(super) fn length(&self) -> u64 {
         let last = self.views.last();
         last.map_or(0, |view| view.byte_offset + view.byte_length)
     }
 
-    /// What follows lies in a view of its own.
+    /// Begins a new view for the following data.
     pub(super) fn begin_view(&mut self) {
         self.views.push(BufferView {
             buffer: 0,
@@ -114,7 +114,7 @@ impl<'a> Binary<'a> {
         });
     }
 
-    /// Puts data into the last view; returns the index of its accessor.
+    /// Adds data to the last view; returns the index of its accessor.
     pub(super) fn push(&mut self, data: AccessorData<'a>) -> usize {
         if self.views.is_empty() {
             self.begin_view();
@@ -146,8 +146,9 @@ impl<'a> Binary<'a> {
         self.accessors.len() - 1
     }
 
-    /// Everything compressed by meshopt: a view for all data of one length of elements and one filter, which the accessors then
-    /// lie in. Gives the bytes, and the buffers: that of the bytes, and that which stands for what they decode to.
+    /// Compresses everything by meshopt: all data with the same length of elements and the same filter gets one view,
+    /// to which the accessors are moved. Returns the bytes, and two buffers: that of the bytes, and that of the
+    /// decoded data.
     pub(super) fn compress(&mut self) -> (Vec<u8>, [Buffer; 2]) {
         let kind =
             |data: &AccessorData<'_>| (data.shape().1, matches!(data, AccessorData::Filtered(_)));
@@ -203,7 +204,7 @@ impl<'a> Binary<'a> {
         (compressed, buffers)
     }
 
-    /// Writes all, a channel at a time.
+    /// Writes all data, one channel at a time.
     pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let mut data = self.data.iter();
         data.try_for_each(|data| out.write_all(&data.bytes()))

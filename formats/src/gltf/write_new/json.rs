@@ -1,10 +1,10 @@
-//! The JSON of a new glTF file, as far as animations need it. Numbers that name something are indices
-//! in the list of such things.
+//! The JSON of a new glTF file, as animations need it. Numbers that name an object are indices in the list of such
+//! objects.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// The whole.
+/// The whole JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root {
@@ -30,17 +30,17 @@ pub(super) struct Asset {
     pub(super) generator: &'static str,
 }
 
-/// The roots among the nodes.
+/// The roots of the nodes.
 #[derive(Serialize)]
 pub(super) struct Scene {
     pub(super) nodes: Vec<usize>,
 }
 
-/// A node at rest, relative to the node whose child it is.
+/// A node at rest, relative to its parent.
 #[derive(Serialize)]
 pub(super) struct Node {
     pub(super) name: String,
-    /// Whole numbers, or those of f32. What glTF has by default is left out.
+    /// Integers, or numbers of f32. Defaults of glTF are left out.
     #[serde(skip_serializing_if = "is_zero")]
     pub(super) translation: [f64; 3],
     #[serde(skip_serializing_if = "is_identity")]
@@ -53,18 +53,18 @@ pub(super) struct Node {
     pub(super) extras: Option<Extras>,
 }
 
-/// What glTF itself has no room for, and is read again.
+/// Data that glTF cannot store otherwise, and that Tumble reads again.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Extras {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) bvh: Option<BvhExtras>,
-    /// The node is where the positions of its children count from.
+    /// Whether the node is the origin of the positions of its children.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(super) tumble_origin: bool,
 }
 
-/// How BVH has a joint.
+/// The BVH data of a joint.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BvhExtras {
@@ -139,8 +139,8 @@ pub(in crate::gltf) const SHORT: u32 = 5122;
 /// The extension of compressed views.
 pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
-/// `min` and `max` are f32 written with all the digits of f64: readers that take them for f64 then
-/// find them equal to the data.
+/// `min` and `max` are f32 values with all digits of f64, so that readers that parse them as f64 find them equal to
+/// the data.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
@@ -176,7 +176,7 @@ pub(super) struct ViewExtensions {
     pub(super) meshopt: MeshoptView,
 }
 
-/// Where a view's bytes are, compressed.
+/// The location of a view's compressed bytes.
 #[derive(Serialize, Clone)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct MeshoptView {
@@ -206,7 +206,7 @@ pub(super) struct BufferExtensions {
     pub(super) meshopt: Fallback,
 }
 
-/// The buffer stands for what is decoded, and holds nothing.
+/// A buffer that is only a substitute for the decoded data, and is empty.
 #[derive(Serialize)]
 pub(super) struct Fallback {
     pub(super) fallback: bool,

@@ -14,19 +14,18 @@ use crate::motion::{Motion, Transform};
 pub(super) struct NewNodes {
     pub(super) list: Vec<Node>,
     pub(super) roots: Vec<usize>,
-    /// Where each node rests, and what its translations are to be moved by.
+    /// The rest transform of each node, and the vector to add to its translations.
     rests: Vec<(Transform, DVec3)>,
     rigs: Vec<Rig>,
     names: UniqueNames,
-    /// The nodes that are children of others already.
+    /// The number of nodes that already have their parents.
     children_until: usize,
 }
 
 /// The joints of clips that are parts of one skeleton, or tracks without parents.
 struct Rig {
     has_skeleton: bool,
-    /// The node of each joint, by its parent node and its name, and which of the joints of
-    /// that name it is.
+    /// The node of each joint, by its parent node, its name, and its index among the joints with this name.
     nodes: HashMap<(Option<usize>, String, usize), usize>,
     roots: Vec<usize>,
 }
@@ -35,12 +34,11 @@ struct Rig {
 pub(super) type SkinOf = (Vec<usize>, Vec<[f32; 16]>);
 
 impl NewNodes {
-    /// The node of each track of a clip. Joints of the same names and parents and
-    /// rest in the same places are the same nodes in all clips, unless another joint of the two clips
-    /// rests elsewhere in one than in the other.
+    /// The node of each track of a clip. Joints with the same names, parents and rest transforms are the same nodes
+    /// in all clips, unless another joint of the two clips rests differently in one than in the other.
     ///
     /// # Errors
-    /// Why the joints are no trees, in words.
+    /// Why the joints are not trees, as text.
     pub(super) fn add(&mut self, clip: &Motion) -> Result<Vec<usize>, String> {
         let tracks = clip.set.track_count();
         let parents: Vec<Option<usize>> = match clip.skeleton.is_empty() {
@@ -129,9 +127,9 @@ impl NewNodes {
         Ok(nodes)
     }
 
-    /// A node's origin, a new node whose child it is, where it has one, else itself: positions of maps
-    /// are more than f32 has digits for, and the sum of the two nodes' translations is as exact as the
-    /// player that computes it.
+    /// The origin of a node: a new parent node if its positions need an origin, otherwise the node itself. Positions
+    /// of maps are larger than f32 can store exactly, and the sum of the translations of both nodes is as exact as
+    /// the program that computes it.
     fn below_origin(&mut self, node: usize) -> usize {
         let origin = self.rests[node].1;
         if origin == DVec3::ZERO {
@@ -155,8 +153,8 @@ impl NewNodes {
         carrier
     }
 
-    /// The nodes that a clip shares with a rig, `None` for each that is to be made; nothing if they
-    /// share no root, or a joint rests elsewhere.
+    /// The nodes that a clip shares with a rig, `None` for each new node. `None` for the whole if they share no root,
+    /// or if a joint rests differently.
     fn shared(
         &self,
         rig: &Rig,
@@ -187,7 +185,7 @@ impl NewNodes {
         shares_root.then_some(found)
     }
 
-    /// A skin for each tree of a skeleton, as the joints of a skin have one root in common.
+    /// A skin for each tree of a skeleton, because the joints of a skin have a common root.
     pub(super) fn skins(&self) -> Vec<SkinOf> {
         let rigs = self.rigs.iter().filter(|rig| rig.has_skeleton);
         rigs.flat_map(|rig| rig.roots.iter().map(|&root| self.skin(root)))
@@ -228,7 +226,7 @@ fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// How BVH has a joint, for those who write it as BVH again.
+/// The BVH data of a joint, for programs that write it as BVH again.
 fn extras(joint: &BvhJoint) -> Extras {
     let sites = joint.end_sites.iter();
     Extras {
@@ -240,7 +238,7 @@ fn extras(joint: &BvhJoint) -> Extras {
     }
 }
 
-/// The f64 of an f32's shortest digits.
+/// The f64 with the shortest digits of an f32.
 fn shortest(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(f64::from(number))
 }
@@ -253,8 +251,8 @@ fn affine(rest: &Transform) -> DAffine3 {
     )
 }
 
-/// The columns of the inverse, whose last row is exactly 0 0 0 1; the identity where there is no
-/// inverse, as of a joint at scale 0, which shows nothing at rest.
+/// The columns of the inverse matrix, whose last row is exactly 0 0 0 1. If there is no inverse, as for a joint with
+/// scale 0, which is invisible at rest, it is the identity.
 fn inverse(world: DAffine3) -> [f32; 16] {
     let columns = |of: DAffine3| {
         let DMat3 {
@@ -278,12 +276,12 @@ fn inverse(world: DAffine3) -> [f32; 16] {
     }
 }
 
-/// Names that were given.
+/// The names that were used.
 #[derive(Default)]
 pub(super) struct UniqueNames(HashSet<String>);
 
 impl UniqueNames {
-    /// `name`, or where another has it, `name#index`.
+    /// `name`, or `name#index` if `name` was used.
     pub(super) fn unique(&mut self, name: String, index: usize) -> String {
         let mut unique = name;
         while !self.0.insert(unique.clone()) {

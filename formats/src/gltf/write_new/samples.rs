@@ -1,5 +1,5 @@
-//! The samples of one clip as the channels of a glTF file need them: a joint at a time, relative to
-//! its parent.
+//! Converts the samples of one clip to those of the channels of a glTF file: one joint at a time, relative to its
+//! parent.
 
 use std::io;
 
@@ -10,7 +10,7 @@ use tumble::signs_differ;
 use crate::gltf::schema::TargetPath;
 use crate::motion::{ChannelInterpolation, Channels, SampledClip, Transform};
 
-/// What a channel moves.
+/// The property that a channel moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Property {
     Rotation,
@@ -31,7 +31,7 @@ impl Property {
     }
 }
 
-/// A clip whose lists have the lengths that they must have.
+/// A clip whose lists have the right lengths.
 #[derive(Clone, Copy)]
 pub(super) struct ClipSamples<'a> {
     clip: &'a SampledClip<'a>,
@@ -56,7 +56,7 @@ impl<'a> ClipSamples<'a> {
         self.clip.times.len()
     }
 
-    /// Whether its poses, which are in the world, have to be made relative to scaled parents.
+    /// Whether its poses are relative to the world, and scaled parents must be taken into account.
     pub(super) fn has_scaled_parents_in_world(self) -> bool {
         let clip = self.clip.clip;
         let has_scales = !self.clip.scales.is_empty()
@@ -67,8 +67,8 @@ impl<'a> ClipSamples<'a> {
         clip.is_world && has_scales && clip.skeleton.iter().any(|joint| joint.parent.is_some())
     }
 
-    /// How `property` of a track is interpolated in the file, `None` where it has no channel:
-    /// rotations of tracks without keys, translations and scales that never leave the rest pose.
+    /// The interpolation of a property of a track in the file; `None` if it has no channel: rotations of tracks
+    /// without keys, and translations and scales that always equal the rest transform.
     pub(super) fn interpolation(self, track: usize, property: Property) -> Option<&'static str> {
         const ALL: Channels = Channels {
             rotation: Some(ChannelInterpolation::Linear),
@@ -101,7 +101,7 @@ impl<'a> ClipSamples<'a> {
         }
     }
 
-    /// Rotations of a track, each with the sign that continues the one before it.
+    /// The rotations of a track, with continued signs.
     pub(super) fn rotations(self, track: usize) -> impl Iterator<Item = [f32; 4]> + use<'a> {
         let mut before = None;
         (0..self.len()).map(move |sample| {
@@ -113,13 +113,13 @@ impl<'a> ClipSamples<'a> {
         })
     }
 
-    /// Translations of a track; none where the clip has none.
+    /// The translations of a track; empty if the clip has none.
     pub(super) fn translations(self, track: usize) -> impl Iterator<Item = [f32; 3]> + use<'a> {
         let samples = self.clip.translations.len() / self.tracks.max(1);
         (0..samples).map(move |sample| self.translation(sample, track).to_array())
     }
 
-    /// Scales of a track; none where the clip has none.
+    /// The scales of a track; empty if the clip has none.
     pub(super) fn scales(self, track: usize) -> impl Iterator<Item = [f32; 3]> + use<'a> {
         let scales = self.clip.scales.get(track..).unwrap_or_default();
         scales
@@ -133,7 +133,7 @@ impl<'a> ClipSamples<'a> {
         joint.map(|joint| joint.rest).unwrap_or_default()
     }
 
-    /// The parent of a track, in a clip whose poses are in the world.
+    /// The parent of a track in a clip whose poses are relative to the world.
     fn parent_in_world(self, track: usize) -> Option<usize> {
         let clip = self.clip.clip;
         clip.skeleton.get(track)?.parent.filter(|_| clip.is_world)

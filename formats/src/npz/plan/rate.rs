@@ -1,4 +1,4 @@
-//! Frame rates as files have them: numbers that were rounded, perhaps more than once.
+//! Frame rates in files: numbers that were rounded, perhaps several times.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
@@ -9,10 +9,10 @@ use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::rate::{Precision, RateSource, of, on_frames};
 
 impl ArchivePlan {
-    /// The rate in the first of these arrays that there is.
+    /// Reads the rate in the first of these arrays that exists.
     ///
     /// # Errors
-    /// When it is no one number, or no rate.
+    /// When it is not a single number, or not a rate.
     pub(crate) fn read_rate(
         &mut self,
         archive: &Archive,
@@ -51,8 +51,8 @@ impl ArchivePlan {
         Ok(())
     }
 
-    /// Says where a file's length, in seconds, contradicts its rate: a rate that is twice or half of what the motion
-    /// was recorded at. Lengths are counted with the last frame and without, and a part may have been cut off.
+    /// Warns if the duration of a file contradicts its rate: a rate that is twice or half of that of the recording.
+    /// Durations include the last frame or not, and a part may have been cut off.
     pub(crate) fn compare_length(&mut self, archive: &Archive, name: &str) {
         const LEAST_FACTOR: f64 = 1.5;
         let Some(rate) = self.rate else {
@@ -80,10 +80,10 @@ impl ArchivePlan {
         });
     }
 
-    /// The times of all frames, in seconds; the plan's rate becomes that on whose frames they lie.
+    /// The times of all frames in seconds. The rate of the plan becomes that of these times.
     ///
     /// # Errors
-    /// When neither times nor a rate are known, or there are not as many times as frames.
+    /// When neither times nor a rate are known, or when the number of times is not that of the frames.
     pub(crate) fn read_times(
         &mut self,
         archive: &Archive,

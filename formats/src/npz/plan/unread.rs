@@ -10,7 +10,7 @@ use crate::npz::tumble_layout::CONSTANTS;
 use crate::warnings::{Warnings, listed};
 
 impl ArchivePlan {
-    /// The members of which nothing is read, but for pickled objects, which have another warning.
+    /// The members that are not read, except pickled objects, which have another warning.
     pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
         let is_read = |index: usize, member: &Member| {
             let header = member.header.as_ref();
@@ -30,13 +30,13 @@ impl ArchivePlan {
         others.map(|(index, _)| index).collect()
     }
 
-    /// Whether a member says what made samples that Tumble wrote: a text beside them.
+    /// Whether a member is a note on how Tumble's samples were made: a text beside them.
     pub(crate) fn is_note(&self, member: &Member) -> bool {
         let header = member.header.as_ref();
         self.is_tumble_layout && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())
     }
 
-    /// Warns of the members that are not read, and of pickled objects, which are not looked into.
+    /// Warns of members that are not read, and of pickled objects.
     pub(crate) fn warn_of_others(
         &self,
         archive: &Archive,

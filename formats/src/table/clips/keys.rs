@@ -1,4 +1,4 @@
-//! The keys of a clip's tracks, from the columns of its table.
+//! Makes the keys of a clip's tracks from the columns of its table.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use rayon::prelude::*;
@@ -12,20 +12,20 @@ use crate::table::columns::{CellReader, Cells, ColumnValues};
 use crate::table::plan::{CellSource, Parts, RotationCells};
 use crate::warnings::Warnings;
 
-/// Fewer rows than this are no work for another thread.
+/// Fewer rows than this are processed faster by one thread.
 const MIN_PARALLEL_ROWS: usize = 1 << 14;
 
 /// The keys of one track.
 pub(crate) struct RowKeys {
     pub(crate) rotations: Vec<Quat>,
-    /// What the translations are to be moved by.
+    /// The vector to add to the translations.
     pub(crate) origin: DVec3,
     pub(crate) translations: Vec<Vec3>,
     pub(crate) scales: Vec<Vec3>,
 }
 
 impl RowKeys {
-    /// Keeps some keys, in this order.
+    /// Keeps the keys with these indices, in this order.
     pub(crate) fn select(&mut self, kept: &[usize]) {
         select(&mut self.rotations, Some(kept));
         for list in [&mut self.translations, &mut self.scales] {
@@ -43,7 +43,7 @@ impl RowKeys {
 
 /// The keys of all rows of a table, whose positions have no origin yet.
 struct AllKeys {
-    /// Signs say nothing.
+    /// Whether signs are to be continued, because the rotations have none.
     continues_signs: bool,
     rotations: Vec<Quat>,
     translations: Vec<DVec3>,
@@ -51,7 +51,7 @@ struct AllKeys {
 }
 
 impl AllKeys {
-    /// Those at some positions.
+    /// The keys at some positions.
     fn at(&self, positions: &[u32]) -> RowKeys {
         let vectors = |list: &[DVec3]| -> Vec<DVec3> {
             match list {
@@ -84,7 +84,7 @@ impl TableClip<'_> {
     /// The keys of all tracks.
     ///
     /// # Errors
-    /// The first fault, row by row.
+    /// The first error, row by row.
     pub(crate) fn keys(
         &self,
         shared: &SharedRows<'_>,
@@ -125,7 +125,7 @@ impl TableClip<'_> {
         keys.collect()
     }
 
-    /// The keys at some positions; nothing if any of them needs a warning or an error.
+    /// The keys at some positions; `None` if any of them needs a warning or an error.
     fn quiet_keys(&self, parts: &Parts, positions: &[u32]) -> Option<RowKeys> {
         let rotations = match &parts.rotation {
             RotationCells::Quaternion(cells) => self.quiet_quaternions(cells, positions),
@@ -171,7 +171,7 @@ impl TableClip<'_> {
         }
     }
 
-    /// Positions, with their origin. Those that are f32 in the file have lost what one would keep.
+    /// Positions with their origin. Positions that are f32 in the file have no digits that an origin would keep.
     fn quiet_points(
         &self,
         cells: Option<&[CellSource; 3]>,
@@ -293,7 +293,8 @@ impl TableClip<'_> {
         (0..self.len()).map(vector).collect()
     }
 
-    /// Whether a number of a track's key is missing in a row: [`ReadOptions::bridge_gaps`] leaves it out.
+    /// For each row, whether a number of a track's key is missing, so that [`ReadOptions::bridge_gaps`] leaves it
+    /// out.
     ///
     /// [`ReadOptions::bridge_gaps`]: crate::format::ReadOptions::bridge_gaps
     pub(crate) fn gaps(&self, parts: &Parts) -> Result<Option<Vec<bool>>, Diagnostic> {
@@ -310,7 +311,7 @@ impl TableClip<'_> {
         Ok(gaps.contains(&true).then_some(gaps))
     }
 
-    /// What reads the numbers of some cells.
+    /// The readers of the numbers of some cells.
     fn columns<const N: usize>(
         &self,
         cells: &[CellSource; N],
@@ -367,14 +368,14 @@ impl TableClip<'_> {
     }
 }
 
-/// Keys as [`quiet_unit`] makes them; nothing if there is anything to be said about one of them.
+/// Keys as [`quiet_unit`] makes them; `None` if any of them needs a warning or an error.
 fn units(keys: impl Iterator<Item = Quat>) -> Option<Vec<Quat>> {
     let keys: Vec<Quat> = keys.collect();
     let is_marked = |any: bool, key: &Quat| any | key.w.is_nan();
     (!keys.iter().fold(false, is_marked)).then_some(keys)
 }
 
-/// The vectors; nothing if one of them is not finite.
+/// The vectors; `None` if one of them is not finite.
 fn finite(vectors: impl Iterator<Item = Vec3>) -> Option<Vec<Vec3>> {
     let vectors: Vec<Vec3> = vectors.collect();
     let numbers: &[f32] = bytemuck::cast_slice(&vectors);
