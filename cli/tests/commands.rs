@@ -17,6 +17,12 @@ pub(crate) fn commands() -> Vec<Command> {
     listed.cloned().collect()
 }
 
+pub(crate) fn named(name: &str) -> Command {
+    let mut all = commands().into_iter();
+    all.find(|command| command.get_name() == name)
+        .expect("a command of this name")
+}
+
 /// Whether a command has an option, by the name of its field.
 pub(crate) fn has(command: &Command, option: &str) -> bool {
     let mut options = command.get_arguments();
