@@ -205,10 +205,10 @@ pub enum SkeletonError {
         /// The number of tracks.
         tracks: usize,
     },
-    /// A track is its ancestor.
+    /// The parents contain a cycle.
     #[error("track {track} is its own ancestor")]
     Cycle {
-        /// The index of a track in the cycle.
+        /// The index of a track in the cycle, or of a descendant of one.
         track: usize,
     },
     /// An offset is NaN or infinite.

@@ -188,8 +188,8 @@ impl Wrap {
     }
 }
 
-/// The first number of `from..end` for which `is_in` is false, if `is_in` is true for all numbers before it; else
-/// `end`.
+/// The first number of `from..end` for which `is_in` is false, or `end`. `is_in` must be true for all numbers before
+/// it.
 fn first_outside(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize {
     let (mut from, mut end) = (from, end);
     while from < end {

@@ -80,8 +80,7 @@ impl TrackSet {
     /// [`GLTF_CUBIC`](crate::method::gltf_cubic::GLTF_CUBIC).
     ///
     /// # Errors
-    /// When there is no such track, the number of pairs is not the number of keys, or a tangent is not finite or is
-    /// too large.
+    /// When there is no such track, the number of pairs is not the number of keys, or a tangent is not finite.
     pub fn set_tangents(&mut self, track: usize, tangents: &[[Quat; 2]]) -> Result<(), TrackError> {
         let largest = |both: &[Quat; 2]| {
             let numbers = both.iter().flat_map(Quat::to_array);
