@@ -32,8 +32,9 @@
 //
 // A library's clips are flat tables (`clip_tables`): per clip its time bases, per time base its spans, per joint a
 // rotation, a translation and a scale, each with a form and cells of four numbers. Each layer of an instance is an
-// entry of 16 bytes (`instances`); weights that fade are written into it as the clock moves (`fade`). Positions are found by `twin::crowd_times`; layers are laid over each other by
-// `lay_over` and `twin::crowd_layers`; `gpu::crowd` runs the kernels, `on_cpu` their twins.
+// entry of 16 bytes (`instances`); weights that fade are written into it as the clock moves (`fade`). Positions are
+// found by `twin::crowd_times`; layers are laid over each other by `lay_over` and `twin::crowd_layers`; `gpu::crowd`
+// runs the kernels, `on_cpu` their twins.
 //
 // Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
 // joints are neighbouring lanes. On a device the tables stay; entries that changed are written with the next
