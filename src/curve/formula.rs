@@ -114,7 +114,7 @@ pub(crate) fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
     exp_by(a, square(a).waves())
 }
 
-/// `q / |q|`, whatever the length.
+/// `q / |q|`, for any length.
 #[inline(always)]
 pub(crate) fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
     let scale = dot(q, q).reciprocal_root();

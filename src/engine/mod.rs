@@ -324,7 +324,7 @@ impl Engine {
     /// frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
-    /// As [`Engine::evaluate`]; also when the quantity is the rotation.
+    /// As [`Engine::evaluate`], but the quantity must not be the rotation.
     #[doc(alias = "angular velocity")]
     #[doc(alias = "angular acceleration")]
     pub fn rates(
@@ -363,8 +363,8 @@ impl Engine {
     /// a copy.
     ///
     /// # Errors
-    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or is
-    /// of another type.
+    /// As [`Engine::upload`] and [`Clip::evaluate`], but for any quantity; also when `output` is not exactly as long
+    /// as the result, or its type does not fit the quantity.
     pub fn evaluate_into<R: OutputValue>(
         &self,
         set: &TrackSet,

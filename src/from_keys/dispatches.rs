@@ -35,7 +35,7 @@ const TASK_KEYS: usize = 16 * 1024;
 /// The samples to evaluate.
 pub(crate) struct KeyJob<'a> {
     pub(crate) request: &'a SetRequest<'a>,
-    /// The curves that its samples lie on.
+    /// The curves of its samples.
     pub(crate) curve: KeyCurve,
 }
 
@@ -62,7 +62,7 @@ impl<'a> KeyJob<'a> {
         }
     }
 
-    /// The keys among which the samples of a batch lie, of each of its tracks.
+    /// The keys of each track of a batch that its samples need.
     pub(crate) fn keys_of(&self, batch: &Batch) -> impl Iterator<Item = TrackKeys<'a>> {
         let (set, curve) = (self.request.set, self.curve);
         let tracks = batch.intervals(set);

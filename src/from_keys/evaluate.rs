@@ -50,8 +50,8 @@ impl<'a> KeyEvaluator<'a> {
         }
     }
 
-    /// Evaluates the samples of a batch that lie in `window`, `[track][sample]`; returns whether
-    /// all of them are resolved.
+    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`; returns whether all of them are
+    /// resolved.
     pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,

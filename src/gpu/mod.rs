@@ -36,10 +36,10 @@
 //!
 //! | what | memory |
 //! |---|---|
-//! | segments, constants, tables of crowds | the device's own |
-//! | lists and keys | the device's own where the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied there, or read from the host's |
-//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else the device's own, copied by the second queue beside later kernels |
-//! | results for CUDA | the device's own, exported as a file ([`exported`]) |
+//! | segments, constants, tables of crowds | device memory |
+//! | lists and keys | device memory if the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied to it, or read in host memory |
+//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else device memory, copied by the second queue beside later kernels |
+//! | results for CUDA | device memory, exported as a file descriptor ([`exported`]) |
 //!
 //! Small buffers share allocations of 4 MiB ([`SharedMemory`](shared_memory::SharedMemory)).
 //!

@@ -121,7 +121,7 @@ impl TimedPath {
         times
     }
 
-    /// The parameters of an interval from which the point this far ahead lies between two intervals.
+    /// The parameters of an interval for which the point at this distance ahead passes from one interval to the next.
     pub(crate) fn passings(&self, interval: usize, distance: f64) -> Vec<f64> {
         let (lengths, total) = (&self.lengths, self.lengths.total());
         let [from, to] = lengths.of(interval);

@@ -66,7 +66,7 @@ impl SmoothPreparation {
         }
     }
 
-    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    /// Adds some intervals of the track `index` of a set, as a separate part.
     pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,

@@ -27,8 +27,8 @@ pub(crate) fn inserted(
     thinned.min_by_key(Vec::len).unwrap_or_default()
 }
 
-/// Inserts keys until the curve is near: every interval whose curve is too far from a sample gets its worst sample as
-/// a key. This ends at the latest when every sample is a key.
+/// Inserts keys until the curve is near: every interval with a sample that is not near gets its worst sample as a
+/// key. This ends at the latest when every sample is a key.
 fn filled(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     loop {
         let worst = worst_of_each(&indices, 0..indices.len() - 1);

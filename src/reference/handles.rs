@@ -275,7 +275,7 @@ fn controls(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> [D
     ]
 }
 
-/// `2 (p·q) q - p`: as far after `q` as `p` is before it (Shoemake 1985).
+/// `2 (p·q) q - p`, such that `q` is half-way from `p` to it (Shoemake 1985).
 fn double(p: DQuat, q: DQuat) -> DQuat {
     q * (2.0 * inner(p, q)) - p
 }

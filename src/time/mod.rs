@@ -13,7 +13,7 @@
 //!
 //! | type | what it is |
 //! |---|---|
-//! | [`frames::SampleTimes`] | which samples are asked for: a rate and a range, or explicit times |
+//! | [`frames::SampleTimes`] | the requested samples: a rate and a range, or explicit times |
 //! | [`frames::Timeline`] | the same for a set: how many samples, and the time of each |
 //! | [`frame_rate::FrameRate`] | frames per second, as an exact ratio |
 //! | [`frame_clock::FrameClock`] | from key times to frame coordinates, for a track or one of its copies |

@@ -170,7 +170,7 @@ pub(crate) struct IntervalBlock {
     pub(crate) offset: [f32; LEN],
     /// Whether the distances of all samples from `whole` are exact in f32.
     pub(crate) are_near: bool,
-    /// The intervals in which samples lie, by their indices in the block.
+    /// The indices in the block of the intervals with samples.
     pub(crate) occupied: Occupied,
 }
 
@@ -226,7 +226,7 @@ pub(crate) struct IntervalBlocks<'a> {
     starts: &'a [f64],
     /// Where the last interval ends.
     end: f64,
-    /// The samples asked for.
+    /// The requested samples.
     samples: Range<usize>,
     /// How many intervals are done.
     done: usize,

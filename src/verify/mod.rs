@@ -72,8 +72,7 @@ pub struct Verification {
     pub max_norm_error: f64,
     /// The bound of `max_error`, radians.
     pub error_bound: f64,
-    /// The bound of `max_norm_error`: [`NORM_BOUND`], plus the distance of the keys' norms from 1 beyond rounding to
-    /// f32.
+    /// The bound of `max_norm_error`: [`NORM_BOUND`], plus the excess of the keys' norm errors over rounding to f32.
     pub norm_bound: f64,
     /// The results for all outputs that are computed from the rotations.
     pub outputs: Vec<OutputVerification>,
@@ -215,7 +214,7 @@ pub fn verify(
     })
 }
 
-/// The largest distance of the keys' norms from 1, beyond that of a unit quaternion rounded to f32. Keys within
+/// The largest excess of the keys' norm errors over that of a unit quaternion rounded to f32. Keys within
 /// [`UNIT_TOLERANCE`](crate::tracks::set::UNIT_TOLERANCE) keep their norm, and curves through them have it too.
 fn norm_excess(set: &TrackSet) -> f64 {
     let keys = set.tracks().flat_map(|track| track.keys);

@@ -1,4 +1,4 @@
-//! Which instances of a crowd are evaluated.
+//! The visible instances of a crowd, which alone are evaluated.
 
 use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;

@@ -62,7 +62,7 @@ impl Clip {
     /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
-    /// As [`Clip::evaluate`]; also when the clip is of rotations.
+    /// As [`Clip::evaluate`], but the clip must not be of rotations.
     pub fn rates(&self, frames: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
         self.request(frames).layout(layout).rates()
     }
@@ -87,7 +87,8 @@ impl Clip {
     /// which accepts memory of any type.
     ///
     /// # Errors
-    /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or is of another type.
+    /// As [`Clip::evaluate`], but for any quantity; also when `output` is not exactly as long as the result, or its
+    /// type does not fit the quantity.
     pub fn evaluate_into<R: OutputValue>(
         &self,
         frames: &SampleTimes,

@@ -103,7 +103,7 @@ struct RangeEnd<L> {
 }
 
 impl<L: Lanes> RangeEnd<L> {
-    /// A rotation that turns at `times` a half-rotation vector per unit of the parameter.
+    /// A rotation whose half-rotation vector changes by `times` a vector per unit of the parameter.
     #[inline(always)]
     fn new(rotation: [L; 4], vector: [L; 3], times: f32) -> Self {
         Self {

@@ -22,7 +22,7 @@ pub(crate) trait Moving: Fn(Dual) -> [Dual; 4] {}
 
 impl<F: Fn(Dual) -> [Dual; 4]> Moving for F {}
 
-/// How far a curve has turned at each eighth of its parameter, radians.
+/// The angle that a curve has covered at each eighth of its parameter, radians.
 #[derive(Debug)]
 pub(crate) struct ArcLengths {
     lengths: [f64; PARTS + 1],
@@ -72,8 +72,8 @@ impl ArcLengths {
         Dual::new(u, first, -along * (first / speed) * (first / speed))
     }
 
-    /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection
-    /// where that leaves the part which contains it.
+    /// The parameter at which the curve has covered `target` radians: Newton's method, or bisection if Newton's
+    /// method leaves the part that contains it.
     fn parameter_at(&self, curve: &impl Moving, target: f64) -> f64 {
         let part = self.lengths.partition_point(|&length| length <= target);
         let part = part.saturating_sub(1).min(PARTS - 1);
