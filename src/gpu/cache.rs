@@ -115,7 +115,8 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     Some(all.join("tumble"))
 }
 
-/// A checksum (64-bit FNV-1a) that detects files which were cut short or overwritten. It does not protect against intent.
+/// A checksum (64-bit FNV-1a) that detects files which were cut short or overwritten. It does not protect against
+/// intent.
 pub(crate) fn sum(name: &str, contents: &[u8]) -> u64 {
     let all = name.bytes().chain(contents.iter().copied());
     all.fold(0xcbf2_9ce4_8422_2325, |sum, byte| {

@@ -97,8 +97,8 @@ impl TrackSet {
     /// normalised.
     ///
     /// # Errors
-    /// When there are no keys, the numbers of keys and times differ, the times are not finite and strictly increasing, or
-    /// a key's norm is not within 0.1 of 1; then the set is unchanged.
+    /// When there are no keys, the numbers of keys and times differ, the times are not finite and strictly
+    /// increasing, or a key's norm is not within 0.1 of 1; then the set is unchanged.
     pub fn push<R: Rotation>(
         &mut self,
         name: impl Into<String>,
