@@ -1,4 +1,4 @@
-//! What is refused before anything is evaluated: encodings, windows and memory that do not fit the result.
+//! Checks before an evaluation: encodings, windows and memory that do not fit the result are refused.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::output::encoding::Encoding;
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
 
-/// Refuses values that an encoding cannot store.
+/// Refuses an encoding that cannot store the quantity.
 pub(crate) fn check_encoding(encoding: Encoding, quantity: Quantity) -> Result<(), Error> {
     match encoding.row().takes_vectors || quantity == Quantity::Rotation {
         true => Ok(()),
@@ -19,7 +19,7 @@ pub(crate) fn check_encoding(encoding: Encoding, quantity: Quantity) -> Result<(
     }
 }
 
-/// Refuses memory of a type that cannot have what is asked for.
+/// Refuses memory whose type cannot store the quantity.
 pub(crate) fn check_rows<R: OutputValue>(quantity: Quantity) -> Result<(), Error> {
     match quantity == Quantity::Rotation {
         true if !R::STORES_ROTATIONS => Err(Error::NotRates),
@@ -28,7 +28,7 @@ pub(crate) fn check_rows<R: OutputValue>(quantity: Quantity) -> Result<(), Error
     }
 }
 
-/// Refuses a window that a result has not, and memory of another size than the window's.
+/// Refuses a window that is not within the result, and memory of another size than the window's.
 pub(crate) fn check_window(
     window: &Window,
     tracks: usize,
@@ -43,7 +43,7 @@ pub(crate) fn check_window(
     }
 }
 
-/// Refuses a window that a result of so many tracks and samples has not.
+/// Refuses a window that is not within a result of `tracks` tracks and `samples` samples.
 pub(crate) fn check_within(window: &Window, tracks: usize, samples: usize) -> Result<(), Error> {
     let lies_in = |part: &Range<usize>, whole| part.start <= part.end && part.end <= whole;
     if !lies_in(&window.tracks, tracks) || !lies_in(&window.samples, samples) {
@@ -55,8 +55,8 @@ pub(crate) fn check_within(window: &Window, tracks: usize, samples: usize) -> Re
     Ok(())
 }
 
-/// Fills the caller's memory as quaternions, if it is of the result's type and length. Where it is
-/// not aligned as they are, memory that is gets the result first.
+/// Fills the caller's memory as quaternions, if it is of the result's type and length. If it is not aligned like
+/// quaternions, the result is first written to memory that is, and copied.
 pub(crate) fn in_quats<R: OutputValue>(
     output: &mut [R],
     needed: usize,

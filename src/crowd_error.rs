@@ -1,4 +1,4 @@
-//! Why a crowd cannot be made, changed or evaluated as asked. Places count from 0.
+//! Errors of crowds. Indices count from 0.
 
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::VulkanError;
@@ -9,24 +9,24 @@ use crate::threads::OutOfThreadsError;
 use crate::threads::stop::StoppedError;
 use crate::time::wrap::WrapMode;
 
-/// The most clips of a library.
+/// The maximum number of clips of a library.
 pub(crate) const MAX_CLIPS: usize = 1 << 16;
-/// The most masks of a library, beside the one that lets everything through.
+/// The maximum number of masks of a library, not counting the one whose weights are all 1.
 pub(crate) const MAX_MASKS: usize = 31;
-/// The most instances of a crowd.
+/// The maximum number of instances of a crowd.
 pub(crate) const MAX_INSTANCES: usize = 1_000_000;
-/// The most layers of an instance.
+/// The maximum number of layers of an instance.
 pub(crate) const MAX_LAYERS: usize = 4;
-/// The longest clip, ticks.
+/// The maximum length of a clip, ticks.
 pub(crate) const MAX_TICKS: u32 = (1 << 31) - (1 << 18);
-/// Speeds stay below this magnitude.
+/// Speeds are below this magnitude.
 pub(crate) const FASTEST: f32 = 128.0;
 
-/// Why a crowd cannot be made, changed or evaluated as asked. Places count from 0.
+/// Why a crowd or its library cannot be made, changed or evaluated as requested. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CrowdError {
-    /// A clip of other joints than the library's skeleton.
+    /// The number of a clip's tracks differs from the number of the skeleton's joints.
     #[error(
         "the clip has {tracks} tracks, the skeleton has {joints} joints; give one track for each"
     )]
@@ -36,160 +36,160 @@ pub enum CrowdError {
         /// Joints of the skeleton.
         joints: usize,
     },
-    /// A skeleton without joints.
+    /// The skeleton has no joints.
     #[error("the skeleton has no joints; a crowd has at least one")]
     NoJoints,
-    /// A library without clips.
+    /// The library has no clips.
     #[error("the library has no clips; push one")]
     NoClips,
-    /// More clips than entries can name.
+    /// The library has the maximum number of clips.
     #[error("the library is full: there can be {} clips", MAX_CLIPS)]
     TooManyClips,
-    /// More masks than entries can name.
+    /// The library has the maximum number of masks.
     #[error("the library is full: there can be {} masks", MAX_MASKS)]
     TooManyMasks,
-    /// The library is larger than indices of 32 bits can tell.
+    /// The library needs more constants than 32 bits can count.
     #[error(
         "the library's clips have more constants than 32 bits can count; use fewer or shorter clips"
     )]
     TooLarge,
-    /// Ticks of no length.
+    /// The number of ticks in a second is out of range.
     #[error("{ticks_per_second} ticks a second; give 1 to {}", MAX_TICKS)]
     TicksPerSecond {
-        /// The ticks that were asked for.
+        /// The requested number of ticks.
         ticks_per_second: u32,
     },
-    /// A clip that is too long for its ticks.
+    /// A clip has too many ticks.
     #[error("the clip takes {seconds} s; at {ticks_per_second} ticks a second there can be {} s", f64::from(MAX_TICKS) / f64::from(*ticks_per_second))]
     TooLong {
-        /// How long it is.
+        /// The clip's length, seconds.
         seconds: f64,
-        /// The library's ticks.
+        /// The library's number of ticks in a second.
         ticks_per_second: u32,
     },
-    /// The method is to give velocities.
+    /// The interpolation computes velocities or accelerations, not rotations.
     #[error("the interpolation gives velocities or accelerations; a crowd needs rotations")]
     NotRotations,
-    /// A curve that turns so wildly that no polynomial fits it.
+    /// A curve rotates so fast that no polynomial fits it.
     #[error(
         "track {track} rotates too fast at {seconds} s for a polynomial; add a key there, or use slerp"
     )]
     TooWild {
-        /// The track.
+        /// The track's index in the set.
         track: usize,
-        /// Where the piece starts, in the set's time.
+        /// The start of the curve's part that was not fitted, seconds of the set's time.
         seconds: f64,
     },
-    /// A track cannot be interpolated as asked.
+    /// A track cannot be interpolated as requested.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
-    /// A mask or a set of matrices is not of the skeleton's joints.
+    /// The number of a mask's weights, or of inverse bind matrices, differs from the number of joints.
     #[error("{count} {subject} were given for {joints} joints; give one for each")]
     Joints {
-        /// What was given: weights or matrices.
+        /// `weights` or the matrices.
         subject: &'static str,
-        /// How many.
+        /// Their number.
         count: usize,
-        /// Joints of the skeleton.
+        /// The number of the skeleton's joints.
         joints: usize,
     },
-    /// A weight of a mask outside 0 to 1.
+    /// A weight of a mask is outside 0 to 1.
     #[error("joint {joint} has the weight {weight} in the mask; weights are 0 to 1")]
     MaskWeight {
-        /// The joint.
+        /// The joint's index.
         joint: usize,
         /// Its weight.
         weight: f32,
     },
-    /// An inverse bind matrix with a number that is not finite.
+    /// An inverse bind matrix has a number that is not finite.
     #[error("the inverse bind matrix of joint {joint} has a number that is not finite")]
     BindNotFinite {
-        /// The joint.
+        /// The joint's index.
         joint: usize,
     },
-    /// Skinning matrices of a library without inverse bind matrices.
+    /// Skinning matrices are requested, but the library has no inverse bind matrices.
     #[error("the library has no inverse bind matrices; set_inverse_bind gives it some")]
     NoInverseBind,
-    /// Too many instances, or none.
+    /// The number of instances is 0 or too large.
     #[error("{requested} instances; there can be 1 to {}", MAX_INSTANCES)]
     Instances {
-        /// Instances that were asked for.
+        /// The requested number of instances.
         requested: usize,
     },
-    /// Too many layers, or none.
+    /// The number of layers is 0 or too large.
     #[error("{requested} layers; an instance has 1 to {}", MAX_LAYERS)]
     Layers {
-        /// Layers that were asked for.
+        /// The requested number of layers.
         requested: usize,
     },
-    /// Something that is not there.
+    /// An index is out of range.
     #[error("there is no {subject} {index}; there are {count}")]
     Missing {
-        /// An instance, a layer, a clip or a mask.
+        /// `instance`, `layer`, `clip` or `mask`.
         subject: &'static str,
-        /// The number that was asked for, from 0.
+        /// The index.
         index: usize,
-        /// How many there are.
+        /// The number of instances, layers, clips or masks.
         count: usize,
     },
-    /// An instance that a list has twice.
+    /// An instance is in a list twice.
     #[error(
         "instance {instance} is in the list again, at {position}; a list of visible instances names each once"
     )]
     Repeated {
-        /// The instance.
+        /// The instance's index.
         instance: usize,
-        /// Where it comes again, from 0.
+        /// The list index of its second entry.
         position: usize,
     },
-    /// A weight outside 0 to 1.
+    /// A weight is outside 0 to 1.
     #[error("the weight is {weight}; weights are 0 to 1")]
     Weight {
-        /// What was given.
+        /// The weight.
         weight: f32,
     },
-    /// A weight, or a fade, of the layer that has none.
+    /// A weight or a fade was set for the first layer, which has no weight.
     #[error("the first layer has no weight; the layers above it, from 1 on, have one each")]
     FirstLayer,
-    /// A speed that is no number, or too fast.
+    /// A speed is NaN or too large.
     #[error(
         "the speed is {speed}; speeds lie between -{} and {}",
         FASTEST,
         FASTEST
     )]
     Speed {
-        /// What was given.
+        /// The speed.
         speed: f32,
     },
-    /// A wrap mode that crowds do not have.
+    /// Crowds do not have this wrap mode.
     #[error("instances of a crowd hold, loop or mirror their clips, not {wrap:?}")]
     Wrap {
-        /// What was given.
+        /// The wrap mode.
         wrap: WrapMode,
     },
-    /// One of many changes is refused.
+    /// One of several changes is refused.
     #[error("change {change}: {reason}")]
     Change {
-        /// Its place among them.
+        /// The change's index.
         change: usize,
-        /// Why.
+        /// The reason.
         reason: Box<CrowdError>,
     },
-    /// A time that is no number, or out of reach.
+    /// A time is negative, NaN, or too large.
     #[error("{seconds} s; times and steps of a crowd are finite, and within 2^52 ticks")]
     Seconds {
-        /// What was given.
+        /// The time, seconds.
         seconds: f64,
     },
-    /// The output given is not as large as the result.
+    /// The output is not exactly as long as the result.
     #[error("the output has {length} values; the result has {needed}")]
     OutputLength {
-        /// Values that it has room for.
+        /// The number of the output's values.
         length: usize,
-        /// Values of the result.
+        /// The number of the result's values.
         needed: usize,
     },
-    /// The output is of another precision than the submitted result.
+    /// The output's precision differs from the submitted result's.
     #[error(
         "the submitted result has numbers of {} bits; take it with {}",
         if *is_half { "16" } else { "32" },
@@ -199,46 +199,45 @@ pub enum CrowdError {
         /// Whether the result is in 16 bits.
         is_half: bool,
     },
-    /// Tables of a library, as those of a file, that do not fit together.
+    /// The tables of a library, for example from a file, do not fit together.
     #[error(
         "the tables of the motion library do not fit together: the file is broken or of another version; save the library again"
     )]
     BrokenTables,
-    /// Nothing was submitted that could be waited for.
+    /// There is no submission to wait for.
     #[error("nothing is in flight; call submit first")]
     NothingSubmitted,
-    /// The result of the submission before was not taken.
+    /// The result of the previous submission was not taken.
     #[error("the result of the submission before was not taken; call wait_into first")]
     StillSubmitted,
-    /// A buffer on a Vulkan device is given to an engine that is the CPU, or to another engine's crowd.
+    /// The engine does not use the Vulkan device of the buffer, or the target belongs to another crowd.
     #[error(
         "the crowd was not made by an engine on the buffer's Vulkan device; make it with Engine::from_vulkan"
     )]
     OtherDevice,
-    /// The range of a buffer that was given for a result does not fit it.
+    /// The range of a buffer does not fit the result.
     #[error(
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {}",
         OFFSET_STEP
     )]
     Buffer {
-        /// Where the range starts, bytes.
+        /// The start of the range, bytes.
         offset: u64,
-        /// Its length, bytes.
+        /// The length of the range, bytes.
         size: u64,
-        /// Bytes of the result.
+        /// The length of the result, bytes.
         needed: u64,
     },
-    /// The Vulkan device could not be used, or stopped working; after it was lost, the crowd must be
-    /// made again.
+    /// The Vulkan device cannot be used, or failed. After a lost device, make the crowd again.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
-    /// Not enough memory.
+    /// There is not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
     /// The system refused worker threads.
     #[error(transparent)]
     Threads(#[from] OutOfThreadsError),
-    /// Somebody asked the work to end.
+    /// The work was stopped ([`Stop`](crate::Stop)).
     #[error(transparent)]
     Stopped(#[from] StoppedError),
 }

@@ -1,13 +1,13 @@
-//! Where to evaluate, and how: a device is a value, never a global.
+//! Devices on which engines evaluate.
 
 use crate::gpu;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::{DeviceInfo, DeviceKind, PhysicalDevice};
 
-/// Where an engine evaluates: the CPU, or one Vulkan device.
+/// The device on which an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
 pub enum Device {
-    /// The f32 twins of the shaders, on all cores.
+    /// The CPU: the f32 twins of the shaders, on all cores.
     Cpu,
     /// A Vulkan device.
     Vulkan(VulkanDevice),
@@ -28,20 +28,19 @@ impl VulkanDevice {
 }
 
 impl Device {
-    /// Every Vulkan device that can compute, fastest kind first. The CPU is always
-    /// there and not listed.
+    /// Lists every Vulkan device that can compute, fastest kind first. The CPU is always available and not listed.
     ///
-    /// The loader runs the drivers' code in this process: one that crashes as it is loaded
-    /// ends it. (The program `tumble` lets a child process load them first.)
+    /// The Vulkan loader runs the drivers' code in this process: a driver that crashes while it is loaded ends the
+    /// process. (The program `tumble` loads drivers in a child process first.)
     ///
     /// # Errors
-    /// When there is no Vulkan loader, or it fails.
+    /// When there is no Vulkan loader or no driver, or the loader fails.
     pub fn list() -> Result<Vec<Self>, VulkanError> {
         Self::list_with(false)
     }
 
-    /// The first Vulkan device of [`Device::list`], for tests: where there is none it is an error, so that no
-    /// test passes on the CPU alone. Software drivers count; `VK_DRIVER_FILES` names the one to load.
+    /// The first Vulkan device of [`Device::list`], for tests. If there is none, this is an error, so that no test
+    /// passes on the CPU alone. Software drivers are included; `VK_DRIVER_FILES` selects the driver to load.
     ///
     /// ```no_run
     /// use tumble::{Device, Engine};
@@ -58,11 +57,11 @@ impl Device {
             .ok_or(VulkanError::NoDevice)
     }
 
-    /// As [`Device::list`], with the Khronos validation layer watching every call
-    /// to the devices ([`Engine::validation_messages`](crate::engine::Engine::validation_messages)).
+    /// As [`Device::list`], with the Khronos validation layer, which checks every call to the devices
+    /// ([`Engine::validation_messages`](crate::engine::Engine::validation_messages)).
     ///
     /// # Errors
-    /// Also when the layer is not installed.
+    /// As [`Device::list`]; also when the layer is not installed.
     pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
         let vulkan = |physical| {
             let physical = Box::new(physical);
@@ -72,7 +71,7 @@ impl Device {
         Ok(devices.into_iter().map(vulkan).collect())
     }
 
-    /// What is known of a Vulkan device; `None` for the CPU.
+    /// Name, kind and limits of a Vulkan device; `None` for the CPU.
     fn info(&self) -> Option<&DeviceInfo> {
         match self {
             Self::Cpu => None,
@@ -80,20 +79,20 @@ impl Device {
         }
     }
 
-    /// Whether it is a Vulkan driver that computes on the CPU (Mesa's lavapipe).
+    /// Whether this is a Vulkan driver that computes on the CPU (such as Mesa's lavapipe).
     #[must_use]
     pub fn is_software(&self) -> bool {
         (self.info()).is_some_and(|info| info.kind == DeviceKind::Cpu)
     }
 
-    /// Vulkan's `deviceUUID`, as 32 hexadecimal digits with dashes: the same in every process on the
-    /// machine, and for NVIDIA's cards the one that NVML tells. Nothing for the CPU.
+    /// The device's UUID (Vulkan's `deviceUUID`), 32 hexadecimal digits with dashes. It is the same in every process
+    /// on the machine, and for NVIDIA's cards the same as NVML's. `None` for the CPU.
     #[must_use]
     pub fn uuid(&self) -> Option<String> {
         self.info().map(|info| info.uuid.clone())
     }
 
-    /// Its name: the driver's, or `CPU`.
+    /// The device's name: the driver's name for it, or `CPU`.
     #[must_use]
     pub fn name(&self) -> &str {
         self.info().map_or("CPU", |info| &info.name)

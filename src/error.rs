@@ -1,4 +1,4 @@
-//! Why an evaluation failed.
+//! Errors of evaluations.
 
 use std::ops::Range;
 
@@ -21,127 +21,127 @@ use crate::tracks::error::TrackError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The samples asked for do not fit the set.
+    /// The sample times do not fit the set.
     #[error(transparent)]
     SampleTimes(#[from] SampleTimesError),
-    /// A track cannot be interpolated as asked.
+    /// A track cannot be interpolated as requested.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
-    /// A path cannot be followed as asked.
+    /// A path cannot be followed as requested.
     #[error(transparent)]
     Follow(#[from] FollowError),
-    /// Samples cannot be smoothed as asked.
+    /// Samples cannot be smoothed as requested.
     #[error(transparent)]
     Smoothing(#[from] SmoothingError),
-    /// The Vulkan device could not be used, or stopped working.
+    /// The Vulkan device cannot be used, or failed.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
-    /// A crowd cannot be made, changed or evaluated as asked.
+    /// A crowd cannot be made, changed or evaluated as requested.
     #[error(transparent)]
     Crowd(#[from] CrowdError),
-    /// The output given is not as large as the result.
+    /// The output is not exactly as long as the result.
     #[error("the output has room for {length} rotations; the result has {needed}")]
     OutputLength {
-        /// Rotations that it has room for.
+        /// The number of the output's values.
         length: usize,
-        /// Rotations of the result.
+        /// The number of the result's values.
         needed: usize,
     },
-    /// Rotations that are to be compared with a result are not as many as it has.
+    /// The number of rotations to compare differs from the number of the result's.
     #[error("{length} rotations are to be compared; the result has {needed}")]
     ComparedLength {
-        /// Rotations to compare.
+        /// The number of rotations to compare.
         length: usize,
-        /// Rotations of the result: one for each sample of each track.
+        /// The number of the result's rotations: one for each sample of each track.
         needed: usize,
     },
-    /// The memory given for an encoded result is not as large as it.
+    /// The output of an encoded result is not exactly as long as the result.
     #[error("the output has {length} bytes; the result has {needed}")]
     OutputBytes {
-        /// Bytes that it has room for.
+        /// The length of the output, bytes.
         length: usize,
-        /// Bytes of the result.
+        /// The length of the result, bytes.
         needed: usize,
     },
-    /// A result has no such part.
+    /// The requested tracks or samples are out of range.
     #[error(
         "there are no tracks {:?} with samples {:?} in a result of {} tracks with {} samples",
         part.0, part.1, whole.0, whole.1
     )]
     NoSuchPart {
-        /// The tracks and the samples asked for.
+        /// The requested tracks and samples.
         part: (Range<usize>, Range<usize>),
-        /// How many tracks and samples there are.
+        /// The numbers of tracks and of samples.
         whole: (usize, usize),
     },
-    /// Not enough memory.
+    /// There is not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
-    /// There is no such track.
+    /// There is no such track, or a track cannot be added.
     #[error(transparent)]
     Track(#[from] TrackError),
     /// A skeleton cannot be made.
     #[error(transparent)]
     Skeleton(#[from] SkeletonError),
-    /// Poses cannot be put together as asked.
+    /// Poses cannot be combined as requested.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// Velocities and accelerations are no rotations, and cannot be stored as such.
+    /// The encoding is for rotations, and the quantity is a velocity or an acceleration.
     #[error(
         "{} stores rotations, not velocities or accelerations; use f32 or vector", encoding.name()
     )]
     EncodesRotations {
-        /// What was asked for.
+        /// The requested encoding.
         encoding: Encoding,
     },
-    /// A request has an encoding, and what is asked of it gives values of four f32.
+    /// The request has an encoding other than f32, but the function returns values of four f32.
     #[error(
         "values of four f32 are asked for, and the request's encoding is {encoding}; leave the encoding out, or use `evaluate_bytes` or `evaluate_into`"
     )]
     ResultOfF32 {
-        /// What was asked for.
+        /// The request's encoding.
         encoding: Encoding,
     },
-    /// Rotations are asked for, and the quantity is a velocity or an acceleration.
+    /// Rotations are requested, but the quantity is a velocity or an acceleration.
     #[error(
         "the quantity is a velocity or an acceleration; `rates` evaluates it, and `evaluate_into` to `Vec4` or `[f32; 4]`"
     )]
     NotRotations,
-    /// Rates of change are asked for, and the quantity is the rotation.
+    /// Velocities or accelerations are requested, but the quantity is the rotation.
     #[error("the quantity is the rotation; ask for its velocity or its acceleration")]
     NotRates,
-    /// A buffer on a Vulkan device is given to an engine that is the CPU.
+    /// A buffer on a Vulkan device is passed to an engine that is the CPU.
     #[error(
         "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with Engine::from_vulkan"
     )]
     BufferOnCpu,
-    /// Results of the CPU lie in no device's memory.
+    /// An exported result is requested from an engine that is the CPU, whose results are in no device's memory.
     #[error(
         "this engine evaluates on the CPU, whose results lie in the host's memory; open a Vulkan device to have them in a device's"
     )]
     ExportOnCpu,
-    /// A buffer is given to an engine that opened its device itself.
+    /// A buffer is passed to an engine that opened its device itself.
     #[error(
         "the engine opened its device itself, so no buffer of an application's can be on it; make the engine of the buffer's device with Engine::from_vulkan"
     )]
     BufferOfOther,
-    /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
+    /// The environment variable `TUMBLE_VECTOR_WIDTH` is not the name of a vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownNameError),
-    /// That many worker threads cannot be asked for.
+    /// The number of worker threads is out of range.
     #[error(
         "{requested} worker threads were asked for; give 1 to {max}, or none for the shared ones"
     )]
     ThreadCount {
-        /// Threads that were asked for.
+        /// The requested number of threads.
         requested: usize,
-        /// The most that can be asked for.
+        /// The maximum number of threads.
         max: usize,
     },
     /// The system refused worker threads.
     #[error(transparent)]
     Threads(#[from] OutOfThreadsError),
-    /// Somebody asked the work to end.
+    /// The work was stopped ([`Stop`](crate::Stop)).
     #[error(transparent)]
     Stopped(#[from] StoppedError),
 }

@@ -1,7 +1,6 @@
-//! Bulk interpolation of rotations, with the same bits on every Vulkan driver and
-//! the CPU.
+//! Bulk interpolation of rotation keyframes, with the same bits on every Vulkan driver and on the CPU.
 //!
-//! Keyframe tracks go in, the rotation of every track at every frame comes out:
+//! From keyframe tracks, an engine evaluates the rotation of every track at every frame:
 //!
 //! ```
 //! use tumble::{Device, Engine, SampleTimes, TrackSet, method};
@@ -26,53 +25,51 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # The path of the data
+//! # Types
 //!
-//! A [`TrackSet`] holds what was loaded. [`SampleTimes`] says which samples to evaluate,
-//! at an exact [`FrameRate`] or at any times. A [`Method`] says how the rotation
-//! between keys follows from the keys. An [`Engine`] is one device; it prepares a
-//! set into a [`Clip`] and evaluates it into [`Rotations`]. [`mod@reference`] is
-//! the textbook in f64, which shares nothing with the engine; [`verify`] compares the
-//! three.
+//! A [`TrackSet`] has the keys of all tracks. [`SampleTimes`] are the times of the samples: at an exact
+//! [`FrameRate`], or any times. A [`Method`] defines the curve through the keys. An [`Engine`] uses one device; it
+//! prepares a set as a [`Clip`] and evaluates it to [`Rotations`]. [`mod@reference`] has the textbook formulas in
+//! f64, without code of the engine; [`verify`] compares the device, the CPU and the reference.
 //!
-//! # Where to go on
+//! # Topics
 //!
-//! * **Results larger than memory**: [`Request::stream`] gives a chunk at a time
-//!   while the next one is evaluated; [`Clip::request`] and [`Engine::request`] ask for some samples of some
-//!   tracks, encoded, into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
+//! * **Results larger than memory**: [`Request::stream`] returns one chunk while the next one is evaluated.
+//!   [`Clip::request`] and [`Engine::request`] evaluate some samples of some tracks, in an encoding, into the
+//!   caller's memory. [`OutputBuffer`] is memory that is fast to fill.
 //! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
-//!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
-//!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.
-//!   [`Engine::blend`], [`Engine::mix`] and [`Engine::add`] put layers of poses together.
-//! * **Crowds**: in [`crowd`], a [`CrowdLibrary`](crowd::CrowdLibrary) holds the clips of a skeleton, and a
-//!   [`Crowd`](crowd::Crowd) plays them: many instances, each at its own time, with layers, into matrices for skinning. Without a skeleton, many
-//!   characters at their own times in one [`Clip`] are one call with [`SampleTimes::at`], a sample for each,
-//!   in [`Layout::FrameMajor`]; give the times in increasing order.
-//! * **Your own Vulkan device** ([`vulkan`]): [`Engine::from_vulkan`] takes a renderer's device and a queue,
-//!   [`Crowd::record`](crowd::Crowd::record) records a crowd's poses into its command buffers, and
-//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer, where [`Engine::pass`]
-//!   blends them and walks skeletons. `examples/application_device.rs`
-//!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
-//! * **Bodies that travel**: [`Engine::follow`] moves them along [`paths`], [`Engine::smooth`] takes the
+//!   [`Engine::local_to_model`] multiplies them along a [`Skeleton`] to model matrices, for skinning also by inverse
+//!   bind matrices. [`Engine::world`] does this for rotations at fixed offsets. [`Engine::blend`], [`Engine::mix`]
+//!   and [`Engine::add`] combine layers of poses.
+//! * **Crowds**: in [`crowd`], a [`CrowdLibrary`](crowd::CrowdLibrary) has the clips of a skeleton, and a
+//!   [`Crowd`](crowd::Crowd) plays them: many instances, each at its time, with layers, evaluated to matrices for
+//!   skinning. Without a skeleton, many characters at different times in one [`Clip`] are one call with
+//!   [`SampleTimes::at`], a sample for each, in [`Layout::FrameMajor`]; list the times in increasing order.
+//! * **An application's Vulkan device** ([`vulkan`]): [`Engine::from_vulkan`] takes a renderer's device and a queue.
+//!   [`Crowd::record`](crowd::Crowd::record) records a crowd's poses into its command buffers. [`Request::target`]
+//!   and [`Request::to_buffer`] write a clip's results to the renderer's buffer, where [`Engine::pass`] blends them
+//!   and evaluates skeletons. `examples/application_device.rs` is a complete program, with two queue families,
+//!   persistent buffers, and the warm-up.
+//! * **Bodies on paths and smoothing**: [`Engine::follow`] moves bodies along [`paths`]; [`Engine::smooth`] removes
 //!   noise from samples.
 //! * **Names of options**: every option has `ALL`, `name`, [`Display`](std::fmt::Display) and
-//!   [`FromStr`](std::str::FromStr), as the program and the bindings use them: `"mirror".parse::<WrapMode>()`.
-//! * **Smaller results**: an [`Encoding`] stores rotations in 16 bits, as matrices or as angles, made on
-//!   the device. [`Engine::rates`] gives angular velocities and accelerations.
-//! * **How right is it here**: [`verify::verify`] compares a device with the CPU, bit for bit, and both
-//!   with [`mod@reference`].
+//!   [`FromStr`](std::str::FromStr), with the names that the program and the bindings use:
+//!   `"mirror".parse::<WrapMode>()`.
+//! * **Other encodings and quantities**: an [`Encoding`] stores rotations in 16 bits, as matrices or as angles; the
+//!   device converts them. [`Engine::rates`] evaluates angular velocities and accelerations.
+//! * **Correctness on your machine**: [`verify::verify`] compares a device with the CPU, bit for bit, and both with
+//!   [`mod@reference`].
 //!
-//! [`glam`] and [`ash`] are re-exported in the versions that the interface uses; functions that take
-//! [`glam::Quat`] take `[f32; 4]`, `x y z w`, too.
+//! [`glam`] and [`ash`] are re-exported in the versions that this crate uses. Functions that take [`glam::Quat`] also
+//! take `[f32; 4]`, `x y z w`.
 //!
-//! # What is promised
+//! # Guarantees
 //!
-//! * **Identical bits** from the CPU, at any vector width and number of threads, and
-//!   from every Vulkan device that passes the self-test, at any memory budget.
-//! * **Accuracy that does not decay**: at hour 24 as in the first second; slerp
-//!   within 6e-7 rad of the f64 reference, cubic methods within 1e-6 rad.
-//! * **Keys are met exactly**: a sample on a key returns the key's own bits (for
-//!   methods that pass through their keys).
+//! * **Identical bits** from the CPU, at any vector width and number of threads, and from every Vulkan device that
+//!   passes the self-test, at any memory budget.
+//! * **Accuracy that does not depend on time**: at hour 24 as in the first second. Slerp is within 6e-7 rad of the
+//!   f64 reference, cubic methods within 1e-6 rad.
+//! * **Exact keys**: a sample at a key's time has the key's bits (for methods that pass through their keys).
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -159,17 +156,17 @@ pub use crate::tracks::set::vectors::{Channel, VectorKeys};
 pub use crate::tracks::set::{Track, TrackSet, UNIT_TOLERANCE};
 
 pub mod paths {
-    //! Bodies that follow paths: where they are, how they are turned, and when.
+    //! Bodies that follow paths: their positions and rotations.
     //!
     //! A path is a track of translations ([`TrackSet::push_path`](crate::TrackSet::push_path)).
-    //! [`Engine::follow`](crate::Engine::follow) moves a body along each, as [`Follow`] says, and gives
-    //! [`Followed`]: positions and rotations.
+    //! [`Engine::follow`](crate::Engine::follow) moves a body along each path by the options [`Follow`], and returns
+    //! positions and rotations ([`Followed`]).
     //!
-    //! * The curve through the points is that of a [`VectorMethod`](crate::VectorMethod).
-    //! * [`PathSpeed`] says when a body is where: by the keys' times, at one speed, or eased in and out.
-    //! * [`Direction`] says where it faces: along the path, ahead on it, to a point, or to another body.
-    //! * [`PathFrame`] says how it is turned about that direction, and [`Twist`] what a closed path does with the
-    //!   roll that is left over after one round.
+    //! * A [`VectorMethod`](crate::VectorMethod) defines the curve through the points.
+    //! * [`PathSpeed`] defines the speed on the path: by the key times, constant, or eased in and out.
+    //! * [`Direction`] is where the body faces: along the path, ahead on it, to a point, or to another body.
+    //! * [`PathFrame`] defines the rotation about that direction, and [`Twist`] what is done with the roll that
+    //!   remains after one round of a closed path.
     //! * [`BodyAxis`] names the axes of the body that face forward and up.
     //!
     //! Formulas and their sources are in `docs/paths.md`.
@@ -182,24 +179,24 @@ pub mod paths {
 }
 
 pub mod vulkan {
-    //! Vulkan devices: which there are, how they did in the checks, and how an application shares its own.
+    //! Vulkan devices: their properties, their checks, and use of an application's device.
     //!
-    //! [`Device::list`](crate::Device::list) lists the devices of the machine, each a [`VulkanDevice`] with its
-    //! [`DeviceInfo`]. An engine on one is opened as any other.
+    //! [`Device::list`](crate::Device::list) lists the devices of the machine as [`VulkanDevice`]s with their
+    //! [`DeviceInfo`]. [`Engine::new`](crate::Engine::new) opens one.
     //!
-    //! * **Is it exact?** A device is checked when it is opened ([`SelfTestReport`]), each of its kernels before it
-    //!   is used ([`KernelCheck`]), and the check itself by a [`NegativeControl`]. [`VulkanError`] says what a device
-    //!   refused.
-    //! * **Where did the time go?** [`Engine::take_timings`](crate::Engine::take_timings) gives [`Timings`].
-    //! * **An application's own device** (feature `vulkan`):
-    //!   [`Engine::from_vulkan`](crate::Engine::from_vulkan) takes its `VulkanHandles` and a `VulkanQueue`, whose lock
-    //!   is a `QueueLock`. Results go into a `VulkanBuffer`: at once by `Request::to_buffer`, or recorded into the
-    //!   application's commands by a `ClipTarget` or a `CrowdTarget`. A `PosePass` blends, mixes or adds what lies in
-    //!   such buffers, or walks a skeleton: a `PassTarget` records it.
-    //! * **Memory for others on the same card**, such as CUDA: an `ExportedResult`.
+    //! * **Exactness**: a device is checked when it is opened ([`SelfTestReport`]), and each kernel before its first
+    //!   use ([`KernelCheck`]). A [`NegativeControl`] checks that the comparison finds differences. [`VulkanError`]
+    //!   says why a device was refused.
+    //! * **Timing**: [`Engine::take_timings`](crate::Engine::take_timings) returns [`Timings`].
+    //! * **An application's device** (feature `vulkan`): [`Engine::from_vulkan`](crate::Engine::from_vulkan) takes
+    //!   `VulkanHandles` and a `VulkanQueue`; a `QueueLock` is a lock for a queue. Results are written to a
+    //!   `VulkanBuffer`: at once by `Request::to_buffer`, or recorded into the application's commands by a
+    //!   `ClipTarget` or a `CrowdTarget`. A `PosePass` blends, mixes or adds poses in such buffers, or evaluates a
+    //!   skeleton; a `PassTarget` records it.
+    //! * **Memory for other interfaces on the same card**, such as CUDA: an `ExportedResult`.
     //!
-    //! Without the feature `vulkan` no device is listed (`VulkanError::NotBuilt`); the types of an application's own
-    //! device are left out.
+    //! Without the feature `vulkan`, no device is listed (`VulkanError::NotBuilt`), and the types for an
+    //! application's device do not exist.
 
     pub use crate::device::VulkanDevice;
     #[cfg(feature = "vulkan")]
@@ -228,7 +225,7 @@ pub mod vulkan {
     pub use crate::shader::kernels;
 
     pub mod tuning {
-        //! How an engine uses its device, for measurements and tests: every choice gives the same bits, and
+        //! How an engine uses its device, for measurements and tests. Every choice gives the same bits, and
         //! `Automatic`, the default of each, is right for programs.
 
         pub use crate::gpu::options::{Mapping, ReadBack, Reads, Transfer, Uploads};

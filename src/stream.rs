@@ -1,5 +1,4 @@
-//! Results larger than memory: a chunk at a time, evaluated while the one before it
-//! is used.
+//! Results larger than memory: one chunk is used while the next one is evaluated.
 
 use std::ops::Range;
 use std::sync::mpsc::sync_channel;
@@ -13,20 +12,18 @@ use crate::output::buffer::OutputBuffer;
 use crate::output::window::Window;
 use crate::threads::{self, OutOfThreadsError};
 
-/// A contiguous part of a result. Chunks come in the order of the whole result in memory, without
-/// gaps.
+/// A contiguous part of a result. Chunks are in the order of the whole result in memory, without gaps.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Chunk<'a> {
-    /// Where it starts in the whole result, in rotations.
+    /// The index of the chunk's first value in the whole result.
     pub start: usize,
-    /// Its tracks.
+    /// The tracks of the chunk.
     pub tracks: Range<usize>,
-    /// Its samples.
+    /// The samples of the chunk.
     pub samples: Range<usize>,
-    /// The values of these tracks and samples, `[track][sample]` or `[sample][track]` as the layout
-    /// says: `x y z w` of rotations, `x y z 0` of velocities and accelerations. They are aligned to
-    /// 16 bytes.
+    /// The values of these tracks and samples, `[track][sample]` or `[sample][track]` depending on the layout: `x y z
+    /// w` of rotations, `x y z 0` of velocities and accelerations. They are aligned to 16 bytes.
     pub rows: &'a [[f32; 4]],
     quantity: Quantity,
 }
@@ -57,10 +54,10 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// Buffers that are used in turn: one is filled, one is read, one waits.
+/// The number of buffers: one is filled, one is read, one waits.
 const BUFFERS: usize = 3;
 
-/// Fills windows on a thread of their own; hands them to `sink` on this one.
+/// Fills windows on a separate thread, and calls `sink` with them on this one.
 pub(crate) fn run<E: From<Error>>(
     mut windows: impl Iterator<Item = Window> + Send,
     quantity: Quantity,

@@ -1,5 +1,5 @@
-//! Twin of `shaders/runs.wgsl`: the samples of one run, in vector lanes, and where they are stored: in a slice by
-//! ordinary stores, or in whole cache lines by streaming stores.
+//! Twin of `shaders/runs.wgsl`: evaluates the samples of one run in vector lanes, and writes them to a slice by
+//! ordinary stores, or to whole cache lines by streaming (non-temporal) stores.
 
 use std::marker::PhantomData;
 use std::slice;
@@ -10,12 +10,12 @@ use crate::simd::lanes::{Lanes, MAX_LANES, Number as _};
 use crate::time::runs::Affine;
 use crate::twin::{Evaluate, Parameters};
 
-/// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
+/// The maximum number of samples that are evaluated one by one, because most lanes of a vector would be unused.
 pub(crate) const SAMPLES_ONE_BY_ONE: usize = 3;
 
-/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be
-/// overwritten, up to the end of a vector. All distances must be integers that f32 holds exactly,
-/// also those that fill up the last vector.
+/// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be overwritten, up to
+/// the end of a vector. All distances must be integers that are exact in f32, including those that fill up the last
+/// vector.
 #[inline(always)]
 pub(crate) fn frames<L: Lanes, S: Evaluate>(
     segment: &S,
@@ -83,8 +83,8 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     }
 }
 
-/// Evaluates the first `count` of the samples whose `distances` from the segment's middle are
-/// given. The list must go on after `count` up to the end of a vector.
+/// Evaluates the first `count` samples, from their `distances` from the segment's middle. The list must continue
+/// after `count` up to the end of a vector.
 #[inline(always)]
 pub(crate) fn distances<L: Lanes, S: Evaluate>(
     segment: &S,
@@ -130,7 +130,7 @@ impl<L: Lanes, D: Distances<L>> Parameters<L> for OfDistances<L, D> {
 
 struct FrameDistances<L> {
     next: L,
-    /// The distances of the iteration after the next, computed an iteration ahead so that none waits for the
+    /// The distances of the iteration after the next, computed one iteration ahead so that no iteration waits for the
     /// addition.
     after: L,
     step: L,
@@ -229,11 +229,11 @@ fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const PREFETCH: b
     output.store_samples(count, vector_loop);
 }
 
-/// The most samples that one iteration of the evaluation loop makes.
+/// The maximum number of samples of one iteration of the evaluation loop.
 const MAX_SAMPLES: usize = MAX_LANES;
 
-/// Evaluates a run, [`Evaluate::samples`] samples in each iteration. With `FILTER`
-/// components below 2^-64 become 0; with `PREFETCH` samples are begun several iterations ahead.
+/// Evaluates a run, [`Evaluate::samples`] samples in each iteration. With `FILTER`, components below 2^-64 in
+/// magnitude become 0; with `PREFETCH`, the computation of samples starts several iterations ahead.
 pub(crate) struct VectorLoop<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const PREFETCH: bool>
 {
     pub(crate) segment: &'a S,
@@ -242,7 +242,7 @@ pub(crate) struct VectorLoop<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, c
     pub(crate) parameters: P,
 }
 
-/// The vectors of a run, whatever their parameters.
+/// The vectors of a run, for any kind of parameters.
 pub(crate) trait NextVectors<L: Lanes, S: Evaluate> {
     fn next(&mut self) -> S::Vectors<L>;
 }
@@ -304,11 +304,10 @@ fn store<L: Lanes>(vectors: &impl AsRef<[L]>, rotations: &mut [[f32; 4]]) {
     }
 }
 
-/// Streaming stores: the whole cache lines of the result, and the staging lines before and after
-/// them. The first sample of the first iteration lies at the start of a line.
+/// Streaming stores: the whole cache lines of the result, and the staging lines before and after them. The first
+/// sample of the first iteration is at the start of a line.
 pub(crate) struct StreamingLines<'a> {
-    /// The first line as it is staged, and how many of its rotations are there already; these
-    /// stay.
+    /// The first staging line, and the number of its rotations that are already computed and must not change.
     pub(crate) begun: (CacheLine, usize),
     pub(crate) whole: &'a mut [CacheLine],
     /// The staging line for the samples after the whole lines.
@@ -363,7 +362,7 @@ impl Sink for StreamingLines<'_> {
     }
 }
 
-/// Stores the `i`th vector: into a whole line, or into the rest after the whole lines.
+/// Stores the `i`th vector: to a whole line, or to the rest after the whole lines.
 #[inline(always)]
 fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Block]) {
     if let Some(block) = whole.get_mut(i) {

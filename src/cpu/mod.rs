@@ -1,21 +1,22 @@
 //! The CPU: the shaders' arithmetic in vector lanes, on all threads, with the bits of every Vulkan device.
 //!
-//! Evaluating a sample costs a few nanoseconds, less than fetching its segment from memory or writing it there. So
-//! a thread prepares about a thousand keys, evaluates them while their segments are in its cache, and forgets them;
-//! long results are written past the caches; and a run's samples, which share a segment, fill the lanes of a vector.
+//! Evaluating a sample takes a few nanoseconds, less than loading its segment from memory or storing the sample
+//! there. Therefore a thread prepares about a thousand keys, evaluates them while their segments are in its cache,
+//! and drops them; long results bypass the caches; and the samples of a run, which share a segment, fill the lanes of
+//! a vector.
 //!
 //! # Types
 //!
 //! * [`CpuEngine`](engine::CpuEngine): a vector width, threads, and the scratch buffers that are kept between calls
-//!   ([`ScratchPool`](scratch::ScratchPool)). Its ways to evaluate are its child modules.
+//!   ([`ScratchPool`](scratch::ScratchPool)). Its routes are its child modules.
 //! * [`Row`](row::Row): the samples of one part of a track.
-//! * [`VectorLoop`](evaluate::VectorLoop): a run of samples, a vector at a time, and [`Sink`](evaluate::Sink), where
-//!   they are stored.
-//! * [`Stage`](streaming::Stage): where rows are written: into the result, or through staging lines.
+//! * [`VectorLoop`](evaluate::VectorLoop): a run of samples, a vector at a time, and [`Sink`](evaluate::Sink), the
+//!   destination of their stores.
+//! * [`Stage`](streaming::Stage): the destination of rows: the result directly, or staging lines.
 //!
-//! # From a call to its bytes
+//! # Steps
 //!
-//! `evaluate` chooses one of four:
+//! `evaluate` chooses one of four functions:
 //!
 //! | in [`engine`] | for | what is prepared |
 //! |---|---|---|
@@ -24,12 +25,12 @@
 //! | `sparse_samples` | far fewer samples than keys | the intervals with a sample |
 //! | `from_keys` | fewer samples than keys, arcs and cubics of small angles | nothing; intervals whose angles turn out too large are prepared alone |
 //!
-//! All but the last end in `CpuEngine::part`, which evaluates a [`Row`](row::Row): the intervals of a part come in
-//! blocks with the samples that each has, and every run is evaluated where it is met ([`evaluate`]). Samples at
-//! listed times, or in copies of a track, are listed as runs first. The loops are compiled for each vector width;
-//! lanes lie along the samples of a run.
+//! All but the last use `CpuEngine::part`, which evaluates a [`Row`](row::Row): the intervals of a part are processed
+//! in blocks, each with its samples, and every run is evaluated when it is found ([`evaluate`]). Samples at listed
+//! times, or in copies of a track, are first listed as runs. The loops are compiled for each vector width; the lanes
+//! are samples of a run.
 //!
-//! # Where memory lies
+//! # Memory
 //!
 //! ```text
 //! thread's cache                        result
@@ -40,8 +41,8 @@
 //! └──────────┴────────────┘
 //! ```
 //!
-//! A result of 32 MiB or more is written by streaming stores, on processors that gain by them. They need whole cache
-//! lines, so what begins or ends within a line waits in a staging line. Shorter results are written where they belong.
+//! A result of 32 MiB or more is written by streaming stores, on processors where they are faster. They need whole
+//! cache lines, so samples of incomplete lines wait in a staging line. Shorter results are written directly.
 
 pub(crate) mod engine;
 pub(crate) mod evaluate;

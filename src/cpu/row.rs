@@ -1,4 +1,4 @@
-//! The samples of one part of a track: its runs, evaluated as they are found.
+//! The samples of one part of a track: their runs are evaluated as they are found.
 
 use bytemuck::Zeroable as _;
 use glam::Vec4;
@@ -17,7 +17,7 @@ use crate::time::runs::{
 use crate::time::spans::SpanSource;
 use crate::twin::Evaluate;
 
-/// Distances are computed for this many samples at a time.
+/// The number of samples whose distances are computed together.
 const CHUNK: usize = 64;
 
 /// The samples of one part of a track, within one track copy.
@@ -29,7 +29,7 @@ pub(crate) struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Evaluates them into `output`, which starts at the first sample of the track copy.
+    /// Evaluates the samples into `output`, which starts at the first sample of the track copy.
     pub(crate) fn evaluate<S: Evaluate>(
         &self,
         segments: &[S],
@@ -70,9 +70,9 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
 }
 
 impl Row<'_> {
-    /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without
-    /// a list of runs: nearly every sample takes this path. Returns false if a distance from a
-    /// segment's middle is no integer of f32; the caller then evaluates all samples by runs.
+    /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without a list of runs;
+    /// nearly every sample is evaluated so. Returns false if a distance from a segment's middle is not an integer
+    /// that f32 has; then the caller evaluates all samples by runs.
     #[inline(always)]
     fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
         &self,
@@ -142,8 +142,8 @@ impl Row<'_> {
         (prepared.spans).runs(part, self.timeline, self.copy, &mut samples)
     }
 
-    /// Evaluates all samples by way of a list of their runs. It is a function of its own to keep
-    /// the usual path small, and to compile the search for runs once, not for each vector width.
+    /// Evaluates all samples by a list of their runs. This is a separate function to keep the usual path small, and
+    /// to compile the search for runs only once instead of for each vector width.
     #[inline(never)]
     fn runs<S: Evaluate>(
         &self,
@@ -218,7 +218,7 @@ impl<S: Evaluate> InLanesInto<[S], [[f32; 4]]> for RunList<'_, '_> {
     }
 }
 
-/// Takes runs and evaluates them as they come; for few samples, and for those outside the keys.
+/// Evaluates runs as they are found, for few samples, and for samples outside the keys.
 struct OneByOne<'a, 'r, S> {
     row: &'a Row<'r>,
     segments: &'a [S],

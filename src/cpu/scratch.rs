@@ -1,5 +1,5 @@
-//! The scratch pool: the buffers that preparing needs are kept from call to call, because
-//! allocating them takes as long as preparing a hundred keys.
+//! The scratch pool keeps the buffers for preparation from call to call, because allocating them takes as long as
+//! preparing a hundred keys.
 
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, TryLockError};
@@ -20,7 +20,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// Prepares some intervals of tracks together; what was prepared before is forgotten.
+    /// Prepares some intervals of tracks together; the previous contents are dropped.
     pub(crate) fn prepare(
         &mut self,
         set: &TrackSet,
@@ -37,22 +37,21 @@ impl Scratch {
     }
 }
 
-/// How many are kept for each thread. Programs alternate between interpolations; transforms alone
+/// The number of scratches that are kept for each thread. Programs alternate between interpolations; transforms alone
 /// use three.
 const KEPT_EACH: usize = 4;
 
-/// What threads have given back, the latest last. Nobody waits for it: a process may be forked while a thread
-/// that is not in it has it locked.
+/// The scratches that threads have returned, the latest last. No thread waits for the mutex, because a process may be
+/// forked while a thread that does not exist in the fork has it locked.
 #[derive(Default)]
 pub(crate) struct ScratchPool(Mutex<Vec<Scratch>>);
 
-/// How often a thread looks whether the pool is free before it does without: others have it for some
-/// nanoseconds.
+/// How often a thread tries to lock the pool before it continues without it; others have it locked for nanoseconds.
 const LOOKS: usize = 1000;
 
 impl ScratchPool {
-    /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
-    /// only what the samples of this timeline need.
+    /// Takes scratch buffers for an interpolation from the pool, or allocates them. They prepare only the intervals
+    /// that the samples of this timeline need.
     pub(crate) fn take(&self, request: &SetRequest<'_>) -> Scratch {
         let interpolation = request.interpolation;
         let mut memory = self.find(interpolation).unwrap_or_else(|| Scratch {

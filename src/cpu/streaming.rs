@@ -1,6 +1,6 @@
-//! Long results are written by streaming stores, which bypass the caches, on processors that gain
-//! by it. They need whole cache lines: rotations of a line that is not whole yet, or that are not
-//! made in order, wait in staging lines, 32 KiB that stay in the first-level cache.
+//! Streaming (non-temporal) stores of long results, which bypass the caches, on processors where they are faster.
+//! They need whole cache lines: rotations of incomplete lines, or that are not computed in order, wait in staging
+//! lines, 32 KiB that stay in the first-level cache.
 
 use std::ops::Range;
 
@@ -13,42 +13,41 @@ use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
 
-/// Bytes from which on a result is written by streaming stores: caches would keep so little of it
-/// that its reader loses nothing.
+/// The minimum size of a result for streaming stores, bytes: the caches would contain so little of it that its reader
+/// does not benefit.
 const LONG: usize = 32 << 20;
 
-/// Samples of a row from which on streaming stores save more than staging costs.
+/// The minimum number of samples of a row for which streaming stores save more time than staging takes.
 const ROW: usize = 64;
 
 /// Number of staging lines.
 const LINES: usize = 512;
 
-/// Writes consecutive rows: directly to where they belong, or through staging lines by streaming
-/// stores.
+/// Writes consecutive rows: directly to the result, or through staging lines by streaming stores.
 pub(crate) struct Stage<'o> {
     width: VectorWidth,
     destination: Destination<'o>,
-    /// The staging lines; `None` where rows are written directly.
+    /// The staging lines; `None` if rows are written directly.
     lines: Option<Box<[CacheLine; LINES]>>,
-    /// Rotations that are staged, if any are, counted from the start of the first staging line.
+    /// The end of the staged rotations, counted from the start of the first staging line.
     filled: usize,
 }
 
-/// The part of the output that is still to be stored to.
+/// The part of the output that is not stored yet.
 struct Destination<'o> {
-    /// Without staging lines all of it. Else what lies before the first whole line of the output:
-    /// it is staged at the end of the first staging line.
+    /// Without staging lines the whole output. Otherwise the part before its first whole line, which is staged at the
+    /// end of the first staging line.
     before: &'o mut [[f32; 4]],
     lines: &'o mut [CacheLine],
     after: &'o mut [[f32; 4]],
-    /// How many of the staging lines are stored already.
+    /// The number of staging lines that are stored already.
     stored: usize,
 }
 
 impl<'o> Stage<'o> {
-    /// For `output`: rows of `samples` each, a part of a result of `rotations`, written by streaming
-    /// stores as `streams` says. Where it says nothing, the average length of a run is computed last,
-    /// only if everything else calls for them.
+    /// Makes a stage for `output`: rows of `samples` each, a part of a result of `rotations`. `streams` says whether
+    /// streaming stores are used. If it is `None`, the average length of a run is computed, but only if all other
+    /// conditions are met.
     pub(crate) fn new(
         width: VectorWidth,
         streams: Option<bool>,
@@ -87,7 +86,7 @@ impl<'o> Stage<'o> {
         }
     }
 
-    /// Makes the next row by calls of `make`, each for as many samples as can be staged.
+    /// Computes the next row by calls of `make`, each for as many samples as can be staged.
     pub(crate) fn row<E>(
         &mut self,
         count: usize,
@@ -121,7 +120,7 @@ impl<'o> Stage<'o> {
         Ok(())
     }
 
-    /// Stores what is still staged after the last row.
+    /// Stores the rotations that are still staged after the last row.
     pub(crate) fn finish(mut self) {
         self.clear();
         if let Some(lines) = &self.lines {
@@ -130,7 +129,7 @@ impl<'o> Stage<'o> {
         }
     }
 
-    /// Stores all staging lines that are whole; what is left moves to the start of the first.
+    /// Stores all staging lines that are complete; the rest moves to the start of the first.
     fn clear(&mut self) {
         let Some(lines) = &mut self.lines else {
             return;
@@ -178,7 +177,7 @@ impl<'o> Destination<'o> {
         }
     }
 
-    /// Takes the next `count` lines of the output, which the caller stores.
+    /// Returns the next `count` lines of the output, which the caller stores.
     #[inline(always)]
     fn next(&mut self, count: usize) -> &'o mut [CacheLine] {
         let (lines, others) = std::mem::take(&mut self.lines).split_at_mut(count);
@@ -201,9 +200,9 @@ impl<'o> InLanesInto<[CacheLine], Destination<'o>> for WholeLines {
     }
 }
 
-/// Where some samples of a row are made.
+/// The destination of some samples of a row.
 pub(crate) enum RowOutput<'s, 'o> {
-    /// Where they belong in the output.
+    /// Directly in the output.
     Here(&'s mut [[f32; 4]]),
     Staged(Staged<'s, 'o>),
 }
@@ -211,10 +210,10 @@ pub(crate) enum RowOutput<'s, 'o> {
 /// Samples in the staging lines.
 pub(crate) struct Staged<'s, 'o> {
     lines: &'s mut [CacheLine],
-    /// Where these samples start in the lines, and where they end.
+    /// The start and the end of these samples in the lines.
     start: usize,
     end: usize,
-    /// All staged rotations before this one are made.
+    /// The end of the staged rotations that are complete.
     made: usize,
     destination: &'s mut Destination<'o>,
 }
@@ -228,7 +227,7 @@ impl RowOutput<'_, '_> {
     }
 }
 
-/// [`Output`], matched once for a row instead of once for each run.
+/// The functions of [`RowOutput`], matched once for a row instead of once for each run.
 pub(crate) trait Samples {
     fn samples(&mut self) -> &mut [[f32; 4]];
 
@@ -246,7 +245,7 @@ pub(crate) trait Samples {
         frames::<L, S>(segment, affine, first, count, &mut self.samples()[start..]);
     }
 
-    /// Says that these samples are final, so that their lines may be stored.
+    /// Marks samples as final, so that their lines may be stored.
     #[inline(always)]
     fn made(&mut self, _: Range<usize>) {}
 }

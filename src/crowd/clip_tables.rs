@@ -29,7 +29,7 @@ use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
-/// Entries of a table are counted in 32 bits, with some to spare.
+/// The limit of a table's entries, which are counted in 32 bits; some are left free.
 pub(crate) const MAX_ENTRIES: usize = 1 << 31;
 
 /// The tables of all clips.
@@ -38,27 +38,27 @@ pub(crate) struct ClipTables {
     pub(crate) clips: Vec<CrowdClip>,
     pub(crate) bases: Vec<CrowdBase>,
     pub(crate) spans: Vec<CrowdSpan>,
-    /// `[clip][joint]`, a rotation, a translation and a scale each.
+    /// `[clip][joint]`, each with a rotation, a translation and a scale.
     pub(crate) channels: Vec<CrowdChannel>,
     /// Constants of segments, and keys.
     pub(crate) cells: Vec<[f32; 4]>,
-    /// Consecutive joints whose rotations are of one form and one time base, and lie side by side,
+    /// Ranges of consecutive joints whose rotations have one form and one time base and are adjacent in memory,
     /// `runs[clip]`.
     pub(crate) runs: Vec<Vec<Range<u32>>>,
 }
 
-/// One channel before it is laid out in the tables: its spans, and its constants in each.
+/// One channel before it is stored in the tables: its spans, and the constants of each.
 #[derive(Default)]
 struct ChannelCurve {
     form: u32,
     spans: Vec<CrowdSpan>,
-    /// The constants of each span, as many as its form has.
+    /// The constants of each span; their number depends on the form.
     constants: Vec<[f32; 4]>,
-    /// The key at the start of each span; used where the span says that there is one.
+    /// The key at the start of each span; used if the span says that there is one.
     keys: Vec<[f32; 4]>,
 }
 
-/// How many constants a form has in each span.
+/// The number of constants of a form in each span.
 pub(crate) fn constants_of(form: u32) -> usize {
     match form {
         FORM_CONSTANT => 1,
@@ -77,7 +77,7 @@ impl ChannelCurve {
         }
     }
 
-    /// Adds a span in which the value stays. A curve whose other constants are 0 gives it, bit for bit.
+    /// Adds a span in which the value is constant: the first constant is the value, the others are 0.
     fn push_constant(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
         let span = CrowdSpan {
             start,
@@ -89,7 +89,7 @@ impl ChannelCurve {
         self.push(span, &constants, key);
     }
 
-    /// Adds a span with as many of the constants as the form has.
+    /// Adds a span with the first of the constants, as many as the form has.
     fn push(&mut self, mut span: CrowdSpan, constants: &[[f32; 4]; POWERS], key: Option<[f32; 4]>) {
         if key.is_some() {
             span.start |= ON_KEY;
@@ -101,8 +101,8 @@ impl ChannelCurve {
     }
 }
 
-/// The curve of one track, as evaluation at frames has it: a frame is a tick, of which there are `period`
-/// from the clip's start on.
+/// The curve of one track as for evaluation at frames: a frame is a tick, and the clip has `period` of them from its
+/// start.
 fn curve(
     data: &ClipData,
     track: usize,
@@ -182,7 +182,7 @@ fn curve(
 }
 
 impl ClipTables {
-    /// Adds a clip. `offsets` are where joints without translations hang.
+    /// Adds a clip. `offsets` are the translations of joints without translation keys.
     pub(crate) fn push(
         &mut self,
         set: &TrackSet,
@@ -242,7 +242,7 @@ impl ClipTables {
         Ok(())
     }
 
-    /// Lays the curves of a clip out in the tables.
+    /// Stores the curves of a clip in the tables.
     fn add(&mut self, period: u32, curves: &[ChannelCurve]) {
         let first_base = self.bases.len();
         if self.cells.is_empty() {
@@ -318,14 +318,14 @@ impl ClipTables {
         self.spans.extend_from_slice(spans);
     }
 
-    /// Whether no rotation is anything but an arc or a constant.
+    /// Whether all rotations are arcs or constants.
     pub(crate) fn has_only_arcs(&self) -> bool {
         let rotations = self.channels.iter().step_by(CHANNELS as usize);
         let mut forms = rotations.map(|channel| channel.form_and_base >> 24);
         forms.all(|form| form == FORM_ARC || form == FORM_CONSTANT)
     }
 
-    /// Every channel of a clip at a tick, `[joint][kind]`, as reference poses hold it: of scales the
+    /// Every channel of a clip at a tick, `[joint][kind]`, in the form of reference poses: scales are stored as their
     /// reciprocals, where 0 counts as 1.
     pub(crate) fn reference(
         &self,
@@ -373,8 +373,8 @@ pub(super) fn runs_of(channels: &[CrowdChannel]) -> Vec<Range<u32>> {
         .collect()
 }
 
-/// As many arcs as there are lanes, at one parameter. No closure: its body would not be compiled for the
-/// vector width.
+/// As many arcs as the vector has lanes, at one parameter. This is a function because a closure's body would not be
+/// compiled for the vector width.
 #[inline(always)]
 fn arc_block<L: Lanes>(
     middles: &[[f32; 4]],
@@ -391,7 +391,7 @@ fn arc_block<L: Lanes>(
     )))
 }
 
-/// Arcs of neighbouring joints at one parameter.
+/// Evaluates arcs of neighbouring joints at one parameter.
 #[inline(always)]
 pub(crate) fn arcs<L: Lanes>(
     middles: &[[f32; 4]],

@@ -4,18 +4,20 @@ use crate::crowd_error::CrowdError;
 use crate::memory::{OutOfMemoryError, zeroed};
 use crate::shader::WEIGHT_UNIT;
 
-/// A weight that changes with the clock, in whole numbers: as it was until the fade starts, in equal parts for
-/// equal ticks while it runs, as it shall be from its end on. It is a function of the clock alone, so that one
-/// jump and a thousand steps lead to the same weight, and going back does too.
+/// A weight that changes linearly with the clock.
+///
+/// The weight is `from` until the fade starts, goes from `from` to `to` in equal steps for equal ticks while the fade
+/// runs, and is `to` afterwards. It is computed in whole numbers from the clock alone: one large step of the clock
+/// leads to the same weight as many small ones, and the clock may go back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CrowdFade {
-    /// The weight before, 0 to 1, kept in units of 2^-15.
+    /// The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub from: f32,
-    /// The weight after, likewise.
+    /// The weight after the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub to: f32,
-    /// When it starts, ticks of the clock; before now or later.
+    /// The clock's time at which the fade starts, ticks; in the past or in the future.
     pub start: u64,
-    /// How many ticks it takes; 0 for a step.
+    /// The duration of the fade, ticks; with 0 the weight changes at once.
     pub ticks: u64,
 }
 
@@ -59,10 +61,11 @@ impl EntryFade {
     }
 }
 
-/// The fades of a crowd's entries, at most one each. Those that ended stay, for the clock may go back.
+/// The fades of a crowd's entries, at most one for each. Fades that have ended are kept, because the clock may go
+/// back.
 #[derive(Debug, Default)]
 pub(crate) struct Fades {
-    /// Those that have not ended, then the others.
+    /// The fades that have not ended, then the others.
     all: Vec<EntryFade>,
     running: usize,
     /// Of each entry the index of its fade among all, counted from 1; 0 where it has none. Empty before the first.
@@ -108,7 +111,8 @@ impl Fades {
         self.of_entry[entry] = 0;
     }
 
-    /// Sets the fade of one of so many entries; its weight, in units of 2^-15, at a time of the clock.
+    /// Sets the fade of an entry and returns its weight at `clock`, in units of 2^-15. `entries` is the number of
+    /// entries.
     pub(crate) fn insert(
         &mut self,
         (entry, entries): (usize, usize),
@@ -139,8 +143,8 @@ impl Fades {
         Ok(fade.units(clock))
     }
 
-    /// Moves on, or back, to a time of the clock: the entries whose weights may have changed, and their weights in
-    /// units of 2^-15.
+    /// Sets the clock, forwards or backwards, and reports each entry whose weight may have changed, with its weight
+    /// in units of 2^-15.
     pub(crate) fn set_clock(
         &mut self,
         clock: u64,

@@ -1,4 +1,4 @@
-//! The entries of a crowd's instances, which of them changed, and which instances are evaluated.
+//! The entries of a crowd's instances, the changes of them, and the visible instances.
 
 use crate::crowd::fade::Fades;
 use crate::crowd::layer::CrowdLayer;
@@ -8,29 +8,29 @@ use crate::shader::{CrowdChange, CrowdClip, CrowdEntry};
 use crate::twin::crowd_entries::change;
 use crate::twin::crowd_times::{ELAPSED_BITS, elapsed};
 
-/// The entries, the clock, and the entries that the device does not know yet.
+/// The entries, the clock, and the changes that the device does not know yet.
 #[derive(Debug)]
 pub(crate) struct Instances {
     /// `[instance][layer]`; [`set`](Self::set) changes them.
     pub(crate) entries: Vec<CrowdEntry>,
     /// A bit for each entry that changed.
     changed: Vec<u64>,
-    /// Room for the changes of a frame.
+    /// Memory for the changes of a frame.
     listed: Vec<CrowdChange>,
-    /// The instances that are evaluated, in this order; without it all are.
+    /// The visible instances in the order of results; `None`: all.
     pub(crate) visible: Option<Vec<u32>>,
-    /// Whether the device has the list.
+    /// Whether the device has this list.
     is_list_known: bool,
     /// Ticks; [`set_clock`](Self::set_clock) changes it.
     pub(crate) clock: u64,
-    /// The time of the clock that no anchor lies before.
+    /// No anchor is before this time of the clock.
     since: u64,
-    /// What changes weights with the clock.
+    /// The fades of weights.
     pub(crate) fades: Fades,
 }
 
 impl Instances {
-    /// Instances that stand at the start of the first clip; layers above the first are left out.
+    /// Makes instances whose first layer has the entry `still`; the other layers have no weight.
     pub(crate) fn new(
         instances: usize,
         layers: usize,
@@ -71,8 +71,9 @@ impl Instances {
         }
     }
 
-    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later. Where it goes farther, all
-    /// get new anchors, and where it goes back, those whose anchors would come after it.
+    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later. If the clock goes
+    /// further, all entries get new anchors; if it goes back, the entries whose anchors would be later than the clock
+    /// get new ones.
     pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
         let is_late = clock.saturating_sub(self.since) >= 1 << (ELAPSED_BITS - 1);
         let back = self.clock.saturating_sub(clock);
@@ -103,13 +104,13 @@ impl Instances {
         self.clock = clock;
     }
 
-    /// Evaluates the instances of a list alone, or all.
+    /// Limits evaluations to the instances of a list; `None`: all.
     pub(crate) fn set_visible(&mut self, list: Option<Vec<u32>>) {
         self.visible = list;
         self.is_list_known = false;
     }
 
-    /// How many instances are evaluated.
+    /// Number of visible instances.
     pub(crate) fn visible_count(&self, layers: usize) -> usize {
         match &self.visible {
             Some(list) => list.len(),
@@ -117,8 +118,8 @@ impl Instances {
         }
     }
 
-    /// What the device is to know for an evaluation, of instances with so many layers: from then on it counts as
-    /// known.
+    /// The changes that the device needs for an evaluation of instances with `layers` layers. Afterwards they count
+    /// as known to the device.
     pub(crate) fn take_frame(&mut self, layers: usize) -> CrowdFrame<'_> {
         let instances = self.visible_count(layers) as u32;
         let is_list_known = std::mem::replace(&mut self.is_list_known, true);
@@ -155,7 +156,7 @@ impl Instances {
         }
     }
 
-    /// The first entry that changed, the end behind the last, and how many there are.
+    /// The first entry that changed, the end of the range of changes, and the number of changes.
     fn changed_range(&self) -> Option<(usize, usize, usize)> {
         let changed = |word: &u64| *word != 0;
         let first = self.changed.iter().position(changed)?;
@@ -167,15 +168,15 @@ impl Instances {
         Some((start, end, count as usize))
     }
 
-    /// Whether so many changes in a range are fewer bytes as a list.
+    /// Whether `count` changes in a range take fewer bytes as a list.
     fn is_listed(&self, range: usize, count: usize) -> bool {
-        /// What a kernel more costs, in bytes.
+        /// The cost of one more kernel, in bytes.
         const DISPATCH: usize = 256;
         let bytes = count * size_of::<CrowdChange>() + DISPATCH;
         count <= listed_changes(self.entries.len()) && bytes < range * size_of::<CrowdEntry>()
     }
 
-    /// From now on the device knows nothing.
+    /// Marks all entries as unknown to the device.
     pub(crate) fn forget(&mut self) {
         self.changed.fill(u64::MAX);
         if let Some(last) = self.changed.last_mut() {

@@ -1,4 +1,4 @@
-//! Rotations of layers, laid over each other for many joints at once.
+//! Blending of the rotations of layers, for many joints at once.
 
 use crate::math::quaternion::{dot, product, step};
 use crate::shader::{CHANNELS, ROTATION};
@@ -11,17 +11,17 @@ use crate::twin::sine_cosine::sine_cosine;
 
 const UNMOVED: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// A layer that is laid over those below it.
+/// A layer that is blended over the layers below it.
 struct Over<'a> {
     weight: f32,
-    /// Cells of which the first number is a joint's part of the weight; without a mask it is 1.
+    /// Cells whose first number is a joint's factor of the weight; without a mask the factor is 1.
     mask: Option<&'a [[f32; 4]]>,
-    /// The channels of each joint in the pose that an additive layer adds the difference from.
+    /// The reference pose of an additive layer: the channels of each joint.
     references: Option<&'a [[f32; 4]]>,
     layered: &'a [[f32; 4]],
 }
 
-/// Lays the rotations of a layer over those below it: [`laid_over`] of every joint.
+/// Blends the rotations of a layer over the layers below it: [`laid_over`] of every joint.
 #[inline(always)]
 pub(crate) fn lay_over<L: Lanes>(
     context: &Layers<'_>,
@@ -61,7 +61,7 @@ impl Over<'_> {
         }
     }
 
-    /// Some vectors of joints from the `first` on.
+    /// Processes some vectors of joints, from `first` on.
     #[inline(always)]
     fn some<L: Lanes, const VECTORS: usize>(&self, first: usize, output: &mut [[f32; 4]]) {
         let below = load::<L, VECTORS>(output, first);
@@ -90,7 +90,7 @@ impl Over<'_> {
         store(canonical(value), output, first);
     }
 
-    /// The same for rotations that are a quarter of a turn of R⁴ apart, as far as can be: seldom any are.
+    /// The same joint by joint, for rotations that are about 90° apart in R⁴, which is rare.
     #[cold]
     #[inline(never)]
     fn one_by_one(&self, joints: std::ops::Range<usize>, output: &mut [[f32; 4]]) {
@@ -114,8 +114,8 @@ impl Over<'_> {
     }
 }
 
-/// [`slerp`](crate::twin::quaternion::slerp) without what it does for rotations that are about a quarter of a
-/// turn of R⁴ apart: there is nothing where any are.
+/// [`slerp`](crate::twin::quaternion::slerp) without the special case of rotations that are about 90° apart in R⁴;
+/// then `None`.
 #[inline(always)]
 fn slerp<L: Lanes, const VECTORS: usize>(
     from: [Together<L, VECTORS>; 4],
@@ -136,7 +136,7 @@ fn slerp<L: Lanes, const VECTORS: usize>(
     Some(along(sum, difference, (to_unit, inverse), sine_and_cosine))
 }
 
-/// Vectors of the rotations from a joint on, filled up with rotations that change nothing.
+/// Vectors of the rotations from the joint `first` on; lanes after the last joint have identity rotations.
 #[inline(always)]
 fn load<L: Lanes, const VECTORS: usize>(
     rotations: &[[f32; 4]],
@@ -159,7 +159,7 @@ fn load<L: Lanes, const VECTORS: usize>(
     loaded
 }
 
-/// The reference rotations from a joint on, of channels of joints.
+/// The reference rotations from the joint `first` on, from the channels of joints.
 #[inline(always)]
 fn reference<L: Lanes, const VECTORS: usize>(
     channels: &[[f32; 4]],
@@ -182,7 +182,7 @@ fn reference<L: Lanes, const VECTORS: usize>(
     loaded
 }
 
-/// Stores the rotations from a joint on, as many as there is room for.
+/// Stores the rotations from the joint `first` on, up to the end of the array.
 #[inline(always)]
 fn store<L: Lanes, const VECTORS: usize>(
     components: [Together<L, VECTORS>; 4],

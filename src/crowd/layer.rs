@@ -1,4 +1,4 @@
-//! What one layer of an instance plays, and the 16 bytes that say so to the kernels.
+//! A layer of an instance, and its 16 bytes for the kernels.
 
 use crate::crowd::fade::weight_units;
 use crate::crowd_error::{CrowdError, FASTEST, MAX_MASKS};
@@ -9,36 +9,37 @@ use crate::shader::{
 use crate::time::wrap::WrapMode;
 use crate::twin::crowd_times::{elapsed, tick_of};
 
-/// Units of a speed of 1.
+/// The units of a speed of 1.
 const SPEED_UNITS: f32 = 65536.0;
 
-/// What a layer of an instance plays.
+/// A clip that an instance plays, and its time, speed, wrap mode and weight.
 ///
-/// A clip's own time counts in ticks from its first key
-/// ([`CrowdLibrary::ticks_per_second`](crate::crowd::library::CrowdLibrary::ticks_per_second)). Speeds
-/// are kept in units of 2^-16 and weights in units of 2^-15.
+/// A clip's time counts in ticks from its first key
+/// ([`CrowdLibrary::ticks_per_second`](crate::crowd::library::CrowdLibrary::ticks_per_second)). Speeds are rounded to
+/// multiples of 2^-16 and weights to multiples of 2^-15.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CrowdLayer {
-    /// The clip.
+    /// The clip's index in the library.
     pub clip: usize,
-    /// Where in the clip it stands now, ticks; the wrap mode says what lies outside of the clip.
+    /// The layer's current time in the clip, ticks. Outside the clip the wrap mode applies.
     pub time: i64,
-    /// Ticks of the clip for a tick of the clock; negative to run backwards.
+    /// The speed: ticks of the clip for each tick of the clock, between -128 and 128; negative to play backwards.
     pub speed: f32,
-    /// Whether the clip holds its ends, starts again or runs there and back. The fourth mode,
-    /// [`WrapMode::Extrapolate`], is refused.
+    /// Outside its keys the clip stays at its ends (`Hold`), starts again (`Loop`) or runs back and forth (`Mirror`).
+    /// [`WrapMode::Extrapolate`] is refused.
     pub wrap: WrapMode,
-    /// How much of it is laid over the layers below, 0 to 1. The first layer has no weight.
+    /// The weight with which the layer is blended over the layers below, 0 to 1. The weight of the first layer is
+    /// ignored.
     pub weight: f32,
-    /// Whether the clip's difference from its reference pose is added to the layers below; else
-    /// they go over into it.
+    /// Whether the clip's difference from its reference pose is added to the layers below; otherwise the layers below
+    /// are interpolated towards the clip.
     pub additive: bool,
-    /// A mask of the library; without one all joints take part.
+    /// The index of a mask of the library; `None`: all joints take part.
     pub mask: Option<usize>,
 }
 
 impl CrowdLayer {
-    /// A clip from its start, once a tick, in a loop, with a weight of 1.
+    /// A layer that plays a clip from its start, at speed 1, in a loop, with a weight of 1.
     #[must_use]
     pub fn new(clip: usize) -> Self {
         Self {
@@ -52,14 +53,13 @@ impl CrowdLayer {
         }
     }
 
-    /// At another time of its clip, ticks.
+    /// The same layer at another time of its clip, ticks.
     #[must_use]
     pub fn at(self, time: i64) -> Self {
         Self { time, ..self }
     }
 
-    /// The bytes for the kernels, for a layer that stands at its time when the clock stands at
-    /// `clock`.
+    /// The layer's bytes for the kernels; `clock` is the time of the clock at which the layer's time is `self.time`.
     pub(crate) fn packed(
         &self,
         clips: &[CrowdClip],
@@ -114,7 +114,7 @@ impl CrowdLayer {
         })
     }
 
-    /// What an entry says at a time of the clock, `to`, before or after the one at which it stands.
+    /// The layer that an entry describes, at the clock's time `to` instead of `clock`; `to` may be earlier.
     pub(crate) fn moved(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64, to: u64) -> Self {
         let modes = entry.speed_and_modes;
         let units = i128::from(modes & SPEED_MAGNITUDE);
@@ -148,7 +148,7 @@ impl CrowdEntry {
         (self.speed_and_modes >> 24) & 0x1f != 0
     }
 
-    /// Whether nothing of the layers below is left: all joints have the clip's rotations, bit for bit.
+    /// Whether the layers below have no influence: all joints have the clip's rotations, bit for bit.
     pub(crate) fn hides_lower_layers(&self) -> bool {
         let is_whole = (self.clip_and_weight >> 16) as f32 * WEIGHT_UNIT == 1.0;
         let is_additive = self.speed_and_modes >> 31 != 0;
@@ -156,13 +156,13 @@ impl CrowdEntry {
     }
 }
 
-/// The tick of a clip at which an entry stands.
+/// The tick of its clip at which an entry is evaluated.
 pub(crate) fn tick(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64) -> u32 {
     let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];
     tick_of(entry, clip.period, clock)
 }
 
-/// A time as a wrap mode has it: within the clip, or within there and back.
+/// A time after wrapping: from 0 to the period, or for mirrored clips from 0 to two periods.
 fn folded(time: i128, wrap: u32, period: u32) -> i64 {
     let period = i128::from(period);
     let folded = match wrap {

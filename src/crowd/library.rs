@@ -15,12 +15,11 @@ use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
-/// Ticks of a second, unless others are asked for: a whole number of them is a frame of 24, 25, 30, 48,
-/// 50, 60, 90, 100, 120, 144, 240 and 360 Hz, and a sample of 44.1 kHz.
+/// The default number of ticks in a second: a frame of 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 240 or 360 Hz and a
+/// sample of 44.1 kHz last a whole number of ticks.
 const TICKS_PER_SECOND: u32 = 705_600;
 
-/// A library of clips for one skeleton, prepared for crowds: masks and inverse bind matrices belong
-/// to it.
+/// The clips, masks and inverse bind matrices of one skeleton, prepared for crowds.
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
@@ -48,21 +47,21 @@ const TICKS_PER_SECOND: u32 = 705_600;
 pub struct CrowdLibrary {
     pub(crate) tables: ClipTables,
     offsets: Vec<Vec3>,
-    /// The joints that have a parent, level by level.
+    /// The joints that have a parent, level by level: parents before their children.
     pub(crate) links: Vec<CrowdLink>,
-    /// Where each level starts among the links, and at last their end.
+    /// The index of each level's first link, then the number of links.
     pub(crate) levels: Vec<u32>,
-    /// A weight for each joint of each mask; the first lets everything through.
+    /// A weight for each joint of each mask; in the first mask all weights are 1.
     masks: Vec<f32>,
-    /// The rows of each joint's inverse bind matrix; empty where there are none.
+    /// The rows of each joint's inverse bind matrix; empty if none were set.
     pub(crate) bind: Vec<Rows>,
-    /// `[clip][joint]`, a rotation, a translation and the reciprocals of a scale each.
+    /// The reference poses, `[clip][joint]`: a rotation, a translation and the reciprocals of a scale.
     references: Vec<[f32; 4]>,
     ticks_per_second: u32,
 }
 
 impl CrowdLibrary {
-    /// An empty library for a skeleton, with 705 600 ticks a second: clips of up to 50 minutes.
+    /// An empty library for a skeleton, with 705 600 ticks a second. A clip may last up to 50 minutes.
     ///
     /// # Errors
     /// When the skeleton has no joints.
@@ -70,10 +69,11 @@ impl CrowdLibrary {
         Self::with_ticks(skeleton, TICKS_PER_SECOND)
     }
 
-    /// An empty library for a skeleton, with other ticks: fewer of them for longer clips.
+    /// An empty library for a skeleton, with the number of ticks in a second. With fewer ticks, clips may be longer:
+    /// a clip has up to 2 147 221 504 ticks.
     ///
     /// # Errors
-    /// When the skeleton has no joints, or there are no ticks.
+    /// When the skeleton has no joints, or the number of ticks is 0 or above 2 147 221 504.
     pub fn with_ticks(skeleton: &Skeleton, ticks_per_second: u32) -> Result<Self, CrowdError> {
         if !(1..=MAX_TICKS).contains(&ticks_per_second) {
             return Err(CrowdError::TicksPerSecond { ticks_per_second });
@@ -114,7 +114,7 @@ impl CrowdLibrary {
         })
     }
 
-    /// Ticks of a second.
+    /// Number of ticks in a second.
     #[must_use]
     pub fn ticks_per_second(&self) -> u32 {
         self.ticks_per_second
@@ -138,22 +138,24 @@ impl CrowdLibrary {
         self.masks.len() / self.joint_count() - 1
     }
 
-    /// How long a clip is, ticks: from the first key of anything to the last, and at least 1. In a loop
-    /// it starts again after so many.
+    /// The length of a clip, ticks: from its first key (of a rotation, translation or scale) to its last, and at
+    /// least 1. This is also the period of a loop. `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {
         self.tables.clips.get(clip).map(|clip| clip.period)
     }
 
-    /// Adds a clip: a track for each joint, the rotations by a method with its options and the
-    /// translations and scales by `vectors`. Joints without translations hang at their offsets in the
-    /// skeleton. Instances say what happens outside the keys, so the wrap modes of `interpolation` do
-    /// not count. The clip's reference pose, for additive layers, is its pose at its start. Returns the
-    /// clip's number.
+    /// Adds a clip and returns its index.
+    ///
+    /// The set has one track for each joint. Rotations are interpolated by `interpolation`, translations and scales
+    /// by `vectors`. Joints without translations stay at their offsets in the skeleton. The wrap modes of
+    /// `interpolation` are ignored, because each layer of an instance has its wrap mode. The reference pose of the
+    /// clip, for additive layers, is its pose at its start ([`CrowdLibrary::set_reference`]).
     ///
     /// # Errors
-    /// When the tracks are not those of the skeleton, a track cannot be interpolated as asked or turns
-    /// so wildly that no polynomial fits, or the clip is too long for the ticks.
+    /// When the set has not one track for each joint, a track cannot be interpolated as requested, the interpolation
+    /// computes velocities or accelerations, a curve rotates so fast that no polynomial fits it, the clip has too
+    /// many ticks, the library is full, or there is not enough memory.
     pub fn push(
         &mut self,
         set: &TrackSet,
@@ -176,11 +178,11 @@ impl CrowdLibrary {
         Ok(clip)
     }
 
-    /// Makes the pose of a clip `from` at a tick, held at its ends, the reference pose of a clip: what
-    /// additive layers of it differ from. A reference scale of 0 counts as 1.
+    /// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a
+    /// tick. After the end of `from` it is its last pose. A reference scale of 0 counts as 1.
     ///
     /// # Errors
-    /// When there are no such clips.
+    /// When one of the two clips does not exist.
     pub fn set_reference(&mut self, clip: usize, from: usize, tick: u32) -> Result<(), CrowdError> {
         let (joints, count) = (self.joint_count(), self.clip_count());
         if let Some(index) = [clip, from].into_iter().find(|&index| index >= count) {
@@ -201,11 +203,11 @@ impl CrowdLibrary {
         Ok(())
     }
 
-    /// Adds a mask, a weight from 0 to 1 for each joint, that layers' weights are multiplied with.
-    /// Returns its number.
+    /// Adds a mask and returns its index. A mask has a weight from 0 to 1 for each joint, by which the weights of
+    /// layers are multiplied.
     ///
     /// # Errors
-    /// When there is not a weight for each joint, one lies outside, or there are 31 masks already.
+    /// When there is not one weight for each joint, a weight is outside 0 to 1, or the library has 31 masks already.
     pub fn push_mask(&mut self, weights: &[f32]) -> Result<usize, CrowdError> {
         let mask = self.mask_count();
         self.check_joints("weights", weights.len())?;
@@ -222,10 +224,10 @@ impl CrowdLibrary {
         Ok(mask)
     }
 
-    /// Gives every joint the inverse of its matrix in the model in the pose in which vertices were bound.
+    /// Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose.
     ///
     /// # Errors
-    /// When there is not a matrix for each joint, or a number is not finite.
+    /// When there is not one matrix for each joint, or a number is not finite.
     pub fn set_inverse_bind(&mut self, matrices: &[Affine3A]) -> Result<(), CrowdError> {
         self.check_joints("inverse bind matrices", matrices.len())?;
         if let Some(joint) = matrices.iter().position(|matrix| !matrix.is_finite()) {
@@ -251,8 +253,7 @@ impl CrowdLibrary {
         }
     }
 
-    /// All constants that kernels read: those of segments and keys, then the masks, then the reference
-    /// poses.
+    /// All constants that kernels read: the constants and keys of segments, then the masks, then the reference poses.
     pub(crate) fn cells(&self) -> Result<Vec<[f32; 4]>, CrowdError> {
         let clip_cells = &self.tables.cells;
         let count = clip_cells.len() + self.masks.len() + self.references.len();
@@ -266,8 +267,8 @@ impl CrowdLibrary {
         Ok(cells)
     }
 
-    /// The push constants of a crowd with so many layers: its sizes, and where masks and reference
-    /// poses start among the cells.
+    /// The push constants of a crowd with `layers` layers: its sizes, and the indices of the first mask and of the
+    /// first reference pose among the cells.
     pub(crate) fn arguments(&self, layers: usize) -> CrowdDispatch {
         let masks = self.tables.cells.len();
         let bases = self.tables.clips.iter().map(|clip| clip.bases).max();
@@ -281,8 +282,8 @@ impl CrowdLibrary {
         }
     }
 
-    /// The library's clips as tables, with the spans and the cells that belong to them. Masks, reference
-    /// poses and inverse bind matrices stay behind.
+    /// Converts the library's clips to tables, with their spans and cells. Masks, reference poses and inverse bind
+    /// matrices are not included.
     #[must_use]
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let (ticks_per_second, joints) = (self.ticks_per_second(), self.joint_count());

@@ -20,13 +20,13 @@ use crate::twin::crowd_times::base_positions;
 
 const TASK: usize = 32;
 
-/// What is evaluated: the same for all instances.
+/// The input of an evaluation, the same for all instances.
 #[derive(Clone, Copy)]
 pub(crate) struct CrowdScene<'a> {
     pub(crate) library: &'a CrowdLibrary,
     pub(crate) values: CrowdValues,
     pub(crate) clock: u64,
-    /// With all entries, and without positions in the clips: these are found here.
+    /// All entries, still without positions in the clips, which the evaluation computes.
     pub(crate) context: Layers<'a>,
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn evaluate(
 struct InstancesTask<'a, 'b> {
     scene: CrowdScene<'a>,
     positions: &'b mut Vec<CrowdPosition>,
-    /// Those of an instance, and those of one of its layers.
+    /// The rotations of an instance, and the rotations of one of its layers.
     rotations: &'b mut Vec<[f32; 4]>,
     output: &'b mut [[f32; 4]],
 }
@@ -134,8 +134,8 @@ impl CrowdScene<'_> {
     }
 }
 
-/// The rotations of an instance: those of its first layer, with the others laid over. `layered` is room for
-/// the rotations of one layer.
+/// The rotations of an instance: those of its first layer, with the other layers blended over them. `layered` is
+/// scratch memory for the rotations of one layer.
 #[inline(always)]
 fn rotations<L: Lanes>(
     context: &Layers<'_>,

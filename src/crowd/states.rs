@@ -1,6 +1,6 @@
-//! States of a library's clips at any times: rotations, positions and velocities of all joints, as those
-//! ask who train on motion. The rotations have a crowd's bits; what follows from them takes only sums and
-//! products, so that every machine has the same bits.
+//! States of a library's clips at any times: rotations, positions and velocities of all joints, for the training of
+//! models of motion. The rotations have a crowd's bits. The rest is computed from them with sums and products alone,
+//! so that every machine has the same bits.
 
 use std::ops::Range;
 
@@ -23,27 +23,27 @@ use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
 
-/// Instances of one task.
+/// The number of instances in a task.
 const TASK: usize = 64;
 
-/// Where each joint of each instance is, and how it moves, `[instance][joint]`. What is empty is left out.
-/// Seconds, radians, and the unit of length of the clips.
+/// Output arrays for the poses and velocities of all joints, `[instance][joint]`. Arrays that are empty are not
+/// computed. Units are seconds, radians, and the unit of length of the clips.
 #[derive(Debug, Default)]
 pub struct MotionStates<'a> {
     /// The rotation in the parent's frame, `x y z w`.
     pub rotations: &'a mut [[f32; 4]],
-    /// The position in the world, along the skeleton.
+    /// The position in the world: offsets and translations along the skeleton.
     pub positions: &'a mut [[f32; 3]],
     /// The rotation in the world, `x y z w`.
     pub world_rotations: &'a mut [[f32; 4]],
     /// The velocity in the world: the derivative of the position.
     pub velocities: &'a mut [[f32; 3]],
-    /// The angular velocity about the world's axes: the derivative of the world's rotation.
+    /// The angular velocity about the world's axes, radians per second: the derivative of the world rotation.
     pub angular_velocities: &'a mut [[f32; 3]],
 }
 
-/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables, of which the large ones may lie in a file that several
-/// processes map.
+/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables. The two large tables, spans
+/// and cells, are separate, so that several processes can map them from a file.
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
@@ -72,24 +72,24 @@ pub struct MotionTables {
     runs: Vec<Vec<Range<u32>>>,
     joints: usize,
     ticks_per_second: u32,
-    /// How many spans and cells there must be.
+    /// The expected numbers of spans and cells.
     sizes: (usize, usize),
 }
 
-/// The small tables as words, for files.
+/// The small tables of [`MotionTables`] as 32-bit words, for files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct MotionWords {
-    /// Of each clip its length in ticks, and which time bases are its.
+    /// For each clip: its length in ticks, and the first and the number of its time bases.
     pub clips: Vec<[u32; 3]>,
-    /// Of each time base which spans are its.
+    /// For each time base: the first and the number of its spans, and the step with which a search in them starts.
     pub bases: Vec<[u32; 3]>,
-    /// Of each channel of each joint of each clip its form, its time base and its cells.
+    /// For each channel of each joint of each clip: its form, its time base and its cells.
     pub channels: Vec<[u32; 4]>,
-    /// The joints that have a parent, and it, level by level.
+    /// The joints that have a parent, each with its parent, level by level.
     pub links: Vec<[u32; 2]>,
-    /// Joints of the skeleton.
+    /// Number of joints of the skeleton.
     pub joint_count: usize,
-    /// Ticks of a second.
+    /// Number of ticks in a second.
     pub ticks_per_second: u32,
 }
 
@@ -115,10 +115,10 @@ impl MotionTables {
         (tables, spans, library_tables.cells)
     }
 
-    /// The tables of these words, with these spans and cells.
+    /// Makes tables from words, for these spans and cells.
     ///
     /// # Errors
-    /// When they do not fit together: they are of another version, or broken.
+    /// When the tables do not fit together: the file is broken or was written by another version.
     pub fn new(
         words: MotionWords,
         (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
@@ -231,24 +231,26 @@ impl MotionTables {
         self.joints
     }
 
-    /// Ticks of a second.
+    /// Number of ticks in a second.
     #[must_use]
     pub fn ticks_per_second(&self) -> u32 {
         self.ticks_per_second
     }
 
-    /// How long a clip is, ticks, and at least 1.
+    /// The length of a clip, ticks, at least 1; `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {
         self.clips.get(clip).map(|clip| clip.period)
     }
 
-    /// The states of instances, of each of which a clip and a tick of it are said; later ticks than the last
-    /// give the clip's end. `tables` are the spans and the cells.
+    /// Computes the states of instances. `at` has a clip and a tick for each instance; ticks after the clip's end
+    /// give its last pose. The spans and cells are those that belong to the tables.
+    ///
+    /// `engine` provides the threads and the vector width. The host computes for every device.
     ///
     /// # Errors
-    /// When there is no such clip, an array is neither empty nor as long as it should be, the tables are
-    /// others, or the work is stopped.
+    /// When a clip does not exist, an array is neither empty nor as long as the instances times the joints, the spans
+    /// and cells do not belong to the tables, the system refuses threads, or the work is stopped.
     pub fn sample_into(
         &self,
         engine: &Engine,
@@ -322,7 +324,7 @@ impl MotionTables {
 }
 
 impl<'a> MotionStates<'a> {
-    /// The states of so many first joints, which are taken away.
+    /// Splits off the states of the first `joints` joints.
     fn split_off(&mut self, joints: usize) -> Self {
         fn first<'a, T>(of: &mut &'a mut [T], count: usize) -> &'a mut [T] {
             of.split_off_mut(..count.min(of.len())).unwrap_or_default()
@@ -450,7 +452,7 @@ impl InLanes for StatesTask<'_, '_> {
 }
 
 impl Joint {
-    /// Turns what is relative to the parent into what is in the world.
+    /// Converts the joint's state from its parent's frame to the world.
     #[inline(always)]
     fn hang_on(&mut self, parent: &Self, moves: bool) {
         let arm = rotated(parent.rotation, self.position);
@@ -470,8 +472,9 @@ impl Joint {
     }
 }
 
-/// Where a time base stands, as [`position_at`] says. Keys mostly lie at even times: where the span is that would
-/// hold the tick then, no search is needed, each step of which waits for memory.
+/// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times. Therefore the
+/// span that would contain the tick at even times is tried first, without a search, each step of which waits for
+/// memory.
 #[inline(always)]
 fn guessed_position(
     base: &CrowdBase,
@@ -501,7 +504,7 @@ fn guessed_position(
     position_at(base, spans, tick)
 }
 
-/// The rotations of an instance: as a crowd's, with one layer.
+/// The rotations of an instance, as in a crowd with one layer.
 #[inline(always)]
 fn local_rotations<L: Lanes>(
     runs: &[Range<u32>],
@@ -545,8 +548,8 @@ impl ClipMoment<'_> {
         sampled(self.cells, channel, position)
     }
 
-    /// The span of a channel, the parameter in it and its rate a second: at the last key those of the span
-    /// that ends there.
+    /// The span of a channel, the parameter in it and the parameter's rate per second. At the last key these are of
+    /// the span that ends there.
     #[inline(always)]
     fn along(&self, channel: &CrowdChannel) -> (u32, f32, f32) {
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
@@ -565,7 +568,7 @@ impl ClipMoment<'_> {
         (index, parameter, span.scale * self.per_second)
     }
 
-    /// The derivative of a rotation, about the parent's axes.
+    /// The angular velocity of a rotation, about the parent's axes.
     #[inline(always)]
     fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 3] {
         let form = channel.form_and_base >> 24;

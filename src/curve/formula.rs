@@ -1,8 +1,7 @@
-//! Formulas: the curve between two keys, in f64, as a function of the parameter from 0 to 1. A
-//! formula takes up to [`NUMBERS`] numbers; its documentation says what they are.
+//! Formulas: the curve between two keys, in f64, as a function of the parameter from 0 to 1. A formula takes up to
+//! [`NUMBERS`] numbers, which its documentation lists.
 //!
-//! Kernels do not evaluate formulas: they evaluate the polynomials that are fitted to
-//! them, the same form for all.
+//! Kernels do not evaluate formulas. They evaluate polynomials of one form that are fitted to the formulas.
 
 use crate::curve::options::{Axes, Quantity};
 use crate::math::dual::{Dual, Scalar};
@@ -38,8 +37,8 @@ impl From<RotationVectorNumbers> for FormulaNumbers {
     }
 }
 
-/// The numbers of [`DeCasteljau`]'s curves and of many others: the keys at both ends, and the control
-/// rotations or tangents between them. They are four quaternions, one behind the other.
+/// The numbers of [`DeCasteljau`]'s curves and of many others: the keys at both ends, and the control rotations or
+/// tangents between them, as four consecutive quaternions.
 #[derive(Default)]
 pub(crate) struct ControlNumbers {
     pub(crate) start: Quaternion,
@@ -72,7 +71,7 @@ impl From<LineNumbers> for FormulaNumbers {
     }
 }
 
-/// Numbers one behind the other, and 0 after them.
+/// Consecutive numbers, followed by zeros.
 fn in_order<const PARTS: usize>(parts: [&[f64]; PARTS]) -> FormulaNumbers {
     let mut numbers = [0.0; NUMBERS];
     for (number, &part) in numbers.iter_mut().zip(parts.into_iter().flatten()) {
@@ -115,7 +114,7 @@ pub(crate) fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
     exp_by(a, square(a).waves())
 }
 
-/// `q / |q|`, whatever the length.
+/// `q / |q|`, for any length.
 #[inline(always)]
 pub(crate) fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
     let scale = dot(q, q).reciprocal_root();
@@ -133,8 +132,8 @@ pub(crate) fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
     ]
 }
 
-/// Slerp on the arc that the signs give: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b` (Shoemake 1985),
-/// up to a factor that normalising removes. Its ends may depend on time too.
+/// Slerp on the arc that the signs define: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b` (Shoemake 1985), up to a factor
+/// that normalising removes. Its ends may depend on time too.
 ///
 /// The sines are written `x sinc(x²)`, and the square of the angle is a smooth function of the
 /// chord between the ends, so that small angles are no special case.
@@ -168,7 +167,7 @@ impl Product {
         [0.0, 0.0, 0.0, 1.0],
     ];
 
-    /// The `j`th exponential. No closure: those are not always inlined.
+    /// The `j`th exponential. This is not a closure, because closures are not always inlined.
     #[inline(always)]
     fn factor<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S, j: usize) -> [S; 4] {
         let [c0, c1, c2, c3] = quaternion::<S>(numbers, Self::BASIS + 4 * j);
@@ -217,9 +216,8 @@ impl Formula for RotationVector {
 
 /// Bézier curves of rotations (Shoemake 1985): de Casteljau's construction with slerps.
 ///
-/// Numbers: the four control rotations. The arcs between them are those that their signs give.
-/// Unlike in flat space, the two halves into which the construction cuts such a curve are not parts
-/// of it.
+/// Numbers: the four control rotations. Their signs define the arcs between them. Unlike in flat space, the two
+/// halves into which the construction divides such a curve are not parts of it.
 pub(crate) struct DeCasteljau;
 
 impl Formula for DeCasteljau {
@@ -245,8 +243,8 @@ impl Formula for StraightLine {
     }
 }
 
-/// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
-/// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
+/// The requested quantity of a rotation and its derivatives by the parameter; `rate` is the parameter's change per
+/// second. The result is a quaternion, or a vector followed by 0.
 #[inline(always)]
 pub(crate) fn quantity_value<R: Real>(
     quantity: Quantity,
@@ -272,7 +270,8 @@ pub(crate) fn quantity_value<R: Real>(
     [x, y, z, R::all(0.0)]
 }
 
-/// Between keys at almost the same time velocities would overflow f32. NaN stays NaN.
+/// Limits a number to the range of f32, which velocities between keys at almost the same time would exceed. NaN stays
+/// NaN.
 #[inline(always)]
 pub(crate) fn clamped<R: Real>(x: R) -> R {
     let largest = 0.25 * f64::from(f32::MAX);

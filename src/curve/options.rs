@@ -1,5 +1,4 @@
-//! The options of a curve of any method: the path between the keys, the shape at its ends, the
-//! quantity that is evaluated and the speed at which the curve is run through.
+//! Options of a curve of any method: the signs of its keys, its ends, the quantity that is evaluated, and the speed.
 
 use std::fmt;
 use std::ops::Range;
@@ -13,10 +12,11 @@ use crate::tracks::set::TrackSet;
 use crate::tracks::set::key_data::LARGEST_TCB;
 use crate::tracks::signs::Signs;
 
-/// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations are
-/// vectors, `x y z` and 0 in the place of `w`, by the derivatives of the formula. On a key they are
-/// those of the segment after it, on the last key those of the last segment; outside the keys they
-/// are 0 while the end value is held.
+/// The quantity that is evaluated: the rotation, its velocity or its acceleration.
+///
+/// Velocities and accelerations are vectors, `x y z 0`, from the derivatives of the formula. At a key they are those
+/// of the segment after it, and at the last key those of the last segment. Where the value at an end is held, they
+/// are 0.
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
@@ -50,7 +50,7 @@ impl Quantity {
         Self::Acceleration(Axes::Parent),
     ];
 
-    /// The name by which programs call it.
+    /// The name that programs use.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -77,16 +77,17 @@ impl FromStr for Quantity {
     }
 }
 
-/// How fast a track runs through its curve; no effect on [`STEP`](crate::method::step::STEP).
+/// The speed on a track's curve; no effect on [`STEP`](crate::method::step::STEP).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Speed {
-    /// As the key times say.
+    /// According to the key times.
     #[default]
     AsKeyed,
-    /// At one angular speed from the first key to the last (by arc length). The path is the same,
-    /// but inner keys are met at other times than their own. Preparing takes milliseconds per key.
-    /// Where the keyed curve is slow, the direction of its velocity changes fast: there velocities
-    /// are within 1e-5 and accelerations within 1e-3 of the largest.
+    /// The same angular speed from the first key to the last (by arc length).
+    ///
+    /// The path is the same, but inner keys are reached at other times. Preparing takes milliseconds for each key.
+    /// Where the keyed curve is slow, the direction of its velocity changes fast; there, velocities are within 1e-5
+    /// and accelerations within 1e-3 of the largest.
     Constant,
 }
 
@@ -96,13 +97,12 @@ names! {
     Constant => "constant",
 }
 
-/// The axes in which a vector is given.
+/// The axes of a vector's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axes {
-    /// Those of the body that turns.
+    /// The axes of the rotating body.
     Body,
-    /// Those of the frame in which it turns: its parent's in a skeleton, the world's for a track that
-    /// has no parent.
+    /// The axes of the frame in which the body rotates: in a skeleton the parent's frame, otherwise the world.
     Parent,
 }
 
@@ -112,14 +112,15 @@ names! {
     Parent => "parent",
 }
 
-/// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.
+/// Which sign of each key is used: `q` and `-q` are the same rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum KeySigns {
-    /// Each key is taken with the sign nearer to its predecessor, so no rotation
-    /// goes the long way round. Keys 180° apart keep the sign they were given.
+    /// Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°. Keys
+    /// that are 180° apart keep their signs.
     #[default]
     Shortest,
-    /// Signs as given: a dot product below zero turns the long way.
+    /// Keys keep their signs. Where the dot product of neighbouring keys is negative, the rotation between them is
+    /// more than 180°.
     AsAuthored,
 }
 
@@ -130,7 +131,7 @@ names! {
 }
 
 impl KeySigns {
-    /// The signs of a track's keys on this path.
+    /// The signs of a track's keys under this option.
     pub(crate) fn signs(self, set: &TrackSet, index: usize) -> Signs<'_> {
         match self {
             Self::Shortest => set.signs(index),
@@ -138,8 +139,7 @@ impl KeySigns {
         }
     }
 
-    /// Refuses keys without a path between them, in some `intervals` of the `index`th track of a
-    /// set.
+    /// Refuses neighbouring keys that are opposite quaternions, in some `intervals` of the track `index` of a set.
     pub(crate) fn check(
         self,
         keys: &[Quat],
@@ -159,31 +159,30 @@ impl KeySigns {
     }
 }
 
-/// The curve in the first and in the last segment, where a neighbouring key is missing. Two keys
-/// alone are joined by slerp, whatever the ends.
+/// The curve in the first and in the last segment, where a neighbouring key is missing. A track of only two keys is
+/// interpolated by slerp for any ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[doc(alias = "boundary condition")]
 #[doc(alias = "end condition")]
 pub enum Ends {
-    /// The parabola through the last three keys: constant velocity stays constant
-    /// to the very ends.
+    /// The parabola through the last three keys at each end. Constant velocity stays constant up to the ends.
     #[default]
     Parabolic,
-    /// No angular acceleration at the ends.
+    /// The angular acceleration is 0 at the ends.
     Natural,
-    /// Given angular velocities (radians per second, body frame) at the ends.
+    /// The angular velocities at the ends are specified (radians per second, body frame).
     Clamped {
-        /// At the first key.
+        /// The velocity at the first key.
         start: glam::DVec3,
-        /// At the last key.
+        /// The velocity at the last key.
         end: glam::DVec3,
     },
-    /// The angular velocity of slerp between the last two keys: constant velocity stays constant
-    /// too. The default of [`C2`](crate::method::c2::C2).
+    /// The angular velocity at an end is that of slerp between the last two keys there. Constant velocity stays
+    /// constant. The default of [`C2`](crate::method::c2::C2).
     Secant,
-    /// A closed curve: the last key equals the first.
+    /// The curve is closed: the last key equals the first, and the curve is smooth there.
     Loop,
-    /// The first and the last segment hold their first key.
+    /// The first and the last segment are constant, with the value of their first key.
     Frozen,
 }
 
@@ -197,14 +196,14 @@ names! {
     Frozen => "frozen",
 }
 
-/// How far the last key of a loop may be from the first (half-angle, radians).
+/// The maximum half-angle between the last key of a loop and the first, radians.
 const LOOP_TOLERANCE: f64 = 1e-3;
 
 /// The largest angular velocity at an end, radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Ends {
-    /// Both ends at rest: what `clamped` stands for.
+    /// Both ends at rest: the value of the name `clamped`.
     pub const AT_REST: Self = Self::Clamped {
         start: glam::DVec3::ZERO,
         end: glam::DVec3::ZERO,
@@ -223,7 +222,7 @@ impl Ends {
         Ok(())
     }
 
-    /// Refuses loops whose last key is not their first. `index` is the track's index in its set.
+    /// Refuses a loop whose last key differs from its first. `index` is the track's index in its set.
     pub(crate) fn check_loop(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
         let (Self::Loop, [first, .., last]) = (self, keys) else {
             return Ok(());
@@ -241,12 +240,11 @@ impl Ends {
     }
 }
 
-/// Why a track cannot be interpolated as asked. Indices count from 0.
+/// Why a track cannot be interpolated as requested. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterpolationError {
-    /// Under [`KeySigns::AsAuthored`] neighbouring keys are each other's negative: no
-    /// great circle is defined.
+    /// Under [`KeySigns::AsAuthored`], neighbouring keys are opposite quaternions, between which no arc is defined.
     #[error(
         "track {track}: keys {key} and {} are opposite quaternions, between which as-authored has no path; flip one sign or use the shortest path",
         key + 1
@@ -257,8 +255,8 @@ pub enum InterpolationError {
         /// The first of the two keys.
         key: usize,
     },
-    /// Under [`WrapMode::Mirror`](crate::time::wrap::WrapMode::Mirror) velocities would change
-    /// their signs from copy to copy.
+    /// A velocity or an acceleration is requested under [`WrapMode::Mirror`](crate::time::wrap::WrapMode::Mirror),
+    /// where it would change its sign from copy to copy.
     #[error("velocities cannot be mirrored; hold, loop or extrapolate them")]
     MirroredVelocity,
     /// Under [`Ends::Clamped`] a velocity is not finite, or too large.
@@ -267,7 +265,7 @@ pub enum InterpolationError {
         velocity.x, velocity.y, velocity.z
     )]
     EndVelocity {
-        /// What was given.
+        /// The velocity.
         velocity: glam::DVec3,
     },
     /// A tension, a continuity or a bias is not finite, or too large.
@@ -277,26 +275,27 @@ pub enum InterpolationError {
     Tcb {
         /// `tension`, `continuity` or `bias`.
         option: &'static str,
-        /// What was given.
+        /// The number.
         value: f64,
     },
-    /// Under [`Ends::Loop`] the last key must repeat the first.
+    /// Under [`Ends::Loop`], the last key differs from the first.
     #[error(
         "track {track}: the last key is {degrees:.3}° from the first; a loop needs a last key that equals the first"
     )]
     OpenLoop {
         /// The track's index in the set.
         track: usize,
-        /// Angle between first and last key, degrees.
+        /// The angle between the first key and the last, degrees.
         degrees: f64,
     },
 }
 
-/// A warning about a track that is interpolated all the same. Indices count from 0.
+/// A warning about a track that is interpolated nevertheless. Indices count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterpolationWarning {
-    /// [`C2`](crate::method::c2::C2) found no velocities that make the angular acceleration continuous.
+    /// The angular acceleration of [`C2`](crate::method::c2::C2) jumps, because no velocities that make it continuous
+    /// were found.
     #[error(
         "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys in long intervals beside short ones, or use bessel-overhauser"
     )]

@@ -1,5 +1,5 @@
-//! An engine on an application's own Vulkan device. The function is unsafe, because the compiler cannot check what
-//! the application promises of its handles.
+//! An engine on an application's Vulkan device. The function is unsafe, because the compiler cannot check the
+//! application's promises about its handles.
 #![allow(unsafe_code)]
 
 use crate::engine::Engine;
@@ -10,15 +10,15 @@ use crate::gpu::options::EngineOptions;
 use crate::gpu::recovery::Opened;
 
 impl Engine {
-    /// Evaluates on an application's own Vulkan device.
+    /// Makes an engine on an application's Vulkan device.
     ///
     /// # Errors
     /// As [`Engine::with_options`].
     ///
     /// # Safety
-    /// The handles must be valid and belong together, must outlive the engine and
-    /// all of its clips and results, and nobody else may use the queues while the
-    /// engine does, unless both lock [`VulkanHandles::queue_lock`].
+    /// The handles must be valid and belong together, and must outlive the engine and all of its clips and results.
+    /// Nothing else may use the queues while the engine uses them, unless the application and the engine share
+    /// [`VulkanHandles::queue_lock`].
     pub unsafe fn from_vulkan(
         handles: VulkanHandles,
         options: &EngineOptions,

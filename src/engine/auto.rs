@@ -15,14 +15,14 @@ use crate::output::rotations::Layout;
 use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
 
-/// Fewer rotations than this the CPU evaluates in 1 to 3 ms, while opening a device alone takes 50
-/// ms; see [`Engine::auto`].
+/// The CPU evaluates fewer rotations than this in 1 to 3 ms, while opening a device alone takes 50 ms. See
+/// [`Engine::auto`].
 const MIN_ROTATIONS_FOR_DEVICE: usize = 1 << 20;
 
 const PROBE_TRACKS: usize = 512;
 const PROBE_FRAMES: usize = 1024;
 
-/// A workload that measures how fast a device is: 2^19 rotations.
+/// A set for measuring a device: 2^19 rotations are evaluated from it.
 #[allow(clippy::disallowed_methods)] // nobody sees the results
 fn probe() -> Result<TrackSet, Error> {
     let last = (PROBE_FRAMES - 1) as f64;
@@ -32,8 +32,8 @@ fn probe() -> Result<TrackSet, Error> {
     Ok(TrackSet::from_shared_times(times, keys)?)
 }
 
-/// Under what the probe of a device's model is remembered: it is another with another driver, or another
-/// version of the engine.
+/// The name under which the probe time of a device's model is cached. It depends on the driver and on the version of
+/// the engine. `None` for the CPU.
 fn model(device: &Device) -> Option<String> {
     let Device::Vulkan(device) = device else {
         return None;
@@ -50,15 +50,15 @@ fn model(device: &Device) -> Option<String> {
     Some(format!("probe-{vendor:x}-{number:x}-{software:016x}"))
 }
 
-/// How long a model took, if that is known.
+/// The cached probe time of a model.
 fn remembered(cache: &Cache, model: &str) -> Option<Duration> {
     let nanoseconds = cache.read(model, size_of::<u64>())?.try_into().ok()?;
     Some(Duration::from_nanos(u64::from_le_bytes(nanoseconds)))
 }
 
 impl Engine {
-    /// The device that evaluates large results fastest: the default where nothing speaks for a
-    /// certain device. It is [`Engine::auto_for`] with more rotations than any result has.
+    /// Opens the device that evaluates large results fastest. It is the default when there is no reason for a certain
+    /// device, and the same as [`Engine::auto_for`] with a very large number of rotations.
     ///
     /// ```
     /// let engine = tumble::Engine::auto()?;
@@ -67,25 +67,24 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the system refuses what the CPU needs.
+    /// When the system refuses the resources of the CPU engine.
     pub fn auto() -> Result<Self, Error> {
         Self::auto_for(usize::MAX)
     }
 
-    /// The device that evaluates calls of `rotations` rotations each fastest, into the host's
-    /// memory. All devices give the same bits, so the choice shows in nothing but the time. The
-    /// rule:
+    /// Opens the device that is fastest if each call evaluates `rotations` rotations into the host's memory. All
+    /// devices give the same bits, so only the time depends on the choice. The rule:
     ///
-    /// * fewer than 2^20 rotations: the CPU. It has done them before a device is even open.
-    /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) never: they compute on
-    ///   the CPU too, and slower.
-    /// * Else every device that is exact, and the CPU, evaluate a probe of 2^19 rotations; what
-    ///   counts is the shortest of three times. That of a model of card with its driver is remembered
-    ///   in the user's cache directory (`TUMBLE_CACHE_DIR`, else the system's; empty: nothing is
-    ///   remembered), so that later processes open the fastest alone.
+    /// * For fewer than 2^20 rotations: the CPU, which evaluates them before a device is even open.
+    /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) are never chosen: they compute on the
+    ///   CPU too, and are slower.
+    /// * Otherwise every exact device and the CPU evaluate a probe of 2^19 rotations, and the shortest of three times
+    ///   counts. The time of a card's model with its driver is stored in the user's cache directory, so that later
+    ///   processes open only the fastest device. `TUMBLE_CACHE_DIR` names another directory; if it is empty, nothing
+    ///   is stored.
     ///
     /// # Errors
-    /// When the system refuses what the CPU needs.
+    /// When the system refuses the resources of the CPU engine.
     pub fn auto_for(rotations: usize) -> Result<Self, Error> {
         let cpu = Self::new(Device::Cpu)?;
         if rotations < MIN_ROTATIONS_FOR_DEVICE {
@@ -128,13 +127,14 @@ impl Engine {
         Ok(engines.next().unwrap_or(cpu))
     }
 
-    /// How long this engine takes to evaluate a probe of 2^19 rotations: the shortest of three
-    /// times, after one that does not count. Making and uploading the probe is not timed.
-    /// [`Engine::auto_for`] compares devices by it. The four evaluations count in
-    /// [`Engine::take_timings`].
+    /// Measures how long this engine takes to evaluate a probe of 2^19 rotations: the shortest of three times, after
+    /// one that is ignored.
+    ///
+    /// Making and uploading the probe is not timed. [`Engine::auto_for`] compares devices by this time. The four
+    /// evaluations are included in [`Engine::take_timings`].
     ///
     /// # Errors
-    /// When the device fails, or there is no memory for the probe.
+    /// When the device fails, or there is not enough memory for the probe.
     pub fn probe_time(&self) -> Result<Duration, Error> {
         let clip = self.upload(&probe()?, SLERP)?;
         let mut output = OutputBuffer::new(PROBE_TRACKS * PROBE_FRAMES)?;

@@ -1,4 +1,4 @@
-//! The engine: sets go in, clips stay on its device, rotations come out.
+//! The engine: it evaluates sets, or clips that stay on its device, and returns rotations.
 
 #[cfg(feature = "vulkan")]
 mod application_device;
@@ -36,7 +36,7 @@ use crate::threads::lock;
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// The most worker threads that can be asked for.
+/// The maximum number of worker threads.
 const MAX_THREADS: usize = 1024;
 
 /// Evaluates sets on one device.
@@ -57,8 +57,8 @@ const MAX_THREADS: usize = 1024;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// Cloning is cheap; clones share the device. Calls from several threads are
-/// allowed; a Vulkan device serves them one after another.
+/// Clones are cheap and share the device. Several threads may call an engine; a Vulkan device serves the calls one
+/// after another.
 #[derive(Clone)]
 pub struct Engine {
     pub(crate) backend: Arc<Backend>,
@@ -68,7 +68,7 @@ impl Engine {
     /// Opens a device with the default options.
     ///
     /// # Errors
-    /// When the device cannot be opened, or fails the self-test.
+    /// As [`Engine::with_options`].
     pub fn new(device: Device) -> Result<Self, Error> {
         Self::with_options(device, &EngineOptions::default())
     }
@@ -84,9 +84,10 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the device cannot be opened, or fails the self-test and
-    /// [`EngineOptions::allow_inexact`] is off. Each kernel is checked when an evaluation first needs it, which
-    /// is refused with [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel) where it differs.
+    /// When the device cannot be opened, the options are out of range, or the device fails the self-test and
+    /// [`EngineOptions::allow_inexact`] is off. Each kernel is checked later, when an evaluation first needs it; if
+    /// it differs from the CPU, that evaluation fails with
+    /// [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel).
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit()?;
         match device {
@@ -117,19 +118,19 @@ impl Engine {
         }
     }
 
-    /// The name of its device: the driver's, or `CPU`.
+    /// The name of the device: the driver's name for it, or `CPU`.
     #[must_use]
     pub fn device_name(&self) -> &str {
         self.device_info().map_or("CPU", |info| &info.name)
     }
 
-    /// What is known of its Vulkan device; `None` on the CPU.
+    /// Name, kind and limits of the Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
         self.backend.opened().map(|opened| &opened.info)
     }
 
-    /// What Vulkan reports of its device; `None` on the CPU.
+    /// All details that Vulkan reports of the device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn device_details(&self) -> Option<DeviceDetails> {
@@ -137,15 +138,15 @@ impl Engine {
         Some(opened.engine().device.physical.details())
     }
 
-    /// What was chosen for its device; `None` on the CPU.
+    /// The engine's choices for its device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn choices(&self) -> Option<EngineChoices> {
         Some(self.backend.opened()?.engine().choices())
     }
 
-    /// The results of the device's self-test as it was opened, one report for each expression; empty on the
-    /// CPU, which devices are compared with.
+    /// The results of the self-test that ran when the device was opened, one report for each expression; empty on the
+    /// CPU, with which devices are compared.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
         self.backend
@@ -153,11 +154,13 @@ impl Engine {
             .map_or(&[], |opened| &opened.self_tests)
     }
 
-    /// Compiles every kernel, one after the other, and says how long the driver took, with its caches as they
-    /// are. `each` gets the name and the time, and goes on while it returns true. Nothing is kept.
+    /// Compiles every kernel, one after the other, and calls `each` with its name and the time that the driver took.
+    ///
+    /// The driver's caches are used as they are, and the compiled kernels are not kept. Compilation continues while
+    /// `each` returns true. On the CPU, `each` is not called.
     ///
     /// # Errors
-    /// When the device fails. On the CPU there is nothing to compile.
+    /// When the device fails.
     #[cfg(feature = "prove")]
     pub fn compile_kernels(
         &self,
@@ -169,10 +172,12 @@ impl Engine {
         Ok(opened.engine().compile_kernels(each)?)
     }
 
-    /// Runs every kernel of the table on the device beside its twin on the CPU, and compares every bit: small
-    /// inputs, ordinary ones and hostile ones. Evaluations check each kernel by itself when they first need it,
-    /// unless it is known to be exact on this device, from this process or an earlier one; this checks all of
-    /// them whatever is known. A kernel that differs is no error here. Empty on the CPU.
+    /// Compares every kernel on the device with its twin on the CPU, bit by bit, for small, ordinary and extreme
+    /// inputs.
+    ///
+    /// Evaluations check each kernel when they first need it, unless it is known from this process or an earlier one
+    /// to be exact on this device; this function checks all kernels. A kernel that differs is reported and is not an
+    /// error. Empty on the CPU.
     ///
     /// # Errors
     /// When the device fails.
@@ -180,8 +185,7 @@ impl Engine {
         self.kernel_checks(false)
     }
 
-    /// As [`Engine::check_kernels`], one kernel after the other: `each` gets the check, and goes on while it
-    /// returns true.
+    /// As [`Engine::check_kernels`], with a call of `each` after every kernel; continues while `each` returns true.
     ///
     /// # Errors
     /// When the device fails.
@@ -196,7 +200,7 @@ impl Engine {
         Ok(opened.engine().check_kernels(false, each)?)
     }
 
-    /// As [`Engine::check_kernels`], but for the kernels that are known to be exact on this device, which are
+    /// As [`Engine::check_kernels`], without running the kernels that are known to be exact on this device; they are
     /// listed as [`remembered`](KernelCheck::remembered).
     ///
     /// # Errors
@@ -205,8 +209,8 @@ impl Engine {
         self.kernel_checks(true)
     }
 
-    /// The kernels that the device may be given, without running any: those that are known to be exact on it are
-    /// [`remembered`](KernelCheck::remembered), and of the others nothing was compared. Empty on the CPU.
+    /// Lists the kernels for this device without running any. Kernels that are known to be exact on it are
+    /// [`remembered`](KernelCheck::remembered); for the others no values were compared. Empty on the CPU.
     #[must_use]
     pub fn known_kernels(&self) -> Vec<KernelCheck> {
         let known = |opened: &Opened| opened.engine().known_kernels();
@@ -226,8 +230,8 @@ impl Engine {
         Ok(checks)
     }
 
-    /// Runs the expressions of the self-test without what forbids the driver to compute them otherwise, to see that
-    /// the comparison finds a driver that does. `None` on the CPU.
+    /// Runs the self-test's expressions without the decorations that forbid the driver to change them, to show that
+    /// the comparison detects such changes. `None` on the CPU.
     ///
     /// # Errors
     /// When the device fails.
@@ -248,21 +252,22 @@ impl Engine {
         self.backend.opened().map_or_else(Vec::new, messages)
     }
 
-    /// Where the time of this engine's evaluations went since this was last asked,
-    /// or since it was opened; nothing on the CPU.
+    /// Returns the times of this engine's evaluations since the last call, or since the engine was opened; zero on
+    /// the CPU.
     #[must_use]
     pub fn take_timings(&self) -> Timings {
         let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
         self.backend.opened().map_or_else(Timings::default, timings)
     }
 
-    /// Prepares a set for a method and brings it to the device, where it stays. Where that would take more than
-    /// [`EngineOptions::memory`], the clip has the keys instead, and each evaluation prepares them piece by
-    /// piece: the same bits, but slower.
+    /// Prepares a set for a method and stores it on the device as a clip.
+    ///
+    /// If the prepared set would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
+    /// evaluation prepares them piece by piece: slower, with the same bits.
     ///
     /// # Errors
-    /// When a track cannot be interpolated as asked, or there is not the memory;
-    /// [`Engine::evaluate`] works through such a set piece by piece.
+    /// When a track cannot be interpolated as requested, there is not enough memory, or the device fails.
+    /// [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
     pub fn upload(
         &self,
         set: &TrackSet,
@@ -272,10 +277,11 @@ impl Engine {
         Ok(Clip::new(self.clone(), uploaded))
     }
 
-    /// A request for the samples that `frames` means, of a set that need not be uploaded: of all tracks, track by
-    /// track, as values of four f32, unless it says otherwise. Only what the samples need is prepared. On a Vulkan
-    /// device a set larger than its memory (or than [`EngineOptions::memory`]) goes through it some tracks at a
-    /// time.
+    /// Starts a request for the samples of a set at the times of `frames`. The set need not be uploaded.
+    ///
+    /// By default the result has all tracks, track by track, with four f32 a value. Only the segments that the
+    /// samples need are prepared. On a Vulkan device a set larger than its memory (or than [`EngineOptions::memory`])
+    /// is evaluated some tracks at a time.
     ///
     /// ```
     /// # use glam::{Quat, Vec4};
@@ -299,12 +305,11 @@ impl Engine {
         Request::of_set(self, set, interpolation.into(), frames)
     }
 
-    /// Prepares and evaluates in one go, `[track][frame]`: short for
-    /// [`request`](Engine::request)`(set, interpolation, frames).`[`evaluate`](Request::evaluate)`()`.
+    /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolation,
+    /// frames).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
-    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when the quantity is a velocity or an
-    /// acceleration.
+    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when the quantity is a velocity or an acceleration.
     pub fn evaluate(
         &self,
         set: &TrackSet,
@@ -314,12 +319,12 @@ impl Engine {
         self.request(set, interpolation, frames).evaluate()
     }
 
-    /// The angular velocity or acceleration of every track at every sample, as
-    /// [`Interpolation::quantity`] says: short for [`request`](Engine::request)`(set, interpolation,
+    /// Evaluates the angular velocity or acceleration ([`Interpolation::quantity`]) of every track at every sample.
+    /// Short for [`request`](Engine::request)`(set, interpolation,
     /// frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
-    /// As [`Engine::evaluate`]; also when the quantity is the rotation.
+    /// As [`Engine::evaluate`], but the quantity must not be the rotation.
     #[doc(alias = "angular velocity")]
     #[doc(alias = "angular acceleration")]
     pub fn rates(
@@ -347,16 +352,19 @@ impl Engine {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// Into memory of the result's type: short for [`request`](Engine::request)`(set, interpolation,
-    /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which takes
-    /// memory of any type. [`Quat`](glam::Quat) takes rotations, [`Vec4`](glam::Vec4) velocities and accelerations,
-    /// `[f32; 4]` either. It is faster when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)):
-    /// the first touch of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
-    /// without a copy.
+    /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
+    /// velocities and accelerations, or `[f32; 4]` for both. Short for [`request`](Engine::request)`(set,
+    /// interpolation,
+    /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which
+    /// accepts memory of any type.
+    ///
+    /// Reuse the memory: the first access to fresh memory takes longer than the evaluation
+    /// ([`OutputBuffer`](crate::output::buffer::OutputBuffer)). Memory that is aligned to 16 bytes is filled without
+    /// a copy.
     ///
     /// # Errors
-    /// As [`Engine::upload`] and [`Clip::evaluate`]; also when `output` is not exactly as long as the
-    /// result, or of another type.
+    /// As [`Engine::upload`] and [`Clip::evaluate`], but for any quantity; also when `output` is not exactly as long
+    /// as the result, or its type does not fit the quantity.
     pub fn evaluate_into<R: OutputValue>(
         &self,
         set: &TrackSet,
@@ -370,9 +378,11 @@ impl Engine {
             .evaluate_values_into(output)
     }
 
-    /// Compiles the kernels for results of these, which a Vulkan device else does when the first of them
-    /// is asked for: some milliseconds each, on some drivers seconds. What was compiled is kept for later
-    /// processes. The CPU has nothing to compile.
+    /// Compiles the kernels for results of this interpolation and encoding, which takes some milliseconds for each,
+    /// on some drivers seconds.
+    ///
+    /// Without this call, a Vulkan device compiles them at the first such request. Compiled kernels are cached for
+    /// later processes. The CPU does nothing.
     ///
     /// ```
     /// # use tumble::{Device, Encoding, Engine, method};
@@ -382,7 +392,7 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the encoding is for rotations and the quantity is another, or the device fails.
+    /// When the encoding is for rotations and the quantity is a velocity or an acceleration, or the device fails.
     pub fn warm(
         &self,
         interpolation: impl Into<Interpolation>,
@@ -396,8 +406,8 @@ impl Engine {
         }
     }
 
-    /// Describes in words how a set would be evaluated: whether it is prepared, and in what
-    /// pieces. All routes give the same bits.
+    /// Describes in words how a set would be evaluated: whether it is prepared, and in which pieces. All routes give
+    /// the same bits.
     ///
     /// # Errors
     /// When the frames do not fit the set.

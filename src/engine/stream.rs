@@ -1,5 +1,5 @@
-//! Results of sets, in chunks or some tracks at a time: for results larger than memory, for iterators, and for those
-//! who want to stop in between.
+//! Results of sets in chunks or some tracks at a time: for results larger than memory, for iterators, and for work
+//! that can be stopped between chunks.
 
 use glam::Quat;
 
@@ -18,8 +18,8 @@ use crate::stream::{Chunk, run};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// Segments that are prepared before the first chunk, where the engine's options have no limit; more are prepared
-/// piece by piece.
+/// The limit of the segments that are prepared before the first chunk, if the engine's options have no limit; more
+/// segments are prepared piece by piece.
 const SEGMENT_BYTES: usize = 256 << 20;
 
 impl Engine {

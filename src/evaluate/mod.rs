@@ -1,14 +1,15 @@
-//! From a set to its rotations: the choice of a route, and its execution on the CPU or a Vulkan device.
+//! Evaluation of sets: the choice of a route, and its execution on the CPU or a Vulkan device.
 //!
-//! Every route gives the same bits; they differ in what they prepare and keep. Of a set with fewer samples than keys
-//! most of what is prepared would never be used, and a set larger than memory cannot be prepared as a whole.
+//! Every route gives the same bits; routes differ in the segments that they prepare and keep. If a set has fewer
+//! samples than keys, most prepared segments would never be used, and a set larger than memory cannot be prepared as
+//! a whole.
 //!
-//! * [`Backend`]: what an engine evaluates on. It chooses a [`SetRoute`] once for a call, and follows it: straight
-//!   from keys, the intervals with a sample alone, batches in a thread's cache, or clips.
-//! * [`Uploaded`]: prepared tracks, and their segments on a device: what a clip is. After a device
-//!   was lost they are uploaded again.
-//! * [`SetPieces`]: a set whose segments exceed the memory budget; a window of its result is halved
-//!   until the segments of each half fit.
+//! * [`Backend`]: the CPU or a Vulkan device. It chooses a [`SetRoute`] for each call: directly from keys, only the
+//!   intervals with a sample, batches in a thread's cache, or clips.
+//! * [`Uploaded`]: prepared tracks, and their segments on a device, for clips. After a device was lost they are
+//!   uploaded again.
+//! * [`SetPieces`]: a set whose segments exceed the memory budget. A window of its result is halved until the
+//!   segments of each half fit.
 
 pub(crate) mod uploaded;
 
@@ -39,7 +40,7 @@ use crate::simd::dispatch::VectorWidth;
 use crate::threads::{on_threads, stop};
 use crate::time::frames::Ticks;
 
-/// What an engine evaluates on.
+/// The device of an engine.
 pub(crate) enum Backend {
     Cpu(CpuEngine),
     Vulkan(Box<Opened>),
@@ -68,34 +69,34 @@ impl Backend {
     }
 }
 
-/// The average number of keys of a track up to which batches serve a set whose tracks must not be
-/// cut: with longer tracks, too few threads would have work.
+/// The maximum average number of keys of a track for batches of a set whose tracks must not be divided: with longer
+/// tracks, too few threads would have work.
 const LONG_TRACK: usize = 16 * 1024;
 
-/// Key intervals that are prepared for one sample that stands alone, and as many again for what it costs
-/// to find them one by one: with fewer keys for each sample, preparing all takes no longer.
+/// The number of key intervals that are prepared for one separate sample, plus the same number for the time to find
+/// them. With fewer keys for each sample, preparing all intervals takes no longer.
 const KEYS_OF_A_SAMPLE: usize = 8;
 
-/// The same where the velocities at the keys of a whole window of the track are solved for.
+/// The same number for methods that solve equations for the velocities at the keys of a whole window of the track.
 const KEYS_OF_A_SOLUTION: usize = 2048;
 
-/// How a set becomes rotations.
+/// The route on which a set is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SetRoute {
-    /// Every sample straight from the keys beside it.
+    /// Every sample is evaluated directly from the keys next to it.
     FromKeys(KeyCurve),
     /// In batches: a thread of the CPU prepares some intervals, evaluates them while their
     /// segments are in its cache, and forgets them.
     Batches {
-        /// Whether a long track may be cut into several.
+        /// Whether a long track may be divided into several parts.
         cuts_tracks: bool,
     },
     /// On the CPU: only the key intervals that have a sample are prepared.
     SparseSamples,
-    /// The segments of all tracks are prepared before the first is evaluated. A Vulkan device
-    /// takes as many tracks at a time as it has memory for.
+    /// The segments of all tracks are prepared before the first is evaluated. A Vulkan device processes as many
+    /// tracks at a time as fit its memory.
     Clips {
-        /// Whether a track that exceeds that memory may be cut.
+        /// Whether a track that exceeds that memory may be divided.
         cuts_tracks: bool,
     },
 }
@@ -145,19 +146,19 @@ impl Backend {
 }
 
 impl SetRoute {
-    /// Whether it is taken because there are few samples for many keys.
+    /// Whether the route is for few samples of many keys.
     pub(crate) fn is_sparse(self) -> bool {
         matches!(self, Self::FromKeys(_) | Self::SparseSamples)
     }
 
-    /// Whether it gives rows, each with the samples of a track, whatever the layout of the result.
+    /// Whether the route computes rows, each with the samples of a track, regardless of the result's layout.
     pub(crate) fn is_of_rows(self) -> bool {
         !matches!(self, Self::Clips { .. })
     }
 }
 
-/// Whether there are so few samples for so many keys that only the intervals with a sample are worth
-/// preparing, and each of these can be prepared without the others.
+/// Whether there are so few samples for so many keys that only the intervals with a sample should be prepared, and
+/// each of these can be prepared without the others.
 fn has_sparse_samples(request: &SetRequest<'_>) -> bool {
     let (tracks, interpolation) = (request.tracks.clone(), request.interpolation);
     let in_frames = matches!(request.timeline.ticks, Ticks::Frames { .. });
@@ -201,14 +202,14 @@ impl fmt::Display for SetRoute {
     }
 }
 
-/// Bytes of segments that a Vulkan device gets at once where a set has far more keys than samples.
+/// The size of segments that a Vulkan device gets at once if a set has far more keys than samples, bytes.
 const DENSE_BYTES: usize = 64 << 20;
 
 /// Rotations that one task searches for unresolved ones.
 const SEARCH_CHUNK: usize = 16 * 1024;
 
 impl Backend {
-    /// Evaluates a set; the result stays in memory of the device where that saves a copy.
+    /// Evaluates a set; the result stays in the device's memory if that saves a copy.
     pub(crate) fn evaluate(
         self: &Arc<Self>,
         request: &SetRequest<'_>,
@@ -294,9 +295,9 @@ impl Backend {
         }
     }
 
-    /// Cuts tracks into batches whose segments fit the device's memory budget. Where keys are far
-    /// more than samples a batch has at most 64 MiB, and each uses the buffers of the one before:
-    /// fresh memory for all segments would cost more than preparing them.
+    /// Divides tracks into batches whose segments fit the device's memory budget. If there are far more keys than
+    /// samples, a batch has at most 64 MiB, and each uses the buffers of the previous one: fresh memory for all
+    /// segments would take longer than preparing them.
     fn clips(&self, request: &SetRequest<'_>, cuts_tracks: bool) -> VecDeque<Batch> {
         let (set, timeline) = (request.set, request.timeline);
         let whole = Batch::Tracks(request.tracks.clone());
@@ -391,7 +392,7 @@ impl Backend {
     }
 }
 
-/// Evaluates a job straight from keys, and on the CPU what the device left unresolved.
+/// Evaluates a job directly from keys, and on the CPU the samples that the device marked as unresolved.
 fn evaluate_from_keys(
     opened: &Opened,
     job: &KeyJob<'_>,

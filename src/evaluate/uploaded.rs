@@ -1,4 +1,4 @@
-//! Prepared tracks, on what an engine evaluates on.
+//! Prepared tracks on an engine's device.
 
 pub(crate) mod pieces;
 
@@ -29,19 +29,19 @@ use crate::tracks::set::TrackSet;
 pub(crate) struct Uploaded {
     backend: Arc<Backend>,
     pub(crate) data: ClipData,
-    /// Uploaded again after the device was lost.
+    /// The segments on the device, which are uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
     uploading: Exclusive<()>,
-    /// What a device reads of samples that were asked for before.
+    /// The lists that a device reads for samples that were requested before.
     lists: ListCache,
-    /// The set, where its segments would take more memory than the engine may use, with how much that is: then
-    /// nothing is prepared before it is evaluated.
+    /// The set and the size of its segments, if they exceed the engine's memory limit; then nothing is prepared
+    /// before the evaluation.
     in_pieces: Option<(TrackSet, usize)>,
 }
 
 impl Uploaded {
-    /// Prepares what is wanted of a set, and uploads it where the device is Vulkan's. The buffers
-    /// of `spare`, which are no longer needed, are used again where they are large enough.
+    /// Prepares the requested tracks of a set, and uploads them to a Vulkan device. The buffers of `spare`, which are
+    /// no longer needed, are reused if they are large enough.
     pub(crate) fn new(
         backend: &Arc<Backend>,
         set: &TrackSet,
@@ -72,7 +72,7 @@ impl Uploaded {
         })
     }
 
-    /// All of a set, for any timeline; in pieces where it would take more memory than the engine may use.
+    /// Prepares a whole set, for any timeline; in pieces if its segments exceed the engine's memory limit.
     pub(crate) fn whole(
         backend: &Arc<Backend>,
         set: &TrackSet,
@@ -93,7 +93,7 @@ impl Uploaded {
         })
     }
 
-    /// The timeline as [`Uploaded::evaluate_into`] takes it.
+    /// The timeline in the form that [`Uploaded::evaluate_into`] requires.
     pub(crate) fn folded<'t>(
         &self,
         timeline: &'t Timeline,
@@ -124,7 +124,7 @@ impl Uploaded {
         pieces.evaluate_into(window, output)
     }
 
-    /// The memory that the next clip can use: that of the segments, and their buffers on a device.
+    /// The memory that the next clip can reuse: that of the segments, and their buffers on a device.
     pub(crate) fn into_spare(self) -> (Vec<Prepared>, Option<ClipBuffers>) {
         let buffers = self.buffers.into_inner();
         let buffers = buffers.unwrap_or_else(PoisonError::into_inner);
@@ -154,8 +154,8 @@ impl Uploaded {
         }
     }
 
-    /// Evaluates a window of the result into `output`, encoded, which is exactly as long. Explicit
-    /// times must be folded into the keys already, as the wrap mode has it.
+    /// Evaluates a window of the result into `output`, in an encoding, with the same length. Explicit times must have
+    /// been folded into the time range of the keys by the wrap mode.
     pub(crate) fn evaluate_into(
         &self,
         timeline: &Timeline,
@@ -211,7 +211,7 @@ impl Uploaded {
         })
     }
 
-    /// The segments on a device; uploaded again where it is not the device that had them.
+    /// The segments on a device; they are uploaded again if the device was replaced.
     fn buffers_on(&self, engine: &VulkanEngine) -> Result<Arc<ClipBuffers>, VulkanError> {
         let there = |buffers: &Option<Arc<ClipBuffers>>| {
             let there = buffers.as_ref().filter(|there| engine.owns(there));

@@ -1,10 +1,9 @@
 //! Blocks of key intervals, and the numbers that methods compute for them. Each pass goes over the
 //! lanes in vectors and is compiled for every width.
 //!
-//! A lane is one key interval. Consecutive intervals of one track are a stretch; the lane on either
-//! side of it is context and has the neighbouring interval, so that no pass asks where a track
-//! ends. At the end of a track the context is empty; the method then sets the context or the
-//! handles by the `Ends` asked for.
+//! A lane is one key interval. Consecutive intervals of one track are a stretch; the lane on each side of it is
+//! context and contains the neighbouring interval, so that passes need not know where a track ends. At the end of a
+//! track the context is empty; then the method sets the context or the handles according to the requested `Ends`.
 
 use std::ops::Range;
 
@@ -19,13 +18,13 @@ use crate::tracks::signs::Signs;
 /// The number of lanes in a block.
 pub(crate) const LANES: usize = 128;
 
-/// The length of a block's arrays: passes read one lane further and end on whole vectors.
+/// The length of a block's arrays: passes read one lane more, and end at whole vectors.
 pub(crate) const ROW_LEN: usize = LANES + 8;
 
 /// One number for each interval.
 pub(crate) type RowF64 = [f64; ROW_LEN];
 
-/// The lanes of context that a stretch needs beside those of its intervals.
+/// The number of lanes of context for a stretch, in addition to those of its intervals.
 pub(crate) const CONTEXT: usize = 2;
 
 /// Some consecutive intervals of a track in a block.
@@ -38,15 +37,15 @@ pub(crate) struct TrackStretch {
     pub(crate) intervals: Range<usize>,
     /// The number of intervals of the whole track.
     pub(crate) track_intervals: usize,
-    /// When the whole track starts and ends, seconds.
+    /// The start and the end of the whole track, seconds.
     pub(crate) span: (f64, f64),
     /// Its index among the prepared parts.
     pub(crate) part: usize,
     /// The index of its first key among the constants; [`NONE`] if the curve does not pass through
     /// its keys.
     pub(crate) first_key: u32,
-    /// The index of its first key among the constants if the track's first and last interval stand
-    /// still, else [`NONE`]; set even if the curve does not pass through its keys.
+    /// The index of its first key among the constants if the track's first and last interval are constant, else
+    /// [`NONE`]; it is set even if the curve does not pass through its keys.
     pub(crate) first_still_key: u32,
 }
 
@@ -89,12 +88,10 @@ pub(crate) struct Intervals {
     pub(crate) steps: [RowF64; 4],
     /// Its logarithm.
     pub(crate) logs: [RowF64; 3],
-    /// Handles at the key that the interval starts with, towards the interval before
-    /// it and towards this one.
+    /// Handles at the first key of the interval: in the interval before it, and in this one.
     pub(crate) incoming: [RowF64; 3],
     pub(crate) outgoing: [RowF64; 3],
-    /// The method's own numbers for the key at the interval's start, and (one lane further) for the
-    /// key at its end.
+    /// The method's numbers for the key at the interval's start, and (one lane further) for the key at its end.
     pub(crate) outward: [RowF64; 4],
     pub(crate) inward: [RowF64; 4],
     /// The numbers that the curve's formula takes.
@@ -104,7 +101,7 @@ pub(crate) struct Intervals {
 }
 
 impl Intervals {
-    /// An empty block, for curves whose formula takes this many numbers that differ from curve to curve.
+    /// An empty block, for curves whose formula takes `numbers` numbers that differ from curve to curve.
     pub(crate) fn new(numbers: usize) -> Self {
         let lane = [0.0; ROW_LEN];
         let identity = [0.0, 0.0, 0.0, 1.0];
@@ -126,8 +123,7 @@ impl Intervals {
         }
     }
 
-    /// Adds some intervals of a track, whose keys count with these signs; the block must have room
-    /// for them.
+    /// Adds some intervals of a track, with these signs of its keys; the block must have room for them.
     pub(crate) fn push(&mut self, track: Track, signs: Signs<'_>, intervals: Range<usize>) {
         let lanes = self.count..self.count + intervals.len();
         let Range { start, end } = intervals;

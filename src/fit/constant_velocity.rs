@@ -1,6 +1,6 @@
-//! Twin of `shaders/from_keys/constant_velocity.wgsl`, one component at a time: arcs as
-//! polynomials. A smooth method joins a track's only two keys by such an arc. Its coefficients are
-//! Taylor's series of sine and cosine about the middle; nothing is sampled and fitted.
+//! Twin of `shaders/from_keys/constant_velocity.wgsl`, one component at a time: arcs as polynomials. In smooth
+//! methods, a track of only two keys is such an arc. Its coefficients are the Taylor series of sine and cosine at the
+//! middle; nothing is sampled or fitted.
 
 use glam::Vec4;
 
@@ -30,7 +30,7 @@ pub(crate) fn arc_component<N: Number>(middle: N, tangent: N, square: N) -> [N; 
     coefficients
 }
 
-/// The arc between two keys, the second in the sign nearer to the first.
+/// The arc between two keys; the second key's sign is the one nearer to the first.
 pub(crate) fn arc_polynomial([from, to]: [[f32; 4]; 2]) -> PolynomialSegment {
     let (middle, tangent) = arc_between(from, to);
     let square = Vec4::splat(norm_squared(tangent));

@@ -1,21 +1,19 @@
-//! Turns key intervals into the coefficients of segments, many intervals at once in vector lanes.
-//! The methods are built on this folder; it knows none of them. `prepare` applies methods to
-//! tracks.
+//! Conversion of key intervals to the coefficients of segments, many intervals at once in vector lanes. This module
+//! does not depend on the methods, which are defined with it. `prepare` applies methods to tracks.
 //!
-//! # Two ways
+//! # Two kinds of fitting
 //!
-//! A segment is a polynomial in f32 for each component of a rotation. It is found in one of two ways:
+//! A segment is a polynomial in f32 for each component of a rotation. It is computed in one of two ways:
 //!
-//! - [`exact`], in f64, serves every method, angle and quantity. A curve is evaluated by its formula at
-//!   Chebyshev nodes; the polynomial through these values is kept if its last coefficients show that it
-//!   is near enough, else the curve is cut in two.
-//! - [`fast`], in f32, serves rotations by methods whose curve follows from four keys. Small angles
-//!   are a series, longer curves a Hermite fit of the whole or of two halves. On motion capture it takes
-//!   a sixth of the time (`dense`: 444 → 67 ms). It says of each lane whether its numbers are valid;
-//!   the others go the exact way.
+//! - [`exact`], in f64, works for every method, angle and quantity. A curve is evaluated by its formula at Chebyshev
+//!   nodes. If the last coefficients of the polynomial through these values show that it is near enough, it is kept;
+//!   otherwise the curve is divided into two.
+//! - [`fast`], in f32, works for rotations by methods whose curves depend on four keys. Small angles are a series,
+//!   longer curves a Hermite fit of the whole curve or of two halves. For motion capture it takes a sixth of the time
+//!   (`dense`: 444 → 67 ms). It marks the lanes whose numbers are not valid; these are fitted by [`exact`].
 //!
-//! Which of the two an interval takes depends on its keys and on the options alone, never on the vector
-//! width or on what else is in its block: every machine finds the same bits.
+//! The choice for an interval depends only on its keys and on the options, never on the vector width or on other
+//! intervals of its block: every machine computes the same bits.
 //!
 //! # Types
 //!
@@ -31,7 +29,7 @@
 //! | [`exact::fit::IntervalCurve`] | one curve by its formula, in f64 |
 //! | [`nodes::Nodes`] | where curves are sampled, and how powers follow from the samples |
 //!
-//! # From a key to its stored curve
+//! # Steps
 //!
 //! ```text
 //! keys ─► Intervals ─┬─ fast: steps ─► small angles: a series ──────────────────► segment
@@ -43,9 +41,9 @@
 //!
 //! # Memory
 //!
-//! A block has a row for each number of an interval, [`block::ROW_LEN`] lanes long, so that a vector is one
-//! load whatever its width. On either side of a stretch lies the neighbouring interval as context: passes
-//! read a lane before and after theirs, and none asks where a track ends. All rows take about 50 KB.
+//! A block has a row for each number of an interval, [`block::ROW_LEN`] lanes long, so that a vector of any width is
+//! one load. The neighbouring intervals are next to a stretch as context: passes read a lane before and after theirs,
+//! and need not know where a track ends. All rows take about 50 KB.
 //!
 //! ```text
 //! lane        0        1 2 … n        n+1      n+2      n+3 … m        m+1

@@ -1,16 +1,16 @@
-//! The nodes at which curves are sampled, and how the coefficients of powers follow from the
-//! samples: Newton's divided differences. Both ways of fitting end here.
+//! The nodes at which curves are sampled, and the computation of the coefficients from the samples by Newton's
+//! divided differences. Both kinds of fitting use it.
 //!
-//! One node is the middle, which the polynomial meets exactly; the others enter as differences from it,
-//! for which f32 is precise enough. Divided differences come first and powers last, which keeps the
-//! rounding errors of f32 small.
+//! One node is the middle, which the polynomial meets exactly; the other samples are differences from it, for which
+//! f32 is precise enough. Divided differences are computed first and powers last, which keeps the rounding errors of
+//! f32 small.
 
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::lanes::{Lanes, canonical};
 
-/// Pairs of nodes at `-s` and `s`, by their `s`; the middle, s = 0, is always one more node. If the
-/// first `s` is 0, the first and the second derivative at the middle are known too. If the last `s`
-/// is there twice, the first derivatives at `-s` and `s` are known too.
+/// Pairs of nodes at `-s` and `s`, by their `s`; the middle, s = 0, is always an additional node. If the first `s` is
+/// 0, the first and the second derivative at the middle are known too. If the last `s` occurs twice, the first
+/// derivatives at `-s` and `s` are known too.
 pub(crate) struct Nodes<const PAIRS: usize> {
     /// The nodes in the order in which Newton's polynomials take them, which is chosen for small
     /// rounding errors in f32.

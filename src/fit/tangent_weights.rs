@@ -1,6 +1,5 @@
-//! Tangent weights: how the steps on both sides of a key count in its tangent, for curves that are
-//! prepared in f32 straight from keys. Only the weights depend on the key times; they are computed
-//! in f64.
+//! Tangent weights: the weights of the steps on both sides of a key in its tangent, for curves that are prepared in
+//! f32 directly from keys. Only the weights depend on the key times; they are computed in f64.
 
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, ROW_LEN, TrackStretch};
@@ -22,7 +21,7 @@ const SIXTH: f32 = 1.0 / 6.0;
 /// The largest ratio of two neighbouring durations for which the weights are valid.
 const MAX_DURATION_RATIO: f64 = 16.0;
 
-/// A key whose tangent f32 weights do not give.
+/// The weights of a key whose tangent cannot be computed with f32 weights.
 pub(crate) const UNKNOWN: TangentWeights = TangentWeights {
     before: 0.0,
     after: 0.0,

@@ -14,7 +14,7 @@ use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
-/// The most samples that are evaluated together.
+/// The maximum number of samples that are evaluated together.
 pub(crate) const LANES: usize = 64;
 
 /// The rotations that are still to be written.
@@ -25,8 +25,8 @@ pub(super) type OutputIter<'a> = std::slice::IterMut<'a, [f32; 4]>;
 pub(crate) struct TwoKeyBlock {
     /// Whether arcs are evaluated as polynomials.
     pub(crate) are_polynomials: bool,
-    /// The keys before and after each sample, with continued signs. A sample that is a key itself
-    /// has that key twice, with the sign that it was given.
+    /// The keys before and after each sample, with their signs for the shortest path. A sample at a key has that key
+    /// twice, with its original sign.
     pub(crate) from: [[f32; 4]; LANES],
     pub(crate) to: [[f32; 4]; LANES],
     pub(crate) parameters: [f32; LANES],
@@ -78,8 +78,8 @@ impl TwoKeyBlock {
     }
 }
 
-/// Vectors of arcs that are made before the first of them is evaluated. Making and evaluating one
-/// vector is a long chain of operations, and a processor looks ahead only a vector or two.
+/// The number of vectors of arcs that are computed before the first of them is evaluated. One vector is a long chain
+/// of dependent operations, and a processor looks ahead only a vector or two.
 const VECTORS: usize = 8;
 
 /// Arcs in vectors, one for each lane.
@@ -166,8 +166,7 @@ impl TwoKeyBlock {
     }
 }
 
-/// Samples of one track on arcs between keys that share one continued sign, evaluated straight
-/// into the result.
+/// Samples of one track on arcs between keys with the same sign, evaluated directly into the result.
 pub(crate) struct ArcRun<'a> {
     pub(crate) samples: &'a [KeySample],
     pub(crate) keys: &'a [[f32; 4]],

@@ -12,20 +12,20 @@ use crate::simd::lanes::Lanes;
 use crate::tracks::track_keys::SignedKeys;
 use crate::twin::small_angle::small_angle_cubic;
 
-/// Samples that are gathered to be evaluated together; they are consecutive in the result. A block of
-/// zeros is empty; lanes that no sample has are marked as held before it is evaluated.
+/// Samples that are collected and evaluated together; they are consecutive in the result. A block of zeros is empty;
+/// unused lanes are marked as held before the evaluation.
 #[derive(Zeroable)]
 pub(crate) struct CubicBlock {
-    /// The four keys around each sample, with continued signs. For a sample that is a key itself
-    /// the second is that key, with the sign that it was given.
+    /// The four keys around each sample, with their signs for the shortest path. For a sample at a key, the second
+    /// one is that key, with its original sign.
     pub(crate) keys: [[[f32; 4]; LANES]; 4],
     /// The tangent weights at the keys before and after each sample.
     pub(crate) weights: [[TangentWeights; LANES]; 2],
     pub(crate) parameters: [f32; LANES],
-    /// 1 where the sample is a key itself, else 0.
+    /// 1 if the sample is at a key, else 0.
     pub(crate) held: [f32; LANES],
     pub(crate) count: usize,
-    /// `UNRESOLVED` where the curve turns too far for the small-angle series.
+    /// The results; `UNRESOLVED` if the curve rotates too far for the small-angle series.
     pub(crate) rotations: [[f32; 4]; LANES],
     /// How many of the samples were unresolved.
     pub(crate) unresolved: usize,

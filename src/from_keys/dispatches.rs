@@ -1,6 +1,6 @@
-//! Sets with fewer samples than keys, cut into dispatches for a Vulkan device: some tracks at a time, and what a
-//! kernel reads of them: keys with their signs as they are stored, the positions of the samples among them, and the
-//! tangent weights.
+//! Division of sets with fewer samples than keys into dispatches for a Vulkan device: some tracks at a time, and the
+//! input of a kernel for them: keys with their stored signs, the positions of the samples among them, and the tangent
+//! weights.
 
 use std::iter::Peekable;
 use std::ops::Range;
@@ -26,16 +26,16 @@ use crate::time::times::key_sample;
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 
-/// The most rows of one dispatch; every Vulkan device allows as many workgroups along y.
+/// The maximum number of rows of one dispatch; every Vulkan device allows as many workgroups along y.
 const ROWS: usize = 65_535;
 
 /// Keys that one task writes.
 const TASK_KEYS: usize = 16 * 1024;
 
-/// What is to be evaluated.
+/// The samples to evaluate.
 pub(crate) struct KeyJob<'a> {
     pub(crate) request: &'a SetRequest<'a>,
-    /// The curves that its samples lie on.
+    /// The curves of its samples.
     pub(crate) curve: KeyCurve,
 }
 
@@ -48,8 +48,8 @@ impl<'a> KeyJob<'a> {
         }
     }
 
-    /// All keys of the set, where kernels can read them as they are stored. For cubics they
-    /// cannot, because weights are indexed like the keys of a dispatch.
+    /// All keys of the set, if kernels can read them as they are stored. For cubics they cannot, because weights have
+    /// the indices of a dispatch's keys.
     pub(crate) fn keys(&self) -> Option<&'a [Quat]> {
         self.weights().is_none().then_some(self.request.set.keys())
     }
@@ -62,7 +62,7 @@ impl<'a> KeyJob<'a> {
         }
     }
 
-    /// The keys among which the samples of a batch lie, of each of its tracks.
+    /// The keys of each track of a batch that its samples need.
     pub(crate) fn keys_of(&self, batch: &Batch) -> impl Iterator<Item = TrackKeys<'a>> {
         let (set, curve) = (self.request.set, self.curve);
         let tracks = batch.intervals(set);
@@ -71,9 +71,8 @@ impl<'a> KeyJob<'a> {
         })
     }
 
-    /// Its dispatches, which are consecutive in the result; `limit` is as in [`KeyDispatches::next`].
-    /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
-    /// velocity that is too large.
+    /// The dispatches of the job, which are consecutive in the result; `limit` is as in [`KeyDispatches::next`].
+    /// Refuses invalid ends: a loop whose first and last rotation differ, or a clamped velocity that is too large.
     pub(crate) fn dispatches(
         &self,
         limit: usize,
@@ -125,10 +124,10 @@ impl<'a> KeyJob<'a> {
     }
 }
 
-/// What one thread writes of a dispatch.
+/// The part of a dispatch that one thread writes.
 pub(crate) struct KeyTask {
     pub(crate) batch: Batch,
-    /// The samples that it has of each of its tracks: all, unless it has a single track.
+    /// The samples of each of its tracks: all, unless it has a single track.
     pub(crate) samples: Range<usize>,
     /// Keys of all its tracks.
     pub(crate) keys: usize,
@@ -141,14 +140,14 @@ impl KeyTask {
     }
 }
 
-/// What one dispatch evaluates.
+/// The input of one dispatch.
 pub(crate) struct KeyDispatch<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
     pub(crate) tasks: Vec<KeyTask>,
     /// The tracks that it has samples of.
     pub(crate) tracks: Range<usize>,
-    /// Number of rows. Tracks that share their key times are a row each, because their samples lie
-    /// at the same positions among their keys; other tracks together are one row.
+    /// Number of rows. Tracks that share their key times are a row each, because their samples have the same
+    /// positions among their keys; other tracks together are one row.
     pub(crate) rows: usize,
     pub(crate) keys: usize,
     /// Samples of one row; the kernel gets the position of each among the keys.
@@ -162,8 +161,8 @@ pub(crate) struct KeyDispatches<'a, 'j> {
 }
 
 impl<'a, 'j> KeyDispatches<'a, 'j> {
-    /// The next dispatch, of about `limit` keys and at most `limit` samples. Where windows were halved
-    /// since the tasks were cut, one task may have more.
+    /// The next dispatch, of about `limit` keys and at most `limit` samples. If windows were halved after the tasks
+    /// were made, one task may have more.
     pub(crate) fn next(&mut self, limit: usize) -> Option<KeyDispatch<'a, 'j>> {
         let SetRequest { set, timeline, .. } = *self.job.request;
         let (mut keys, mut samples) = (0, 0);
@@ -198,8 +197,8 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
 }
 
 impl KeyDispatch<'_, '_> {
-    /// Its rows; with `maps_samples` an invocation takes a sample of one, and neighbours begin to
-    /// store where a line of memory does.
+    /// The shape of its rows. With `maps_samples`, an invocation evaluates one sample, and neighbours start to store
+    /// at the start of a memory line.
     pub(crate) fn rows(&self, maps_samples: bool) -> RowShape {
         let (each, line) = match maps_samples {
             true => (1, LINE - 1),
@@ -237,8 +236,8 @@ impl KeyDispatch<'_, '_> {
         !self.job.request.set.signs_of(self.tracks.clone()).any()
     }
 
-    /// Writes what the kernel reads. Keys that it reads in imported memory, as they are stored and none
-    /// of them negated, are not written; `imported` is the index of the set's first key there.
+    /// Writes the kernel's input. Keys that are read in imported memory (as they are stored, if none is negated) are
+    /// not written; `imported` is the index of the set's first key there.
     pub(crate) fn write(
         &self,
         imported: Option<usize>,
@@ -334,8 +333,8 @@ impl KeyDispatch<'_, '_> {
         Ok(())
     }
 
-    /// Writes the positions of explicit times among the keys, which are as in [`Ticks::Times`]. This is a separate loop,
-    /// because a crowd has many tracks with one sample each.
+    /// Writes the positions of explicit times among the keys, which are as in [`Ticks::Times`]. This is a separate
+    /// loop, because a crowd has many tracks with one sample each.
     fn write_times(
         &self,
         task: &KeyTask,
@@ -376,19 +375,19 @@ struct Known<'p> {
     weights: Option<TrackWeights<'p>>,
 }
 
-/// What a task has still to write.
+/// The remaining output of a task.
 struct TaskBuffers<'w> {
     keys: &'w mut [[u32; 4]],
     samples: &'w mut [KeySample],
     weights: &'w mut [TangentWeights],
     /// The index of the next key among the dispatch's.
     next_key: usize,
-    /// The index of the set's first key in imported memory, where keys are read from there.
+    /// The index of the set's first key in imported memory, if keys are read there.
     imported: Option<usize>,
 }
 
 impl TaskBuffers<'_> {
-    /// The index of a track's key, which is the next one where keys are copied.
+    /// The index of a track's key; it is the next index if keys are copied.
     fn key_index(&self, set: &TrackSet, track: usize, key: usize) -> u32 {
         self.imported
             .map_or(self.next_key, |first| first + set.keys_of(0..track) + key) as u32

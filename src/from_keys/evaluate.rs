@@ -1,6 +1,5 @@
-//! Evaluates samples straight from keys, one in each lane, by the operations that preparing and
-//! evaluating segments would do, so with the same bits.
-//! Twin: `shaders/from_keys.wgsl`.
+//! Evaluation of samples directly from keys, one in each lane, with the operations of preparing and evaluating
+//! segments, and therefore with the same bits. Twin: `shaders/from_keys.wgsl`.
 
 use std::ops::Range;
 
@@ -51,8 +50,8 @@ impl<'a> KeyEvaluator<'a> {
         }
     }
 
-    /// Evaluates the samples of a batch that lie in `window`, `[track][sample]`; returns whether
-    /// all of them are resolved.
+    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`; returns whether all of them are
+    /// resolved.
     pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,
@@ -90,8 +89,8 @@ impl<'a> KeyEvaluator<'a> {
 }
 
 impl<'a> SampleBlock<'a> {
-    /// Evaluates whole vectors of samples between keys of one sign straight into the output, if they
-    /// lie on arcs. Returns the samples that are left.
+    /// Evaluates whole vectors of samples between keys of one sign directly into the output, if they are on arcs.
+    /// Returns the remaining samples.
     fn whole_vectors<'s>(
         &mut self,
         keys: TrackKeys<'_>,
@@ -142,7 +141,7 @@ impl<'a> SampleBlock<'a> {
         }
     }
 
-    /// Evaluates the samples that wait; returns whether all since the last call are resolved.
+    /// Evaluates the collected samples; returns whether all since the last call are resolved.
     fn flush(&mut self, output: &mut OutputIter<'_>) -> bool {
         match self {
             SampleBlock::TwoKeys(block) => {

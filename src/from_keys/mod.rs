@@ -1,5 +1,5 @@
-//! Evaluation straight from keys, for sets with fewer samples than keys: no segment is prepared,
-//! and an interval without samples costs no more than a look at its times.
+//! Evaluation directly from keys, for sets with fewer samples than keys: no segment is prepared, and for intervals
+//! without samples only the times are read.
 
 pub(crate) mod arcs;
 pub(crate) mod cubics;
@@ -13,8 +13,8 @@ use crate::shader::{Form, LONGEST_STEP};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// Stands for a sample whose curve turns too far for the small-angle series; no rotation is 0. The
-/// fallback then evaluates it by way of segments.
+/// The value of a sample whose curve rotates too far for the small-angle series; no rotation is 0. Such samples are
+/// then evaluated by segments.
 pub(crate) const UNRESOLVED: [f32; 4] = [0.0; 4];
 
 /// Curves that can be evaluated from the keys around a sample.
@@ -22,20 +22,20 @@ pub(crate) const UNRESOLVED: [f32; 4] = [0.0; 4];
 pub(crate) enum KeyCurve {
     /// Arcs between two keys.
     Arcs,
-    /// Tracks of two keys, which smooth methods join at constant velocity.
+    /// Tracks of two keys, which smooth methods interpolate with constant velocity.
     TwoKeys,
     /// Cubics between four keys.
     Cubics(WeightRule),
 }
 
 impl KeyCurve {
-    /// How many keys beside an interval's own two a sample needs on both sides.
+    /// The number of keys that a sample needs on each side, in addition to the two of its interval.
     pub(crate) fn beside(self) -> usize {
         usize::from(matches!(self, Self::Cubics(_)))
     }
 
-    /// The curves of a set that is evaluated from keys: it has fewer samples than keys, and its
-    /// curves are arcs, or cubics most of which turn through small angles. `None` for any other.
+    /// The curves of a set that can be evaluated from keys: it has fewer samples than keys, and its curves are arcs,
+    /// or cubics most of which have small angles. `None` for any other set.
     pub(crate) fn of_set(
         set: &TrackSet,
         interpolation: &Interpolation,
@@ -60,8 +60,8 @@ impl KeyCurve {
     }
 }
 
-/// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With
-/// fewer, preparing all segments takes no longer. Only speed depends on this, no bit does.
+/// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With fewer, preparing all
+/// segments takes no longer. Only speed depends on this; the bits do not.
 #[allow(clippy::disallowed_methods)] // as it says
 fn has_small_steps(set: &TrackSet) -> bool {
     const PROBES: usize = 64;

@@ -1,5 +1,5 @@
-//! Replaces Vulkan in a build without the feature `vulkan`: the names that the rest of
-//! the engine uses, of types that have no value. No device is ever listed, so none is ever opened.
+//! Replacement of Vulkan in a build without the feature `vulkan`: the names that the rest of the engine uses, with
+//! types that have no values. No device is listed, so none is opened.
 
 #[path = "cache.rs"]
 pub(crate) mod cache;
@@ -10,7 +10,7 @@ pub(crate) mod options;
 #[path = "reports.rs"]
 pub(crate) mod reports;
 
-/// There is none.
+/// A type without values.
 #[derive(Clone, Copy)]
 pub(crate) enum Never {}
 

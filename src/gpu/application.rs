@@ -1,7 +1,6 @@
-//! A device as an application makes it: an instance of Vulkan 1.1, one queue that computes, one that only
-//! copies where there is one, and buffers and commands of the application's. The proof of a device
-//! ([`verify::renderer`](crate::verify::renderer)) lets the engine work on it, and measures by its time
-//! stamps.
+//! A device as an application makes it: an instance of Vulkan 1.1, a queue that computes, a queue that only copies
+//! (if the device has one), and the application's buffers and commands. The proof of a device
+//! ([`verify::renderer`](crate::verify::renderer)) runs the engine on it, and measures with its time stamps.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,56 +12,56 @@ use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
 use crate::gpu::instance::Instance;
 use crate::gpu::physical::PhysicalDevice;
 
-/// The version of Vulkan that the application asks for.
+/// The Vulkan version that the application requests.
 const VERSION: u32 = vk::API_VERSION_1_1;
 
-/// Work that takes longer than this has hung.
+/// The time limit; work that takes longer has hung.
 const TIMEOUT_SECONDS: u64 = 60;
 
-/// An application's device, destroyed with it.
+/// An application's device, which is destroyed together with this.
 pub(crate) struct Application {
     pub(crate) physical: PhysicalDevice,
     device: ash::Device,
     queue: vk::Queue,
     pub(crate) copy_queue: Option<VulkanQueue>,
     pool: vk::CommandPool,
-    /// Two time stamps; null where the queue takes none.
+    /// Two time stamps; null if the queue has none.
     stamps: vk::QueryPool,
-    /// A wait ran out of time: nothing may be destroyed.
+    /// Whether a wait timed out; then nothing may be destroyed.
     has_hung: bool,
     // Destroyed last.
     instance: Arc<Instance>,
 }
 
-/// Where an application's buffer lies.
+/// The memory of an application's buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ApplicationMemory {
-    /// In the device's own memory; not visible to the host where there is such.
+    /// Device memory; not visible to the host if the device has such memory.
     Device,
-    /// In the host's, cached where there is such.
+    /// Host memory; cached if the device has such memory.
     Host,
 }
 
-/// A buffer of an application's, of its own memory.
+/// A buffer of the application, with a separate allocation.
 pub(crate) struct ApplicationBuffer {
     device: ash::Device,
     pub(crate) raw: vk::Buffer,
     memory: vk::DeviceMemory,
     pub(crate) size: u64,
-    /// Whether its memory is in the device's own heap and the host cannot see it.
+    /// Whether its memory is device-local and not visible to the host.
     pub(crate) is_hidden: bool,
 }
 
-/// How long work took.
+/// The time that work took.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elapsed {
-    /// By the device's time stamps, where it has any.
+    /// The time by the device's time stamps, if it has any.
     pub(crate) on_device: Option<Duration>,
-    /// From before it was submitted until its fence was seen.
+    /// The time by the host's clock, from before the submission until the fence was seen.
     pub(crate) on_host: Duration,
 }
 
-/// The family that only copies: it neither draws nor computes.
+/// The family that only copies: it has no graphics and no compute.
 fn copy_family(families: &[vk::QueueFamilyProperties], compute: u32) -> Option<u32> {
     let only_copies = |family: &vk::QueueFamilyProperties| {
         use vk::QueueFlags as Flags;
@@ -80,7 +79,7 @@ fn copy_family(families: &[vk::QueueFamilyProperties], compute: u32) -> Option<u
 }
 
 impl Application {
-    /// Opens the physical device of that UUID.
+    /// Opens the physical device with this UUID.
     pub(crate) fn new(uuid: &str, validation: bool) -> Result<Self, VulkanError> {
         let instance = Instance::of_version(validation, VERSION)?;
         // SAFETY: the instance is alive, here and below.
@@ -155,7 +154,7 @@ impl Application {
         Ok(application)
     }
 
-    /// What the engine is given of it.
+    /// The handles for the engine.
     pub(crate) fn handles(&self) -> VulkanHandles {
         VulkanHandles {
             entry: self.instance.entry().clone(),
@@ -177,7 +176,7 @@ impl Application {
         self.instance.validation_messages()
     }
 
-    /// A buffer for results, that can be copied from and to.
+    /// A buffer for results, as a source and destination of copies.
     pub(crate) fn buffer(
         &self,
         size: u64,
@@ -239,8 +238,8 @@ impl Application {
         Ok(buffer)
     }
 
-    /// Commands with what `record` leaves in them; with time stamps around it where they are asked for
-    /// and there are any.
+    /// A command buffer with the commands that `record` records, between time stamps if `is_timed` and the queue has
+    /// them.
     pub(crate) fn recorded<E: From<VulkanError>>(
         &self,
         is_timed: bool,
@@ -276,8 +275,8 @@ impl Application {
         Ok(commands)
     }
 
-    /// Records a copy of the first `size` bytes, which waits for all before it and which the host and all
-    /// behind it see.
+    /// Records a copy of the first `size` bytes, which waits for all commands before it; the host and all later
+    /// commands see the copy.
     pub(crate) fn copy(
         &self,
         commands: vk::CommandBuffer,
@@ -384,7 +383,7 @@ impl Application {
         Ok(elapsed)
     }
 
-    /// Takes back all commands, none of which is in flight.
+    /// Resets all command buffers, none of which may be in flight.
     pub(crate) fn forget_commands(&self) {
         let flags = vk::CommandPoolResetFlags::RELEASE_RESOURCES;
         // SAFETY: nothing is in flight: `run` waits. Commands that cannot be taken back stay.
@@ -393,7 +392,7 @@ impl Application {
 }
 
 impl ApplicationBuffer {
-    /// A range of it, for the engine.
+    /// A range of the buffer, for the engine.
     pub(crate) fn range(&self, offset: u64, size: u64) -> VulkanBuffer {
         VulkanBuffer {
             buffer: self.raw,
@@ -402,7 +401,7 @@ impl ApplicationBuffer {
         }
     }
 
-    /// Its first bytes; it must be in the host's memory, and nothing may write it now.
+    /// The first bytes of a buffer in host memory, which nothing may write at this time.
     pub(crate) fn bytes(&self, size: usize) -> Result<Vec<u8>, VulkanError> {
         let size = size.min(self.size as usize);
         let flags = vk::MemoryMapFlags::empty();

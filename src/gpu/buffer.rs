@@ -12,25 +12,25 @@ use crate::gpu::physical::external::{FILE, HOST_ALLOCATION, usage};
 use crate::gpu::shared_memory::{MemoryKind, Share};
 use crate::shader::PolynomialSegment;
 
-/// Where a buffer lives and who touches it.
+/// The memory of a buffer, by its users.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Residence {
     /// The host writes, the device reads.
     Upload,
-    /// The same in the device's own memory. The host must write in order, and not read.
+    /// As `Upload`, in device memory. The host must write in order, and must not read.
     Direct,
-    /// Copies fill it, the host reads.
+    /// Copies write, the host reads.
     Readback,
     /// Kernels write, the host reads.
     InPlace,
-    /// Only the device touches it; copies fill it.
+    /// Only the device uses it; copies write.
     Device,
-    /// Kernels write, and copies read, maybe on another queue.
+    /// Kernels write, and copies read, possibly on another queue.
     Results,
 }
 
 impl Residence {
-    /// What its memory must have, and what it should have besides, the best first.
+    /// The required and the preferred properties of the memory, the best ones first.
     fn properties(self) -> (vk::MemoryPropertyFlags, &'static [vk::MemoryPropertyFlags]) {
         use vk::MemoryPropertyFlags as Flags;
         const fn all(flags: &[Flags]) -> Flags {
@@ -41,14 +41,14 @@ impl Residence {
             }
             Flags::from_raw(all)
         }
-        /// Reading memory that the host does not cache is dozens of times slower, so cached memory is
-        /// taken also where it is not coherent (Adreno, older Mali).
+        /// Reading uncached memory is dozens of times slower on the host. Therefore cached memory is used even if it
+        /// is not coherent (Adreno, older Mali).
         const CACHED: &[Flags] = &[
             all(&[Flags::HOST_COHERENT, Flags::HOST_CACHED]),
             Flags::HOST_CACHED,
             Flags::HOST_COHERENT,
         ];
-        /// Where memory is one, it is the device's as well.
+        /// Device-local memory too, if the host and the device share memory.
         const UNIFIED: &[Flags] = &[
             all(&[
                 Flags::HOST_COHERENT,
@@ -71,14 +71,14 @@ impl Residence {
     }
 }
 
-/// A storage buffer. One that the host touches stays mapped for as long as it lives.
+/// A storage buffer. If the host uses it, it is mapped during its whole life.
 pub(crate) struct Buffer {
     pub(crate) device: Arc<LogicalDevice>,
     pub(crate) raw: vk::Buffer,
-    /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
+    /// A view of the buffer as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     memory: Share,
-    /// Whether the host must ask to see what the device wrote, and to show what it wrote itself.
+    /// Whether the host must invalidate before reading and flush after writing.
     is_incoherent: bool,
     /// Bytes.
     pub(crate) size: u64,
@@ -94,8 +94,8 @@ unsafe impl Sync for Buffer {}
 const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
 
 impl Buffer {
-    /// A buffer of at least `size` bytes. Even an empty one has room for one element of any kind:
-    /// kernels may read element 0 of a list before they choose another.
+    /// Makes a buffer of at least `size` bytes. Even an empty one has room for one element of any kind, because
+    /// kernels may read element 0 of a list before they select another.
     pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         name: &str,
@@ -187,7 +187,7 @@ impl Buffer {
         Some(buffer)
     }
 
-    /// A buffer of `size` bytes at least, for results, whose memory may be exported and is no other buffer's.
+    /// Makes a buffer of at least `size` bytes for results, with a dedicated allocation that may be exported.
     pub(crate) fn exportable(
         device: &Arc<LogicalDevice>,
         name: &str,
@@ -219,12 +219,12 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Its memory, and how much that is, bytes.
+    /// The buffer's memory, and its size in bytes.
     pub(crate) fn memory(&self) -> (vk::DeviceMemory, u64) {
         (self.memory.memory, self.memory.size)
     }
 
-    /// A buffer that has no memory yet, and what memory it needs.
+    /// Makes a buffer without memory, and reports its memory requirements.
     fn without_memory(
         device: &Arc<LogicalDevice>,
         size: u64,
@@ -281,19 +281,19 @@ impl Buffer {
         Ok(())
     }
 
-    /// Whether the host sees its bytes.
+    /// Whether the host can access its bytes.
     pub(crate) fn is_mapped(&self) -> bool {
         self.memory.mapped.is_some()
     }
 
-    /// Whether the host and the device see each other's writes by themselves, once fences and barriers
-    /// have ordered them.
+    /// Whether the host and the device see each other's writes without invalidating and flushing, after fences and
+    /// barriers.
     pub(crate) fn is_coherent(&self) -> bool {
         !self.is_incoherent
     }
 
-    /// Makes what the device wrote into some of the mapped bytes visible to the host, after the fence of
-    /// that work and before they are read.
+    /// Makes the device's writes to some mapped bytes visible to the host, after the fence of that work and before
+    /// the bytes are read.
     pub(crate) fn invalidate(&self, range: &Range<usize>) -> Result<(), VulkanError> {
         let Some(range) = self.atoms(range) else {
             return Ok(());
@@ -303,8 +303,8 @@ impl Buffer {
             .named("vkInvalidateMappedMemoryRanges")
     }
 
-    /// Makes what the host wrote into some of the mapped bytes visible to the device, before that work is
-    /// submitted; the device must not write beside them meanwhile.
+    /// Makes the host's writes to some mapped bytes visible to the device, before the work is submitted. The device
+    /// must not write next to these bytes at the same time.
     pub(crate) fn flush(&self, range: &Range<usize>) -> Result<(), VulkanError> {
         let Some(range) = self.atoms(range) else {
             return Ok(());
@@ -314,7 +314,8 @@ impl Buffer {
             .named("vkFlushMappedMemoryRanges")
     }
 
-    /// The atoms of the memory in which some bytes lie; `None` where none has to be made visible.
+    /// The memory range in whole atoms that contains some bytes; `None` if the memory is coherent or the range is
+    /// empty.
     fn atoms(&self, range: &Range<usize>) -> Option<vk::MappedMemoryRange<'static>> {
         if !self.is_incoherent || range.is_empty() {
             return None;
@@ -330,7 +331,7 @@ impl Buffer {
         )
     }
 
-    /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.
+    /// Some of the mapped bytes; empty if the buffer is not mapped or is shorter.
     pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
         match self.memory.mapped {
             // SAFETY: mapped with at least this size for the life of the buffer.

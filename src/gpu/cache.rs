@@ -1,6 +1,6 @@
-//! What is worth remembering from process to process, in the user's cache directory: the driver's
-//! compiled kernels, and what was found out about devices. Everything works without it: what cannot
-//! be written is not remembered, and what cannot be read, or is not as it was written, is not there.
+//! Data that is kept from process to process in the user's cache directory: the driver's compiled kernels, and
+//! results of checks and measurements of devices. The cache is optional: errors in writing are ignored, and files
+//! that cannot be read or are damaged count as missing.
 
 use std::env;
 use std::ffi::OsString;
@@ -12,10 +12,10 @@ use std::path::PathBuf;
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The variable that names the directory itself; an empty value turns the cache off.
+/// The environment variable with the directory; an empty value disables the cache.
 pub(crate) const VARIABLE: &str = "TUMBLE_CACHE_DIR";
 
-/// The first bytes of every file; behind them stands the sum of what follows.
+/// The first bytes of every file, which are followed by the checksum of the rest.
 const MARK: &[u8] = b"tumble cache 1\n";
 
 /// A directory with files that this and other processes read and replace at any time.
@@ -24,27 +24,27 @@ const MARK: &[u8] = b"tumble cache 1\n";
 /// `~/Library/Caches`), or in `LOCALAPPDATA` on Windows.
 #[derive(Debug, Clone)]
 pub(crate) struct Cache {
-    /// `None` where nothing is remembered.
+    /// `None` if the cache is disabled.
     folder: Option<PathBuf>,
 }
 
 impl Cache {
-    /// The user's, as the environment has it now.
+    /// The cache that the environment variables define.
     pub(crate) fn of_user() -> Self {
         let folder = folder(|name| env::var_os(name));
         Self { folder }
     }
 
-    /// One in a directory, which is made when something is written.
+    /// A cache in a directory, which is made when something is written.
     #[cfg(test)]
     pub(crate) fn within(folder: &Path) -> Self {
         let folder = Some(folder.to_owned());
         Self { folder }
     }
 
-    /// What was last written under a name: a file's name without a folder. `None` where there is
-    /// nothing, it is longer than `most` bytes, or it was damaged. The contents may come from another
-    /// version, another machine or somebody else all the same: whoever reads them must check them.
+    /// The contents that were last written under a name, which is a file's name without a folder. `None` if there is
+    /// no such file, it is longer than `max_bytes`, or it is damaged. The contents may come from another version,
+    /// another machine or an attacker; the caller must check them.
     pub(crate) fn read(&self, name: &str, max_bytes: usize) -> Option<Vec<u8>> {
         let path = self.path(name)?;
         // What is no file might never end.
@@ -63,8 +63,8 @@ impl Cache {
         (u64::from_le_bytes(*stored_sum) == sum(name, contents)).then(|| contents.to_owned())
     }
 
-    /// Replaces what is under a name, as a whole: who reads meanwhile gets the old contents or the new
-    /// ones. Returns whether it could be written, which nobody needs to know but tests.
+    /// Replaces the file with this name atomically: other readers get the old or the new contents. Returns whether it
+    /// was written, for tests.
     pub(crate) fn write(&self, name: &str, contents: &[u8]) -> bool {
         let Some(path) = self.path(name) else {
             return false;
@@ -96,7 +96,7 @@ impl Cache {
     }
 }
 
-/// Where the environment puts it.
+/// The directory that environment variables define.
 fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     if let Some(named) = variable(VARIABLE) {
         return (!named.is_empty()).then(|| named.into());
@@ -115,7 +115,8 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     Some(all.join("tumble"))
 }
 
-/// A checksum (64-bit FNV-1a) that detects files which were cut short or overwritten. It does not protect against intent.
+/// A checksum (64-bit FNV-1a) that detects files which were cut short or overwritten. It does not protect against
+/// intent.
 pub(crate) fn sum(name: &str, contents: &[u8]) -> u64 {
     let all = name.bytes().chain(contents.iter().copied());
     all.fold(0xcbf2_9ce4_8422_2325, |sum, byte| {

@@ -1,4 +1,4 @@
-//! Recording a clip's samples into an application's commands and buffer: everything that it takes, made once.
+//! Recording of a clip's samples into an application's commands, with all resources prepared once.
 
 use std::sync::Arc;
 
@@ -15,20 +15,20 @@ use crate::gpu::submission::{Access, Binding, Commands};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 
-/// Samples of a clip that are recorded into an application's commands, and the buffer that they go to
-/// ([`Request::target`](crate::engine::clip::request::Request::target)). What kernels read of the samples lies on the
-/// device: recording neither lists nor allocates anything.
+/// Samples of a clip, prepared for recording into an application's commands, and the buffer for the result
+/// ([`Request::target`](crate::engine::clip::request::Request::target)). The work lists are on the device already:
+/// recording does not allocate.
 pub struct ClipTarget {
     engine: Arc<VulkanEngine>,
     lists: KeptLists,
     pipelines: Vec<Arc<Pipeline>>,
-    /// Of each window and group that has work, its descriptor set.
+    /// The descriptor set of each window and group that has work.
     sets: Vec<vk::DescriptorSet>,
     encoding: Encoding,
     buffer: VulkanBuffer,
-    /// Where the buffer is bound from.
+    /// The offset at which the buffer is bound, bytes.
     bound: u64,
-    /// Bytes of the result.
+    /// The length of the result, bytes.
     bytes: u64,
     // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
     // flight when the target is dropped.
@@ -81,25 +81,27 @@ impl ClipTarget {
         })
     }
 
-    /// Bytes of the result.
+    /// The length of the result, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Records an evaluation into the application's command buffer, to `offset` bytes behind the beginning
-    /// of the target's range. Nothing is waited for and nothing allocated: a dispatch for each two million
-    /// values, and some bytes for each value that the host computed, if there are any. What is recorded
-    /// waits for all that was recorded before it, and all that comes behind it sees the result; it may be
-    /// submitted as often as is wanted.
+    /// Records an evaluation into the application's command buffer. The result starts `offset` bytes after the start
+    /// of the target's range.
+    ///
+    /// Recording neither waits nor allocates. It records one dispatch for each two million values, and the bytes of
+    /// the few values that the host computed, if any. Barriers are included: the evaluation waits for all commands
+    /// recorded before it, and later commands see the result. The commands may be submitted any number of times.
     ///
     /// # Errors
-    /// When the result does not fit there, or `offset` is no multiple of the bytes of a value; then nothing is
+    /// When the result does not fit at this offset, or `offset` is not a multiple of a value's size; then nothing is
     /// recorded.
     ///
     /// # Safety
-    /// The command buffer must be of the engine's device, in recording, outside of a render pass, and of a
-    /// family that computes. The target must live until the work has ended, and the clip's engine as long.
+    /// The command buffer must belong to the engine's device and to a queue family that can compute, and must be in
+    /// the recording state, outside a render pass. The target and the clip's engine must live until the work has
+    /// ended.
     pub unsafe fn record(
         &self,
         commands: vk::CommandBuffer,

@@ -1,6 +1,6 @@
-//! A crowd on a Vulkan device: its tables, which stay there, and where its results go. Each evaluation records
-//! what changed and the dispatches, without waiting and without allocating. Each barrier names the buffers that it
-//! orders.
+//! A crowd on a Vulkan device: its tables, which stay on the device, and the buffers for its results. Each evaluation
+//! records the changes and the dispatches, without waiting and without allocating. Each barrier names the buffers
+//! that it orders.
 
 use std::sync::Arc;
 
@@ -21,19 +21,19 @@ use crate::shader::{
     WORKGROUP,
 };
 
-/// The fewest instances of a window: so many that windows start at multiples of 256 bytes.
+/// The minimum number of instances of a window: with it, windows start at multiples of 256 bytes.
 const LEAST_WINDOW: u64 = 32;
 
-/// Bytes of a window's matrices on a software device.
+/// The size of a window's matrices on a software device, bytes.
 const SOFTWARE_WINDOW: u64 = 8 << 20;
 
 /// Bytes of a matrix.
 const MATRIX: u64 = 48;
 
-/// The sizes of a crowd, and what its kernels read of its library ([`VulkanEngine::crowd_table`]).
+/// The sizes of a crowd, and the tables of its library for the kernels ([`VulkanEngine::crowd_table`]).
 pub(crate) struct CrowdTables {
     pub(crate) instances: u32,
-    /// Where each level of the skeleton below the roots starts among the links, and their end.
+    /// The first link of each level of the skeleton below the roots, then the number of links.
     pub(crate) levels: Vec<u32>,
     /// Whether all rotations are arcs or constants.
     pub(crate) only_arcs: bool,
@@ -45,7 +45,7 @@ pub(crate) struct CrowdTables {
     pub(crate) channels: Buffer,
     pub(crate) cells: Buffer,
     pub(crate) links: Buffer,
-    /// The rows of inverse bind matrices; empty where there are none.
+    /// The rows of inverse bind matrices; empty if there are none.
     pub(crate) bind: Buffer,
 }
 
@@ -55,9 +55,9 @@ pub(crate) struct DeviceCrowd {
     pub(crate) tables: CrowdTables,
     /// `[instance][layer]`
     pub(crate) entries: Buffer,
-    /// Entries that changed, on their way among the others.
+    /// Changed entries, before they are copied to the others.
     changes: Buffer,
-    /// The instances that are evaluated, where that is not all.
+    /// The visible instances, if not all are visible.
     visible: Buffer,
 }
 
@@ -83,19 +83,18 @@ impl DeviceCrowd {
         })
     }
 
-    /// Bytes of the result for an instance.
+    /// Bytes of the result of one instance.
     pub(crate) fn bytes(&self, output: CrowdOutput) -> u64 {
         u64::from(self.tables.arguments.joints) * output.bytes() as u64
     }
 
-    /// Bytes of the positions of the layers of an instance.
+    /// Bytes of the positions of the layers of one instance.
     pub(crate) fn position_bytes(&self) -> u64 {
         let arguments = &self.tables.arguments;
         size_of::<CrowdPosition>() as u64 * u64::from(arguments.layers) * u64::from(arguments.bases)
     }
 
-    /// Instances that are evaluated at once: as many as their results fit the device's limits, and the
-    /// memory budget.
+    /// The number of instances of a window: their results fit the device's limits and the memory budget.
     pub(crate) fn window(&self) -> u32 {
         let arguments = &self.tables.arguments;
         let info = &self.engine.device.physical.info;
@@ -117,7 +116,7 @@ impl DeviceCrowd {
         (limit / LEAST_WINDOW * LEAST_WINDOW).clamp(LEAST_WINDOW, all) as u32
     }
 
-    /// The kernels that run for a result, one after another.
+    /// The kernels for a result, in their order.
     pub(crate) fn kernels(&self, output: CrowdOutput) -> Vec<Kernel> {
         use CrowdValues::{Model, Rotations, Skinning};
         let is_plain = self.tables.arguments.layers == 1 && self.tables.only_arcs;
@@ -167,16 +166,16 @@ impl DeviceCrowd {
     }
 }
 
-/// What the kernels of a window work on.
+/// The buffers of a window's kernels.
 #[derive(Clone, Copy)]
 struct WindowBuffers {
     /// All entries, or those of the window's instances.
     entries: Binding,
-    /// Where each layer of the window's instances is in its clip.
+    /// The position of each layer of the window's instances in its clip.
     positions: Binding,
     /// The values in 32 bits.
     values: Binding,
-    /// What is left of them.
+    /// The result.
     output: Binding,
 }
 
@@ -187,27 +186,27 @@ struct BoundKernel {
     set: vk::DescriptorSet,
 }
 
-/// A window of instances: the kernels that run for it, one after another.
+/// A window of instances: its kernels in their order.
 struct Window {
     kernels: Vec<BoundKernel>,
-    /// The sets of those that read entries, the first ones, where these are gathered.
+    /// The descriptor sets of the first kernels, those that read entries, for gathered entries.
     on_gathered: [vk::DescriptorSet; 2],
     buffers: WindowBuffers,
 }
 
-/// A range of an application's buffer that a crowd is evaluated into
-/// ([`Crowd::target`](crate::crowd::player::Crowd::target)), with all that recording needs.
+/// A range of an application's buffer for a crowd's results ([`Crowd::target`](crate::crowd::player::Crowd::target)),
+/// with all resources for recording.
 pub struct CrowdTarget {
-    /// What it was made for; its buffers are in the sets.
+    /// The crowd that the target was made for; its buffers are in the descriptor sets.
     pub(crate) crowd: Arc<DeviceCrowd>,
     output: CrowdOutput,
-    /// Where the result goes.
+    /// The range of the result.
     pub(crate) range: Binding,
-    /// The most instances that fit.
+    /// The maximum number of instances.
     pub(crate) room: u32,
     scatter: BoundKernel,
     gather: BoundKernel,
-    /// Instances of a window.
+    /// The number of instances of a window.
     window: u32,
     windows: Vec<Window>,
     // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
@@ -215,12 +214,12 @@ pub struct CrowdTarget {
     _pool: DescriptorPool,
     positions: Buffer,
     gathered: Buffer,
-    /// Values of a window before they are rounded to 16 bits.
+    /// The values of a window before they are rounded to 16 bits.
     values: Option<Buffer>,
 }
 
 impl CrowdTarget {
-    /// For a range of a buffer from `offset` on, with room for so many instances.
+    /// Makes a target for a range that starts at `offset`, with room for `room` instances.
     pub(crate) fn new(
         crowd: &Arc<DeviceCrowd>,
         output: CrowdOutput,
@@ -315,7 +314,7 @@ impl CrowdTarget {
         })
     }
 
-    /// What is left there.
+    /// The output that is written to the buffer.
     #[must_use]
     pub fn output(&self) -> CrowdOutput {
         self.output
@@ -326,8 +325,8 @@ impl CrowdTarget {
         u64::from(frame.instances) * self.crowd.bytes(self.output)
     }
 
-    /// Records the evaluation of a frame, which has an instance and no more than there is room for: what changed, then
-    /// the dispatches. What is recorded must be submitted in the order of the calls.
+    /// Records the evaluation of a frame that has at least one instance and at most `room`: the changes, then the
+    /// dispatches. Recorded frames must be submitted in the order of the calls.
     pub(crate) fn record(&self, commands: Commands<'_>, frame: &CrowdFrame<'_>) {
         let (crowd, whole) = (&self.crowd, Binding::whole);
         let result = Binding {
@@ -374,7 +373,7 @@ impl CrowdTarget {
         commands.barrier_over(Access::Kernel, Access::Any, &[result]);
     }
 
-    /// Records what the device does not know yet: entries, and which instances are evaluated.
+    /// Records the changes that the device does not know yet: entries, and the list of visible instances.
     fn record_changes(&self, commands: Commands<'_>, frame: &CrowdFrame<'_>) {
         let crowd = &self.crowd;
         let [entries, changes, visible] =
@@ -404,14 +403,14 @@ impl CrowdTarget {
         }
     }
 
-    /// Records a dispatch of as many invocations as its arguments count.
+    /// Records a dispatch with as many invocations as its arguments say.
     fn dispatch(&self, commands: Commands<'_>, bound: &BoundKernel, arguments: CrowdDispatch) {
         let groups = self.crowd.engine.workgroups(arguments.count);
         let bytes = bytemuck::bytes_of(&arguments);
         commands.dispatch(&bound.pipeline, bound.set, bytes, groups);
     }
 
-    /// Records the dispatches of a window, each of which sees what the one before it wrote.
+    /// Records the dispatches of a window; each sees the result of the previous one.
     fn record_window(
         &self,
         commands: Commands<'_>,
@@ -493,7 +492,7 @@ impl CrowdTarget {
     }
 }
 
-/// A target whose result the host reads: evaluated into memory that the host sees, submitted without a wait.
+/// A target whose result the host reads: it is in host-visible memory, and a submission does not wait.
 pub(crate) struct CrowdReader {
     // It goes first: it waits for what uses the rest.
     pub(crate) results: KernelResults,
@@ -501,7 +500,7 @@ pub(crate) struct CrowdReader {
 }
 
 impl CrowdReader {
-    /// With room for so many instances.
+    /// Makes a reader with room for `room` instances.
     pub(crate) fn new(
         crowd: &Arc<DeviceCrowd>,
         output: CrowdOutput,
@@ -518,12 +517,12 @@ impl CrowdReader {
         })
     }
 
-    /// Whether it is for that output, and has room for so many instances.
+    /// Whether the reader is for this output and has room for so many instances.
     pub(crate) fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
         self.target.output == output && self.target.room >= instances
     }
 
-    /// Submits the evaluation of a frame; the one before must have been waited for.
+    /// Submits the evaluation of a frame; the previous one must have been waited for.
     pub(crate) fn submit(&mut self, frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
         self.results.kernels.begin(0)?;
         let commands = self.results.kernels.commands();
@@ -531,7 +530,7 @@ impl CrowdReader {
         self.results.submit(Some(self.target.bytes(frame)))
     }
 
-    /// Waits, and copies the result, of which `output` has as many bytes.
+    /// Waits, and copies the result to `output`, which has the same length.
     pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
         self.results.wait()?;
         output.copy_from_slice(self.results.bytes(0..output.len())?);

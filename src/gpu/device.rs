@@ -1,4 +1,4 @@
-//! The logical device, the queue that computes, and the one that copies results where there is one.
+//! The logical device, the queue that computes, and the queue that copies results, if there is one.
 
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,28 +18,28 @@ use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::shared_memory::SharedMemory;
 use crate::threads::lock;
 
-/// What a submission is for.
+/// The purpose of a submission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum QueueLane {
-    /// Kernels, and whatever goes with them.
+    /// Kernels, with their uploads and barriers.
     Kernels,
     /// Copies of results to the host.
     Copies,
 }
 
-/// How often a fence is asked, each time for up to 10 ms: for a minute.
+/// The number of times that a fence is polled, each for up to 10 ms: a minute in total.
 const PATIENCE: usize = 6000;
 
-/// A queue, which Vulkan wants to have one user at a time.
+/// A queue, which Vulkan allows one user at a time.
 struct DeviceQueue {
     raw: Mutex<vk::Queue>,
     family: u32,
-    /// What an application that uses it too locks.
+    /// The lock that the application uses for the same queue.
     shared: Option<QueueLock>,
 }
 
 impl DeviceQueue {
-    /// Does work with it while nobody else uses it.
+    /// Calls `work` while nothing else uses the queue.
     fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
         let queue = lock(&self.raw);
         match &self.shared {
@@ -49,34 +49,34 @@ impl DeviceQueue {
     }
 }
 
-/// An opened device, destroyed with its last user unless it was handed in.
+/// An opened device. It is destroyed with its last user, unless it belongs to the application.
 pub(crate) struct LogicalDevice {
     pub(crate) raw: ash::Device,
     pub(crate) physical: PhysicalDevice,
     /// Whether its kernels read texel buffers.
     pub(crate) reads_texels: bool,
-    /// Where what the host writes for kernels goes.
+    /// The rule for the memory of uploads.
     pub(crate) placing: Placing,
     queue: DeviceQueue,
-    /// The queue of [`Lane::Copies`], where that is another one.
+    /// The queue of [`QueueLane::Copies`], if it is not the kernels' queue.
     copy_queue: Option<DeviceQueue>,
-    /// Whether staged results are copied in submissions of their own.
+    /// Whether staged results are copied in separate submissions.
     pub(crate) copies_apart: bool,
     names: Option<ext::debug_utils::Device>,
-    /// The extension that imports the caller's memory, where it is used.
+    /// The extension that imports the caller's memory, if it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
-    /// The extension that exports memory, where results can be exported.
+    /// The extension that exports memory, if results can be exported.
     pub(crate) exports: Option<khr::external_memory_fd::Device>,
-    /// The extension that exports semaphores, where timelines can be exported.
+    /// The extension that exports semaphores, if timelines can be exported.
     pub(crate) exports_timelines: Option<khr::external_semaphore_fd::Device>,
-    /// Whether it was opened here, and may be opened again here.
+    /// Whether the engine opened the device, and may open it again.
     pub(crate) owned: bool,
     pub(crate) shared: SharedMemory,
-    /// A wait ran out of time: work may still run, so nothing may be destroyed.
+    /// Whether a wait timed out: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
-    /// The process that opened it. In a process that was forked from it nothing may be done with it.
+    /// The process that opened the device. A process that was forked from it must not use the device.
     process: u32,
-    /// What the driver compiled, kept from process to process.
+    /// The driver's compiled kernels, which are kept from process to process.
     pub(crate) pipelines: PipelineCache,
 }
 
@@ -158,8 +158,7 @@ impl LogicalDevice {
         Ok(Arc::new(device))
     }
 
-    /// An application's device; it stays the application's to destroy. Results that are staged are copied
-    /// by `copy_queue` where there is one.
+    /// A device of an application, which must destroy it. Staged results are copied by `copy_queue`, if there is one.
     pub(crate) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
@@ -208,8 +207,8 @@ impl LogicalDevice {
         }
     }
 
-    /// Does work with the queue of a lane, for one user at a time; `None` where an application's lock did not
-    /// call it.
+    /// Calls `work` with the queue of a lane, for one user at a time; `None` if the application's lock did not call
+    /// its argument.
     pub(crate) fn with_queue<T>(
         &self,
         lane: QueueLane,
@@ -235,7 +234,7 @@ impl LogicalDevice {
         self.copy_queue.is_some()
     }
 
-    /// Nobody else uses any queue of a device that the engine opened meanwhile.
+    /// Locks all queues of a device that the engine opened.
     fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
         let kernels = lock(&self.queue.raw);
         (
@@ -257,7 +256,7 @@ impl LogicalDevice {
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
 
-    /// From now on nothing of this device is destroyed: it may still be in use.
+    /// Marks the device as hung: its objects are not destroyed any more, because they may still be in use.
     pub(crate) fn mark_hung(&self) {
         if !self.hung.swap(true, Ordering::Relaxed) {
             // The instance must outlive the device, which stays.
@@ -265,9 +264,9 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the work behind a fence has ended, after a first wait failed: a device that the engine
-    /// opened until it is idle. On an application's, others may submit meanwhile, which Vulkan forbids during
-    /// such a wait; there the fence is asked again and again. If all fails, the device counts as hung.
+    /// Waits until the work of a fence has ended, after a first wait failed. For a device that the engine opened,
+    /// this waits until it is idle. Vulkan forbids this while others submit, as on an application's device; there the
+    /// fence is polled. If all this fails, the device is marked as hung.
     pub(crate) fn wait_until_done(&self, fence: vk::Fence) {
         if !self.may_destroy() {
             return; // a device that has hung is not waited for again
@@ -286,7 +285,7 @@ impl LogicalDevice {
         self.mark_hung();
     }
 
-    /// Waits until the device, which the engine opened, is idle. If the wait fails, it counts as hung.
+    /// Waits until the device, which the engine opened, is idle. If the wait fails, the device is marked as hung.
     fn wait_until_idle(&self) {
         let _queues = self.all_queues();
         // SAFETY: the device is alive, and its queues are locked.
@@ -296,8 +295,7 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the driver is done with copies that have ended. If the wait fails, they have ended all
-    /// the same.
+    /// Waits until the driver has released copies that have ended. Errors are ignored.
     pub(crate) fn settle(&self) {
         // The queue that computes on an application's device is not the engine's to wait for.
         let lanes = match self.owned {
@@ -312,8 +310,8 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the device, which the engine opened (no other imports memory), is idle, and again if
-    /// the wait fails for lack of memory.
+    /// Waits until the device is idle, and again if the wait fails for lack of memory. The engine opened the device,
+    /// because no other device imports memory.
     pub(crate) fn wait_in_any_case(&self) {
         let _queues = self.all_queues();
         // SAFETY: as in `wait_until_idle`.
@@ -329,7 +327,7 @@ impl LogicalDevice {
         !self.hung.load(Ordering::Relaxed) && self.check_process().is_ok()
     }
 
-    /// Refuses the device in a process that was forked from that which opened it.
+    /// Returns an error in a process that was forked from the one that opened the device.
     pub(crate) fn check_process(&self) -> Result<(), VulkanError> {
         match self.process == std::process::id() {
             true => Ok(()),

@@ -1,39 +1,39 @@
-//! What can go wrong with Vulkan.
+//! Errors of Vulkan.
 
 use crate::prepare::error::SetError;
 use crate::time::error::SampleTimesError;
 #[cfg(feature = "vulkan")]
 use ash::vk;
 
-/// Why a Vulkan device could not be used, or stopped working.
+/// Why a Vulkan device cannot be used, or failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VulkanError {
-    /// The engine was compiled without the feature `vulkan`.
+    /// The crate was compiled without the feature `vulkan`.
     #[cfg(not(feature = "vulkan"))]
     #[error(
         "this was built without Vulkan; build it with the feature `vulkan` of the crate `tumble`"
     )]
     NotBuilt,
-    /// There is no Vulkan loader library.
+    /// The Vulkan loader library was not found.
     #[error(
         "no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers; macOS: brew install vulkan-loader molten-vk)"
     )]
     NoLoader {
-        /// What the system said.
+        /// The system's message.
         reason: String,
     },
-    /// A loader, but no driver, or none with a device that can compute.
+    /// The loader found no driver, or none with a device that can compute.
     #[error(
         "the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers; macOS: brew install molten-vk)"
     )]
     NoDevice,
-    /// A card of NVIDIA's, and no file that names its Vulkan driver.
+    /// There is an NVIDIA card, but no manifest of its Vulkan driver.
     #[error(
         "no Vulkan driver for the NVIDIA card that /dev/nvidiactl shows: in a container, add the capability `graphics` (NVIDIA_DRIVER_CAPABILITIES=all); MIG instances of a card do not support Vulkan"
     )]
     NoNvidiaDriver,
-    /// The process was forked from one that uses Vulkan, and no driver can be used on both sides of a fork.
+    /// The process was forked from one that uses Vulkan. Drivers do not work on both sides of a fork.
     #[error(
         "Vulkan cannot be used in a process that was forked from one which uses it: start the process otherwise (spawn or forkserver in Python's multiprocessing), open the device in it alone, or use the CPU, which gives the same bits"
     )]
@@ -43,145 +43,145 @@ pub enum VulkanError {
         "the Vulkan drivers did not answer within {seconds} s; cards without NVIDIA's persistence daemon (nvidia-persistenced) and machines with many cards take long to start: run the daemon, wait longer (TUMBLE_DRIVER_SECONDS={}), or name the drivers to load in VK_DRIVER_FILES", seconds.saturating_mul(3)
     )]
     SlowDriver {
-        /// How long was waited.
+        /// The time limit, seconds.
         seconds: u64,
     },
-    /// A kernel binds more storage buffers than the device can.
+    /// A kernel binds more storage buffers than the device allows.
     #[error(
         "the kernel {kernel} binds {needed} storage buffers, and the device allows {limit} (maxPerStageDescriptorStorageBuffers); frames at a rate and samples straight from keys need 4, explicit times 5, crowds 5: evaluate this on the CPU"
     )]
     StorageBuffers {
-        /// The kernel.
+        /// The kernel's name.
         kernel: &'static str,
-        /// Storage buffers that it binds.
+        /// The number of storage buffers that the kernel binds.
         needed: u32,
         /// The device's limit.
         limit: u32,
     },
-    /// An application's queue is of a family that the device has not, or that cannot do its work.
+    /// An application's queue is of a family that does not exist, or that cannot do the required work.
     #[error(
         "the queue is of family {family}, which cannot {work}; the device has {families} families, from 0"
     )]
     QueueFamily {
-        /// The family that was given.
+        /// The family's index.
         family: u32,
-        /// What it is for.
+        /// The required work.
         work: &'static str,
-        /// How many the device has.
+        /// The number of the device's families.
         families: usize,
     },
-    /// The application's lock did not run what it was given.
+    /// The application's queue lock did not call the function that was passed to it.
     #[error(
         "the application's lock of the queue (VulkanHandles::queue_lock) did not call the function that it was given"
     )]
     QueueLock,
-    /// The queue for copies is the one that computes.
+    /// The copy queue is the same as the compute queue.
     #[error("the copy queue is the compute queue; give another, or none")]
     SameQueue,
-    /// A driver ends the process that loads it.
+    /// A driver crashes the process that loads it.
     #[error(
         "a Vulkan driver fails while it is loaded: {how}; remove it, or list the drivers to load in VK_DRIVER_FILES"
     )]
     Driver {
-        /// How a process that loaded it ended.
+        /// How a process that loaded the driver ended.
         how: String,
     },
     /// A Vulkan call failed.
     #[cfg(feature = "vulkan")]
     #[error("{call} failed: {result:?}{}", hint(*result))]
     Call {
-        /// The call's name.
+        /// The function's name.
         call: &'static str,
-        /// What it returned.
+        /// The returned code.
         result: vk::Result,
     },
-    /// The validation layer was asked for and is not installed.
+    /// The validation layer is requested but not installed.
     #[error(
         "the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
     )]
     NoValidation,
-    /// No memory type has what a buffer needs.
+    /// No memory type has the properties that a buffer needs.
     #[error(
         "the device offers no memory with the properties {properties:#x} (VkMemoryPropertyFlagBits)"
     )]
     NoMemoryType {
-        /// The properties needed, as `VkMemoryPropertyFlagBits`.
+        /// The required properties, as `VkMemoryPropertyFlagBits`.
         properties: u32,
     },
     /// The device did not finish in time.
     #[error("the device did not finish a dispatch within {seconds} s")]
     Timeout {
-        /// How long was waited.
+        /// The time limit, seconds.
         seconds: u64,
     },
-    /// The device computes other bits than the CPU.
+    /// The self-test found other bits than the CPU's.
     #[error(
         "{device} is not exact: self-test `{check}` differs in {differing} of {total} results; it is used only when inexact devices are allowed"
     )]
     Inexact {
         /// The device's name.
         device: String,
-        /// The check of the self-test that failed.
+        /// The failed check of the self-test.
         check: &'static str,
-        /// Results that differ.
+        /// The number of results that differ.
         differing: usize,
-        /// Results compared.
+        /// The number of results that were compared.
         total: usize,
     },
-    /// The device computes other bits than the CPU with one kernel.
+    /// A kernel computes other bits than the CPU.
     #[error(
         "{device} is not exact: the kernel `{kernel}` differs from the CPU in {differing} of {total} values; it is used only when inexact devices are allowed"
     )]
     InexactKernel {
         /// The device's name.
         device: String,
-        /// The kernel, as [`kernels`](crate::vulkan::kernels) names it.
+        /// The kernel's name, as in [`kernels`](crate::vulkan::kernels).
         kernel: &'static str,
-        /// Values that differ.
+        /// The number of values that differ.
         differing: usize,
-        /// Values compared.
+        /// The number of values that were compared.
         total: usize,
     },
-    /// The range of a buffer that was given for a result does not fit it.
+    /// The range of a buffer does not fit the result.
     #[error(
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
     )]
     BufferRange {
-        /// Where the range starts, bytes.
+        /// The start of the range, bytes.
         offset: u64,
-        /// Its length, bytes.
+        /// The length of the range, bytes.
         size: u64,
-        /// Bytes of a rotation.
+        /// The size of a value of the result, bytes; the range must start at a multiple of it.
         rotation: u64,
-        /// Bytes of the result.
+        /// The length of the result, bytes.
         needed: u64,
     },
-    /// The device cannot export the memory of its results.
+    /// The device cannot export the memory of results.
     #[error(
         "{device} cannot hand the memory of results to others: {lacks}; evaluate into the host's memory instead"
     )]
     NoExport {
         /// The device's name.
         device: String,
-        /// What it has not.
+        /// The missing capability.
         lacks: &'static str,
     },
-    /// One track alone exceeds the device's limits.
+    /// A buffer would exceed the device's limits.
     #[error(
         "{subject} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"
     )]
     TooLarge {
-        /// What is too large.
+        /// The buffer's contents.
         subject: &'static str,
-        /// Bytes needed.
+        /// The required size, bytes.
         bytes: u64,
-        /// Bytes allowed.
+        /// The device's limit, bytes.
         limit: u64,
     },
 }
 
 impl VulkanError {
-    /// The device is lost: what it held is gone, and it must be opened again.
+    /// Whether the device is lost: its memory is gone, and it must be opened again.
     pub(crate) fn is_lost(&self) -> bool {
         #[cfg(feature = "vulkan")]
         if let Self::Call { result, .. } = self {
@@ -190,7 +190,7 @@ impl VulkanError {
         false
     }
 
-    /// Memory ran out: the same work in smaller windows may succeed.
+    /// Whether memory ran out: the same work in smaller windows may succeed.
     pub(crate) fn is_out_of_memory(&self) -> bool {
         #[cfg(feature = "vulkan")]
         if let Self::Call { result, .. } = self {
@@ -219,7 +219,7 @@ fn hint(result: vk::Result) -> &'static str {
 }
 
 #[cfg(feature = "vulkan")]
-/// Keeps the name of the call that failed.
+/// Adds the name of the failed function to an error.
 pub(crate) trait Named<T> {
     fn named(self, call: &'static str) -> Result<T, VulkanError>;
 }
@@ -231,7 +231,7 @@ impl<T> Named<T> for ash::prelude::VkResult<T> {
     }
 }
 
-/// What may fail in an evaluation.
+/// Errors of an evaluation.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum EvaluateError {
     #[error(transparent)]
@@ -241,7 +241,7 @@ pub(crate) enum EvaluateError {
 }
 
 impl EvaluateError {
-    /// Turns the index of a track in a batch, which starts at `first`, into its index in the set.
+    /// Converts the index of a track in a batch that starts at the track `first` into its index in the set.
     pub(crate) fn of_tracks_from(mut self, first: usize) -> Self {
         if let Self::Set(SetError::Frames(SampleTimesError::GapTooLong { track, .. })) = &mut self {
             *track += first;

@@ -1,4 +1,4 @@
-//! Results in a device's memory that others import: CUDA, or another Vulkan device, without a copy.
+//! Results in a device's memory that CUDA or another Vulkan device imports, without a copy.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -14,14 +14,14 @@ use crate::gpu::submission::Point;
 use crate::gpu::submission::Semaphore;
 use crate::threads::lock;
 
-/// How long a result is waited for: no window takes longer than a fence is waited for.
+/// The time limit for waiting for a result; the same as for a fence.
 const TIMEOUT_SECONDS: u64 = 60;
 
-/// The memory of a result, and what the device reaches when it has written it.
+/// The memory of a result, and the semaphore that the device signals when it has written it.
 pub(crate) struct Exported {
     // It goes first: nobody waits for it any more when the buffer is freed.
     done: Option<Mutex<Semaphore>>,
-    /// The value that the last submitted work reaches.
+    /// The semaphore's value when the last submitted work has ended.
     submitted: AtomicU64,
     pub(crate) buffer: Buffer,
 }
@@ -46,30 +46,30 @@ impl Exported {
         })
     }
 
-    /// Whether others can wait for the device to write it.
+    /// Whether importers can wait for the device.
     pub(crate) fn has_timeline(&self) -> bool {
         self.done.is_some()
     }
 
-    /// The point that the next submission reaches.
+    /// The semaphore's next value, for the next submission.
     pub(crate) fn next_point(&self) -> Option<Point> {
         self.done.as_ref().map(|done| lock(done).advance())
     }
 
-    /// Says that the work which reaches a point was submitted.
+    /// Records that the work of a point was submitted.
     pub(crate) fn has_submitted(&self, point: Option<Point>) {
         if let Some((_, value)) = point {
             self.submitted.store(value, Ordering::Release);
         }
     }
 
-    /// The point at which all of it is written.
+    /// The point at which the whole result is written.
     fn last_point(&self) -> Option<Point> {
         let done = lock(self.done.as_ref()?);
         Some((done.raw, self.submitted.load(Ordering::Acquire)))
     }
 
-    /// Waits until all of it is written.
+    /// Waits until the whole result is written.
     fn wait(&self) -> Result<(), VulkanError> {
         let device = &self.buffer.device;
         device.check_process()?;
@@ -107,12 +107,14 @@ impl Drop for Exported {
     }
 }
 
-/// A result in the memory of the device that evaluated it. Others on the same card, such as CUDA, import that
-/// memory as a file and use it without a copy; the memory lives for as long as this or an import of it does.
+/// A result in the memory of the device that evaluated it.
 ///
-/// Where [`ExportedResult::timeline_file`] gives a semaphore, the device may still be writing: an importer lets its
-/// queue or stream wait for the semaphore, or the host waits ([`ExportedResult::wait`]). Where there is none, all is
-/// written.
+/// Other interfaces on the same card, such as CUDA, import this memory through a file descriptor and use it without a
+/// copy. The memory lives as long as this object or an import of it.
+///
+/// If [`ExportedResult::timeline_file`] returns a semaphore, the device may still be writing: the importer's queue or
+/// stream must wait for the semaphore, or the host waits ([`ExportedResult::wait`]). If there is none, the result is
+/// written already.
 #[derive(Clone)]
 pub struct ExportedResult {
     exported: Arc<Exported>,
@@ -124,20 +126,19 @@ impl ExportedResult {
         Self { exported, bytes }
     }
 
-    /// Bytes of the result, from the start of the memory.
+    /// The length of the result, bytes, from the start of the memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Bytes of the memory, which belongs to one buffer alone (a dedicated allocation): what an importer needs to
-    /// know.
+    /// The length of the memory, bytes. It is a dedicated allocation of one buffer, which importers must specify.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         self.exported.buffer.memory().1
     }
 
-    /// The device's UUID, by which another interface finds it, as in
+    /// The device's UUID, by which other interfaces identify it, as in
     /// [`DeviceInfo::uuid`](crate::gpu::reports::DeviceInfo::uuid).
     #[must_use]
     pub fn device_uuid(&self) -> &str {
@@ -154,10 +155,10 @@ impl ExportedResult {
         &self.exported.buffer.device
     }
 
-    /// A new file of the memory (`VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT`), for one import.
+    /// A new file descriptor of the memory (`VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT`), for one import.
     ///
     /// # Errors
-    /// When the device refuses, or the process was forked from that which opened the device.
+    /// When the device refuses, or the process was forked from the one that opened the device.
     #[cfg(unix)]
     pub fn memory_file(&self) -> Result<std::os::fd::OwnedFd, VulkanError> {
         let device = self.device();
@@ -177,9 +178,9 @@ impl ExportedResult {
         Ok(unsafe { std::os::fd::FromRawFd::from_raw_fd(file) })
     }
 
-    /// A new file of the timeline semaphore (`VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT`), for one import, and
-    /// the value that it reaches when the result is written; `None` where the device exports none, and has written
-    /// the result already.
+    /// A new file descriptor of the timeline semaphore (`VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT`), for one
+    /// import, and the semaphore's value when the result is written. `None` if the device exports no semaphores; then
+    /// the result is written already.
     ///
     /// # Errors
     /// As [`ExportedResult::memory_file`].
@@ -202,10 +203,10 @@ impl ExportedResult {
         Ok(Some((file, value)))
     }
 
-    /// Whether the device has written all of it, without waiting.
+    /// Whether the whole result is written; does not wait.
     ///
     /// # Errors
-    /// When the device was lost, or the process was forked from that which opened it.
+    /// When the device was lost, or the process was forked from the one that opened it.
     pub fn is_written(&self) -> Result<bool, VulkanError> {
         let device = self.device();
         device.check_process()?;
@@ -217,10 +218,10 @@ impl ExportedResult {
         Ok(reached.named("vkGetSemaphoreCounterValue")? >= value)
     }
 
-    /// Waits until the device has written all of it.
+    /// Waits until the whole result is written.
     ///
     /// # Errors
-    /// When the device was lost or did not finish in time, or the process was forked from that which opened it.
+    /// When the device was lost or did not finish in time, or the process was forked from the one that opened it.
     pub fn wait(&self) -> Result<(), VulkanError> {
         self.exported.wait()
     }

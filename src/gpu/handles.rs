@@ -7,20 +7,19 @@ use ash::vk;
 
 use crate::threads::lock;
 
-/// An application's instance, device and queue, to evaluate on
+/// An application's instance, device and queue, for an engine
 /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)).
 ///
-/// The device needs no features, but a software device is faster with one
-/// ([`VulkanHandles::shader_int64`]). Below Vulkan 1.2, enable `VK_KHR_shader_float_controls`
-/// where it is offered.
+/// No features of the device are required, but software devices are faster with one
+/// ([`VulkanHandles::shader_int64`]). With Vulkan 1.1, enable `VK_KHR_shader_float_controls` if the device has it.
 pub struct VulkanHandles {
     /// The loaded functions; they keep the loader library open.
     pub entry: ash::Entry,
     /// The instance, of Vulkan 1.1 or newer.
     pub instance: ash::Instance,
-    /// The version that it was made for (`VkApplicationInfo::apiVersion`).
+    /// The Vulkan version for which the instance was made (`VkApplicationInfo::apiVersion`).
     pub api_version: u32,
-    /// The device's physical device.
+    /// The physical device of `device`.
     pub physical_device: vk::PhysicalDevice,
     /// The device.
     pub device: ash::Device,
@@ -28,22 +27,24 @@ pub struct VulkanHandles {
     pub shader_float_controls: bool,
     /// Whether the feature `shaderInt64` is enabled, which makes software devices faster.
     pub shader_int64: bool,
-    /// A queue of the device that can compute.
+    /// A queue of the device, of a family that can compute.
     pub queue: vk::Queue,
-    /// That queue's family.
+    /// The family of `queue`.
     pub queue_family: u32,
-    /// Another queue, on which results that are staged are copied to the host while the first one
-    /// computes ([`ReadBack`](crate::gpu::options::ReadBack)). Without one, only `queue` is used. The
-    /// device must have the feature `timelineSemaphore` enabled then.
+    /// A second queue, on which staged results are copied to the host while `queue` computes
+    /// ([`ReadBack`](crate::gpu::options::ReadBack)). It requires the feature `timelineSemaphore` of the device.
+    /// `None`: only `queue` is used.
     pub copy_queue: Option<VulkanQueue>,
-    /// A lock that the application locks whenever it uses `queue`, from any thread; the engine locks it for
-    /// each of its submissions, so that both may submit at any time. It must not be locked while the
-    /// application calls the engine, which would wait for it for ever. Without one nobody else may use the
-    /// queue while the engine does. The queue for copies is the engine's alone.
+    /// A lock for `queue`, so that the application and the engine may submit at any time, from any thread.
+    ///
+    /// The application must lock it whenever it uses `queue`; the engine locks it for each of its submissions. The
+    /// application must not call the engine while it has the lock, because the engine would wait for it forever.
+    /// Without a lock, nothing else may use the queue while the engine uses it. The copy queue is for the engine
+    /// alone.
     pub queue_lock: Option<QueueLock>,
 }
 
-/// A lock for a queue that an application and an engine share: the application's, of whatever kind.
+/// A lock for a queue that an application and an engine share. The application implements it with a lock of any kind.
 ///
 /// ```
 /// use std::sync::{Arc, Mutex};
@@ -59,16 +60,16 @@ pub struct VulkanHandles {
 #[derive(Clone)]
 pub struct QueueLock(Arc<Locked>);
 
-/// Runs work while a lock is locked.
+/// A function that calls its argument while a lock is locked.
 type Locked = dyn Fn(&mut dyn FnMut()) + Send + Sync;
 
 impl QueueLock {
-    /// A lock by a function that locks it, calls what it is given once, and unlocks it.
+    /// Makes a lock from a function that locks, calls its argument once, and unlocks.
     pub fn new(locked: impl Fn(&mut dyn FnMut()) + Send + Sync + 'static) -> Self {
         Self(Arc::new(locked))
     }
 
-    /// Does work while the lock is locked; `None` from a function that did not call it.
+    /// Calls `work` while the lock is locked; `None` if the application's function did not call its argument.
     pub(crate) fn run<T>(&self, work: impl FnOnce() -> T) -> Option<T> {
         let (mut work, mut done) = (Some(work), None);
         (self.0)(&mut || {
@@ -100,7 +101,7 @@ impl fmt::Debug for QueueLock {
 pub struct VulkanQueue {
     /// The queue.
     pub queue: vk::Queue,
-    /// Its family, which can copy.
+    /// The queue's family, which can copy.
     pub family: u32,
 }
 
@@ -109,8 +110,8 @@ pub struct VulkanQueue {
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
-    /// Where the range starts, bytes: a multiple of the size of a stored rotation.
+    /// The start of the range, bytes: a multiple of the size of a stored value.
     pub offset: u64,
-    /// Its length, bytes: at least the size of the result.
+    /// The length of the range, bytes: at least the size of the result.
     pub size: u64,
 }

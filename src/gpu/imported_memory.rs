@@ -1,4 +1,4 @@
-//! The caller's own memory, which software devices work on without a copy.
+//! The caller's memory, which software devices use without a copy.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -8,17 +8,17 @@ use std::sync::Arc;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
 
-/// Fewer bytes than this are copied faster than imported.
+/// The minimum number of bytes to import; fewer are copied faster.
 const LEAST: usize = 1 << 20;
 
-/// Memory is imported in whole pages, which are at least this large.
+/// The size of whole pages, in which memory is imported, bytes.
 const PAGE: usize = 4096;
 
-/// Imported memory: the caller's, which a device may read or write as long as this lives.
+/// Imported memory of the caller, which a device may read or write as long as this lives.
 pub(crate) struct ImportedMemory<'a> {
-    /// The pages that it lies in.
+    /// The pages that contain it.
     pub(crate) buffer: Buffer,
-    /// Where it starts in them, bytes.
+    /// Its start in the pages, bytes.
     pub(crate) start: usize,
     memory: NonNull<u8>,
     size: usize,
@@ -28,8 +28,7 @@ pub(crate) struct ImportedMemory<'a> {
 }
 
 impl<'a> ImportedMemory<'a> {
-    /// Imports memory for kernels to write values of `each` bytes; returns the slice where that is
-    /// impossible.
+    /// Imports memory for kernels to write values of `each` bytes; returns the slice if that is impossible.
     pub(crate) fn to_write(
         device: &Arc<LogicalDevice>,
         bytes: &'a mut [u8],
@@ -72,7 +71,7 @@ impl<'a> ImportedMemory<'a> {
         })
     }
 
-    /// Some of its bytes for the host to write, on which no kernel may work.
+    /// Some of its bytes, for the host to write. No kernel may use them at the same time.
     pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
         assert!(range.start <= range.end && range.end <= self.size);
         // SAFETY: it is borrowed as a whole, and the range lies within it.
@@ -81,7 +80,7 @@ impl<'a> ImportedMemory<'a> {
         }
     }
 
-    /// Says that all work that was submitted with it has ended.
+    /// Records that all work that was submitted with it has ended.
     pub(crate) fn has_come_back(&mut self) {
         self.is_idle = true;
     }

@@ -1,6 +1,6 @@
-//! Work in flight: the host starts one piece of it while the device works on those before, brings its results
-//! to the host, and does what is left to do then. Results are read where kernels wrote them, or copied out of the
-//! device's memory: by the submission of the kernels, or by another one beside later kernels.
+//! Work in flight: the host starts a piece of it while the device works on the previous ones, copies their results to
+//! the host, and applies the rotations that the host computed. Results are read where kernels wrote them, or are
+//! copied from device memory by the kernels' submission or by another one beside later kernels.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,47 +22,45 @@ use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
 use crate::threads::copy;
 
-/// What one piece of work in flight needs; `U` are its uploads.
+/// The resources of one piece of work in flight; `U` are its uploads.
 pub(crate) struct InFlight<U> {
     // It goes first: it waits for its work to end before the buffers are freed.
     pub(crate) results: KernelResults,
     pub(crate) uploads: U,
     pub(crate) done: Option<Finish>,
-    /// Whether the kernel had run before: some drivers compile at the first dispatch, which then
-    /// does not count as slow.
+    /// Whether the kernel ran before. Some drivers compile at the first dispatch, which then does not count as slow.
     pub(crate) compiled: bool,
-    /// What work that goes on after its call uses, until it has ended.
+    /// The resources of work that continues after its call, until it has ended.
     pub(crate) kept: Option<KeptAlive>,
 }
 
-/// What work on an exported result uses besides its uploads and the result, which waits for the work itself.
+/// The resources of work on an exported result in addition to its uploads; the result waits for the work itself.
 pub(crate) struct KeptAlive {
     pub(crate) _segments: Arc<ClipBuffers>,
     pub(crate) _pipeline: Arc<Pipeline>,
 }
 
-/// What is left to do when a piece of work has been computed.
+/// The remaining steps after the device has computed a piece of work.
 pub(crate) struct Finish {
-    /// The bytes of the whole result that it makes.
+    /// The range of bytes of the whole result that the piece writes.
     pub(crate) output: Range<usize>,
     pub(crate) encoding: Encoding,
     /// Rotations that the host computed, by their index among those of the piece.
     pub(crate) patches: Vec<Patch>,
 }
 
-/// Adds up where the time of an evaluation goes.
+/// Sums of the times of an evaluation.
 #[derive(Default)]
 pub(crate) struct Stopwatch {
     pub(crate) timings: Timings,
-    /// When the last window was seen to have ended. Windows overlap, and the time that two share
-    /// must not count twice.
+    /// The time when the last window ended. Windows overlap, and the time that two share must be counted once.
     last: Option<Instant>,
-    /// A window took longer than [`LONG`].
+    /// Whether a window took longer than [`LONG`].
     pub(crate) slow: bool,
 }
 
-/// A window should take no longer. Systems reset a device that one program keeps busy for seconds
-/// (Windows after 2 s), and the display stands still long before that.
+/// The maximum time for a window. Systems reset a device that one program keeps busy for seconds (Windows after 2 s),
+/// and the display stops long before that.
 const LONG: Duration = Duration::from_millis(100);
 
 impl Stopwatch {
@@ -78,24 +76,24 @@ impl Stopwatch {
     }
 }
 
-/// Where results go.
+/// The destination of results.
 pub(crate) enum Target<'a> {
-    /// Straight into a mapped buffer.
+    /// Directly to a mapped buffer.
     Buffer(&'a mut Buffer),
-    /// Through the device's own memory into a buffer of the host's.
+    /// Through device memory to a buffer of the host.
     Staged(&'a mut Buffer),
-    /// Straight into the caller's memory, which is imported.
+    /// Directly to the caller's memory, which is imported.
     ImportedMemory(ImportedMemory<'a>),
-    /// Through a window's own buffer into the caller's memory.
+    /// Through each window's buffer to the caller's memory.
     Slice(&'a mut [u8]),
-    /// Into a buffer that the application made on this device.
+    /// To a buffer that the application made on this device.
     External(VulkanBuffer),
-    /// Into memory that others import.
+    /// To memory that others import.
     Exported(Arc<Exported>),
 }
 
 impl<'a> Target<'a> {
-    /// The caller's memory, for values of `each` bytes: imported if that is wanted and possible.
+    /// The caller's memory, for values of `each` bytes: imported if that is requested and possible.
     pub(crate) fn of(
         device: &Arc<LogicalDevice>,
         imports: bool,
@@ -109,8 +107,8 @@ impl<'a> Target<'a> {
             .map_or_else(Self::Slice, Self::ImportedMemory)
     }
 
-    /// The buffer that kernels write into and where the result starts in it, bytes; `None` where each
-    /// piece of work has a buffer of its own.
+    /// The buffer that kernels write, and the start of the result in it, bytes; `None` if each piece of work has a
+    /// buffer.
     pub(crate) fn destination(&self) -> Option<(vk::Buffer, u64)> {
         match self {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
@@ -121,7 +119,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Whether whoever uses the result waits by itself for the device to end.
+    /// Whether the user of the result waits for the device.
     pub(crate) fn is_waited_for_elsewhere(&self) -> bool {
         matches!(self, Self::Exported(result) if result.has_timeline())
     }
@@ -140,7 +138,7 @@ impl<U: Default> InFlight<U> {
 }
 
 impl<U> InFlight<U> {
-    /// Waits for the work, if there is any, and does what is left to do then.
+    /// Waits for the work, if there is any, and does the remaining steps.
     pub(crate) fn finish(
         &mut self,
         target: &mut Target<'_>,
@@ -181,22 +179,22 @@ impl<U> InFlight<U> {
     }
 }
 
-/// Submitted kernels, and the memory that their results come back through. It must be dropped before anything else
-/// that the kernels use.
+/// Submitted kernels, and the memory through which their results come back. It must be dropped before other resources
+/// of the kernels.
 pub(crate) struct KernelResults {
     // Kernels and copy go first: they wait for their end before the buffers are freed.
     pub(crate) kernels: Submission,
     apart: Option<CopyApart>,
-    /// What kernels write.
+    /// The buffer that kernels write.
     output: Option<Buffer>,
-    /// What the host reads, where that is not the same.
+    /// The buffer that the host reads, if it is another one.
     host: Option<Buffer>,
 }
 
 /// Copies in separate submissions.
 struct CopyApart {
     submission: Submission,
-    /// What the kernels' queue has reached.
+    /// The timeline that the kernels' queue signals.
     done: Semaphore,
 }
 
@@ -210,8 +208,7 @@ impl KernelResults {
         })
     }
 
-    /// The buffer for kernels to write, of this size or longer; `staged` results are copied out of
-    /// the device's own memory.
+    /// The buffer for kernels to write, of at least this size; `staged` results are copied from device memory.
     pub(crate) fn room(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -226,7 +223,7 @@ impl KernelResults {
         grow(device, &mut self.output, size, Residence::Results)
     }
 
-    /// The same for results that are copied to a buffer which is not one of these.
+    /// As `room`, for results that are copied to another buffer than this one's.
     pub(crate) fn room_apart(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -246,14 +243,14 @@ impl KernelResults {
         Ok(())
     }
 
-    /// Submits the recorded kernels, and what brings the first `size` bytes of the results to the host;
-    /// with `None` they were written into other memory, where the host sees them.
+    /// Submits the recorded kernels and the copy of the first `size` bytes of the results to the host. With `None`,
+    /// the kernels write other memory, which the host can access.
     pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
         self.submit_to(size, None)
     }
 
-    /// As [`ReadBack::submit`]; the results go to another buffer that the host sees, from an offset on, if one
-    /// is named.
+    /// As [`KernelResults::submit`]; the results are copied to another host-visible buffer, from an offset on, if one
+    /// is specified.
     pub(crate) fn submit_to(
         &mut self,
         size: Option<u64>,
@@ -292,7 +289,7 @@ impl KernelResults {
         Ok(copied && self.kernels.is_done()?)
     }
 
-    /// Waits for the copy and for the kernels, whose time it returns, the copy's end included.
+    /// Waits for the copy and for the kernels, and returns their time, including the end of the copy.
     pub(crate) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
         if let Some(apart) = &mut self.apart {
             apart.submission.wait()?;
@@ -310,7 +307,7 @@ impl KernelResults {
     }
 }
 
-/// A kept buffer of at least `size` bytes, which is replaced if it is shorter.
+/// A kept buffer of at least `size` bytes; a shorter one is replaced.
 fn grow<'b>(
     device: &Arc<LogicalDevice>,
     kept: &'b mut Option<Buffer>,

@@ -11,11 +11,10 @@ use crate::threads::lock;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// The process that created the first instance. Drivers have threads of their own, which a process that is
-/// forked from it has not.
+/// The process that created the first instance. Drivers have threads, which do not exist in a forked process.
 static USED_BY: OnceLock<u32> = OnceLock::new();
 
-/// An instance, destroyed with its last user unless it was handed in.
+/// An instance. It is destroyed with its last user, unless it belongs to the application.
 pub(crate) struct Instance {
     pub(crate) raw: ash::Instance,
     pub(crate) debug_utils: bool,
@@ -44,7 +43,7 @@ impl Instance {
         Self::of_version(validation, vk::API_VERSION_1_3)
     }
 
-    /// The same for an application that asks for that version of Vulkan.
+    /// As `new`, for an application that requests this version of Vulkan.
     pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
         // So say loaders that find no driver.
         let is_absence = |error: &VulkanError| {
@@ -156,7 +155,7 @@ impl Instance {
         Ok(Arc::new(instance))
     }
 
-    /// An application's instance; it stays the application's to destroy.
+    /// An instance of an application, which must destroy it.
     pub(crate) fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
         Arc::new(Self {
             raw,
@@ -189,7 +188,7 @@ impl Instance {
     }
 }
 
-/// Whether this machine has a card of NVIDIA's and none of the files that name its Vulkan driver.
+/// Whether this machine has an NVIDIA card and no manifest of its Vulkan driver.
 pub(crate) fn lacks_nvidia_driver() -> bool {
     let folders = [
         "/usr/share/vulkan/icd.d",
@@ -209,7 +208,7 @@ fn lacks_driver(card: &Path, folders: &[&Path]) -> bool {
     card.exists() && !folders.iter().any(has_driver)
 }
 
-/// Where Homebrew puts the loader, and `MoltenVK`, which is one too: neither is where macOS looks.
+/// Homebrew's paths of the loader and of `MoltenVK`, which can be used as a loader; macOS does not search there.
 const HOMEBREW: [&str; 4] = [
     "/opt/homebrew/lib/libvulkan.1.dylib",
     "/usr/local/lib/libvulkan.1.dylib",

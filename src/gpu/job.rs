@@ -1,4 +1,4 @@
-//! A job: what of a clip on the device is to be evaluated.
+//! A job: the samples of a clip on the device that are to be evaluated.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(crate) struct ClipBuffers {
     pub(crate) groups: Vec<(Buffer, Buffer)>,
 }
 
-/// What is to be evaluated, and how stored.
+/// The samples to evaluate, and their encoding.
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) clip: &'a ClipData,
@@ -33,13 +33,13 @@ pub(crate) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// The kernel that evaluates what is listed.
+    /// The kernel for a kind of list.
     pub(crate) fn kernel(&self, list: List) -> Kernel {
         let form = self.clip.interpolation.form();
         Kernel::over_segments(form, list, self.encoding.row().store)
     }
 
-    /// What it binds for a group.
+    /// The buffers that the kernel binds for a group.
     pub(crate) fn bindings(
         &self,
         group: &GroupItems,
@@ -53,7 +53,7 @@ impl Job<'_> {
         all
     }
 
-    /// All of the result.
+    /// The window of the whole result.
     pub(crate) fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
     }

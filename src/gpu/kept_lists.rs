@@ -1,5 +1,5 @@
-//! Lists that stay on the device: what a kernel reads of a result's samples depends on the clip, the
-//! samples and the layout alone, so whoever asks for the same ones again needs none of it anew.
+//! Work lists that stay on the device. They depend only on the clip, the samples and the layout, so a repeated
+//! request uses them again.
 
 use std::sync::{Arc, Mutex};
 
@@ -12,10 +12,10 @@ use crate::output::window::Window;
 use crate::threads::{lock, on_threads};
 use crate::time::frames::{Ticks, Timeline};
 
-/// The lists of a result, window by window, in the memory of a device.
+/// The lists of a result, window by window, in device memory.
 pub(crate) struct KeptLists {
     device: Arc<LogicalDevice>,
-    /// In the order in which they lie in the result.
+    /// The windows, in the order of the result.
     pub(crate) windows: Vec<KeptWindow>,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct KeptWindow {
 }
 
 impl KeptWindow {
-    /// What kernels bind of the lists, in their order.
+    /// The bindings of the lists, in the kernels' order.
     pub(crate) fn bindings(&self) -> Vec<Binding> {
         let uploads = self.lists.uploads(self.work.list).into_iter();
         uploads.filter_map(Upload::binding).collect()
@@ -35,7 +35,7 @@ impl KeptWindow {
 }
 
 impl KeptLists {
-    /// Lists all of a result, in windows of at most so many values, and brings the lists to the device.
+    /// Makes the lists of the whole result, in windows of at most this number of values, and uploads them.
     pub(crate) fn new(
         request: ListRequest<'_>,
         whole: &Window,
@@ -75,7 +75,7 @@ impl KeptLists {
         })
     }
 
-    /// The lists of a window of the result, where the result was cut as it is now.
+    /// The lists of a window of the result, if the result is divided in the same way as now.
     pub(crate) fn of(&self, window: &Window) -> Option<&KeptWindow> {
         let start = |kept: &KeptWindow| kept.window.start;
         let index = self
@@ -86,7 +86,7 @@ impl KeptLists {
             .filter(|kept| kept.window == *window)
     }
 
-    /// Bytes of the device's memory.
+    /// The size in device memory, bytes.
     fn bytes(&self) -> u64 {
         let windows = self.windows.iter();
         let uploads = windows.flat_map(|kept| kept.lists.uploads(kept.work.list));
@@ -94,32 +94,32 @@ impl KeptLists {
     }
 }
 
-/// More bytes of lists than this are not kept.
+/// The maximum size of kept lists, bytes.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// Results of which a clip keeps the lists.
+/// The number of results whose lists a clip keeps.
 const MAX_RESULTS: usize = 2;
 
-/// The lists that a clip keeps, of frames at a rate: from the second time on that the same ones are asked for,
-/// so that whoever never asks twice pays for none.
+/// The lists that a clip keeps for frames at a rate. They are kept from the second time that the same ones are
+/// requested, so that single requests cost nothing.
 #[derive(Default)]
 pub(crate) struct ListCache(Mutex<CachedLists>);
 
 #[derive(Default)]
 struct CachedLists {
-    /// What was asked for last.
+    /// The last request.
     last: Option<Asked>,
-    /// What was asked for again, and whose lists are too long to keep.
+    /// The repeated request whose lists are too long to keep.
     too_long: Option<Asked>,
-    /// The latest first.
+    /// Kept lists, the latest first.
     lists: Vec<(Asked, Arc<KeptLists>)>,
 }
 
-/// The samples, what of them is the result, and the values of its windows.
+/// A request: the samples, the window of the result, and the number of values of its windows.
 type Asked = (Timeline, Window, usize);
 
 impl ListCache {
-    /// The lists of a result in windows of so many values, if they are kept or shall be from now on.
+    /// The lists of a result in windows of this number of values, if they are kept or are to be kept from now on.
     pub(crate) fn lists(
         &self,
         request: ListRequest<'_>,
@@ -159,7 +159,7 @@ impl ListCache {
         Ok(made)
     }
 
-    /// Lets go of all, where memory is short.
+    /// Drops all lists, if memory is short.
     pub(crate) fn forget(&self) {
         *lock(&self.0) = CachedLists::default();
     }

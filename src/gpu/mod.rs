@@ -1,54 +1,53 @@
 //! Vulkan, through `ash`: evaluation on a device, with the bits of the CPU. Unsafe code is allowed here.
 //!
-//! A driver may be slow to compile, run out of memory, lose its device, round otherwise than Vulkan demands, or
-//! belong to an application that draws at the same time. So work goes to the device in windows that are short and
-//! of bounded memory, what a kernel computes is compared with the CPU before it is used, and whatever fails is
-//! repeated by one piece of code.
+//! A driver may compile slowly, run out of memory, lose its device, round differently from Vulkan's rules, or belong
+//! to an application that draws at the same time. Therefore work is submitted in short windows with limited memory,
+//! kernels are compared with the CPU before they are used, and failed work is repeated by one piece of code.
 //!
 //! # Types
 //!
-//! One type owns one Vulkan object, destroys it, and keeps what it was made from alive:
+//! One type owns one Vulkan object, destroys it, and keeps alive the objects from which it was made:
 //!
 //! * [`Instance`](instance::Instance), [`PhysicalDevice`](physical::PhysicalDevice) with its queue families and memory
 //!   types, [`LogicalDevice`](device::LogicalDevice) with a queue for kernels and, on cards, one for copies;
-//! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands, a
-//!   fence and descriptor sets that are used again and again;
+//! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands,
+//!   a fence and descriptor sets that are reused;
 //! * [`VulkanEngine`](engine::VulkanEngine): a device with its pipelines, and buffers kept for the next call;
-//! * [`Opened`](recovery::Opened): what the rest of the crate holds. It has the current `VulkanEngine`, opens a lost
-//!   device again, and repeats work that ran out of memory in smaller windows.
+//! * [`Opened`](recovery::Opened): the device for the rest of the crate. It has the current `VulkanEngine`, opens a
+//!   lost device again, and repeats work that ran out of memory in smaller windows.
 //!
-//! # From a call to its bytes
+//! # Steps
 //!
-//! 1. `evaluate::uploaded` makes a [`Job`](job::Job): prepared segments, which lie on the device as
-//!    [`ClipBuffers`](job::ClipBuffers), sample times and an encoding. `Opened::attempt_smaller` runs it.
-//! 2. [`engine::run`] cuts the result into windows of at most 2²¹ rotations and runs them pipelined: while the device
-//!    works on one, the host lists the next ([`in_flight`]).
+//! 1. `evaluate::uploaded` makes a [`Job`](job::Job): prepared segments on the device
+//!    ([`ClipBuffers`](job::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
+//! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
+//!    device evaluates one window, the host lists the next ([`in_flight`]).
 //! 3. [`work_list`] lists which samples of a window belong to which segment, as runs, single samples, or a grid;
-//!    [`kept_lists`] keeps the lists of frames that are asked for again. [`upload`] writes them where kernels read.
+//!    [`kept_lists`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
 //! 4. [`submission`] records the copies of the lists, barriers, and a dispatch for each group of segments.
-//! 5. `InFlight::finish` waits for the fence, copies the bytes to the caller where they are not there yet, and
-//!    overwrites the rotations that the host computed in f64 because no polynomial fits their curve.
+//! 5. `InFlight::finish` waits for the fence, copies the bytes to the caller if necessary, and overwrites the
+//!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
-//! Sets with fewer samples than keys go to [`engine::from_keys`] without segments. Crowds have their own tables and
-//! targets ([`crowd`]); [`clip_target`] records a clip into an application's commands, and [`pass_target`] passes over
-//! poses from buffer to buffer.
+//! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
+//! tables and targets ([`crowd`]). [`clip_target`] records a clip into an application's commands, and [`pass_target`]
+//! records passes over poses from buffer to buffer.
 //!
-//! # Where memory lies
+//! # Memory
 //!
 //! | what | memory |
 //! |---|---|
-//! | segments, constants, tables of crowds | the device's own |
-//! | lists and keys | the device's own where the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied there, or read from the host's |
-//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else the device's own, copied by the second queue beside later kernels |
-//! | results for CUDA | the device's own, exported as a file ([`exported`]) |
+//! | segments, constants, tables of crowds | device memory |
+//! | lists and keys | device memory if the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied to it, or read in host memory |
+//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else device memory, copied by the second queue beside later kernels |
+//! | results for CUDA | device memory, exported as a file descriptor ([`exported`]) |
 //!
 //! Small buffers share allocations of 4 MiB ([`SharedMemory`](shared_memory::SharedMemory)).
 //!
 //! # Trust
 //!
-//! [`self_test`] runs when a device is opened, [`kernel_check`] when a pipeline is first made; what passed is
-//! remembered ([`cache`]). Without the feature `vulkan`, `absent.rs` stands here instead: the names that the rest of
-//! the crate uses, with nothing behind them.
+//! [`self_test`] runs when a device is opened, [`kernel_check`] when a pipeline is first made; passed checks are
+//! stored ([`cache`]). Without the feature `vulkan`, `absent.rs` replaces this module: it has the names that the rest
+//! of the crate uses, without functions.
 #![allow(unsafe_code)]
 
 #[cfg(feature = "prove")]

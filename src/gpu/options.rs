@@ -1,125 +1,122 @@
-//! Choices for an engine, and where its time went.
+//! Options of an engine, and the times of its evaluations.
 
 use std::ops::AddAssign;
 use std::time::Duration;
 
 use crate::simd::dispatch::VectorWidth;
 
-/// How results of a Vulkan device reach the host.
+/// How results of a Vulkan device reach the host's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Transfer {
-    /// In place where the device shares the host's memory, else staged. Software devices
-    /// work on the caller's own memory where they can, without a copy.
+    /// `InPlace` if the device shares the host's memory, otherwise `Staged`. Software devices write directly into the
+    /// caller's memory if possible.
     #[default]
     Automatic,
-    /// The kernel writes into memory that the host reads.
+    /// The kernel writes into memory that the host can read.
     InPlace,
-    /// The kernel writes into the device's memory, from where results are copied.
+    /// The kernel writes into the device's memory, and results are copied to the host.
     Staged,
 }
 
-/// On which queue of a Vulkan device results are copied to the host, where they are copied
-/// ([`Transfer::Staged`]).
+/// On which queue of a Vulkan device results are copied to the host, if they are copied ([`Transfer::Staged`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReadBack {
-    /// Cards that have a second queue: [`ReadBack::Overlapped`]; all others, and software devices:
+    /// [`ReadBack::Overlapped`] on cards that have a second queue, otherwise and on software devices
     /// [`ReadBack::SameQueue`].
     #[default]
     Automatic,
     /// In the submission of the kernels, after them.
     SameQueue,
-    /// In a submission of its own, which waits for the kernels' on a timeline semaphore: on a second
-    /// queue, so that the next kernels run beside the copy; where there is none, on the same queue.
-    /// Devices without timeline semaphores copy as by [`ReadBack::SameQueue`].
+    /// In a separate submission, which waits for the kernels on a timeline semaphore. It uses a second queue, so that
+    /// the next kernels run beside the copy, or the same queue if there is no other. Devices without timeline
+    /// semaphores use [`ReadBack::SameQueue`].
     Overlapped,
 }
 
-/// How keys, segments and work lists come to a Vulkan device.
+/// How keys, segments and work lists are transferred to a Vulkan device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Uploads {
-    /// Each upload by itself: as [`Uploads::Direct`] where the memory that is both the device's and
-    /// the host's is as large as the device's (resizable BAR, integrated devices), or the upload is at
-    /// most a 64th of it; else read in place or staged, as results are ([`Transfer`]).
+    /// [`Uploads::Direct`] if the memory that is device-local and host-visible is as large as the device's memory
+    /// (resizable BAR, integrated devices), or if the upload is at most a 64th of that memory. Otherwise as results
+    /// ([`Transfer`]): read in place or staged.
     #[default]
     Automatic,
-    /// Written by the host into the device's own memory, where any of it is visible to the host and
-    /// there is room; else as by `Automatic`.
+    /// The host writes into device-local memory, if some of it is host-visible and has room; otherwise as
+    /// `Automatic`.
     Direct,
-    /// Written into the host's memory, from where the device copies them.
+    /// The host writes into host memory, from which the device copies.
     Staged,
 }
 
 /// How kernels of a Vulkan device read keys, segments and work lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reads {
-    /// Texel buffers on software devices that can, else storage buffers.
+    /// Texel buffers on software devices that support them, otherwise storage buffers.
     #[default]
     Automatic,
     /// Storage buffers.
     StorageBuffers,
-    /// Texel buffers, and stores of 64 bits, on devices that have 64-bit integers and texel
-    /// buffers as long as their largest allocation; else storage buffers.
+    /// Texel buffers, and stores of 64 bits, on devices with 64-bit integers and with texel buffers as long as their
+    /// largest allocation; otherwise storage buffers.
     TexelBuffers,
 }
 
-/// How the samples of a result are shared among the invocations of a kernel on a Vulkan device.
+/// How the samples of a result are distributed to the invocations of a kernel on a Vulkan device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mapping {
     /// [`Mapping::Samples`] on graphics cards and integrated devices, [`Mapping::Runs`] on software
     /// devices.
     #[default]
     Automatic,
-    /// An invocation takes up to 16 consecutive samples of one segment, whose constants it loads
-    /// once. Devices that serve their lanes one by one are fastest so.
+    /// Each invocation evaluates up to 16 consecutive samples of one segment, whose constants it loads once. This is
+    /// fastest on devices that execute their lanes one after another.
     Runs,
-    /// Neighbouring invocations take neighbouring samples: the lanes that a card runs together write
-    /// whole lines of memory, and read the constants that they share from one address.
+    /// Neighbouring invocations evaluate neighbouring samples. The lanes that a card executes together write whole
+    /// cache lines and read shared constants from one address.
     Samples,
 }
 
-/// Choices for an [`Engine`](crate::engine::Engine); none of them changes a bit of any result.
+/// Options of an [`Engine`](crate::engine::Engine). None of them changes any bit of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct EngineOptions {
-    /// Bytes of the device's memory to use besides results, on the CPU for the segments of a set; no limit by
-    /// default. What needs more is prepared piece by piece.
+    /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+    /// set. By default there is none. Larger sets are prepared piece by piece.
     pub memory: Option<u64>,
-    /// Worker threads of the CPU; by default those that all engines of the process share, as many as the
-    /// environment's `RAYON_NUM_THREADS` says, else one for each core.
+    /// The number of worker threads of the CPU. By default all engines of the process share a pool of as many threads
+    /// as the environment variable `RAYON_NUM_THREADS` says, or one for each core.
     pub thread_count: Option<usize>,
-    /// The widest vector instructions to evaluate with on the CPU; by default
-    /// [`VectorWidth::widest`].
+    /// The widest vector instructions that the CPU uses; by default [`VectorWidth::widest`].
     pub vector_width: Option<VectorWidth>,
-    /// Whether the CPU writes past its caches: rotations of segments in f32, track by track, where the
-    /// memory is aligned to 16 bytes. By default it does so with results of 32 MiB and more, on
-    /// processors that gain by it.
+    /// Whether the CPU uses non-temporal stores, which bypass the caches. They apply to rotations in f32, track by
+    /// track, in memory that is aligned to 16 bytes. By default they are used for results of 32 MiB and more, on
+    /// processors where they are faster.
     pub streaming_stores: Option<bool>,
-    /// How results come back from a Vulkan device.
+    /// How results are transferred from a Vulkan device.
     pub transfer: Transfer,
-    /// On which queue results are copied back.
+    /// On which queue results are copied to the host.
     pub read_back: ReadBack,
-    /// How a Vulkan device gets what its kernels read.
+    /// How keys, segments and work lists are transferred to a Vulkan device.
     pub uploads: Uploads,
-    /// How a Vulkan device's kernels read.
+    /// How kernels of a Vulkan device read their input.
     pub reads: Reads,
-    /// How a Vulkan device's invocations share the samples.
+    /// How samples are distributed to invocations of a Vulkan device.
     pub mapping: Mapping,
-    /// Use a device although it fails the self-test: its bits may differ.
+    /// Whether a device is used although it fails the self-test; its bits may differ from the CPU's.
     pub allow_inexact: bool,
 }
 
-/// Where the time of a Vulkan device's evaluations went
-/// ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
+/// The times of a Vulkan device's evaluations ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// Time in which the host made work lists and recorded commands; the device may have worked on
-    /// another window meanwhile.
+    /// Time in which the host made work lists and recorded commands. The device may have worked on another window at
+    /// the same time.
     pub work_lists: Duration,
-    /// Time from submitting work to seeing that it has ended, copies included; time that several windows in
+    /// Time from the submission of work until the host saw its end, including copies. Time that several windows in
     /// flight share is counted once.
     pub submit_to_fence: Duration,
-    /// Time in which the queue of the kernels worked, by the device's clock; zero where it has none.
-    /// Copies on another queue run beside it and are not counted here.
+    /// Time in which the kernels' queue was busy, by the device's time stamps; zero if it has none. Copies on another
+    /// queue are not included.
     pub on_device: Duration,
     /// Time in which the host copied results into the caller's memory.
     pub read_back: Duration,

@@ -1,5 +1,5 @@
-//! Passes over rotations where these lie: recorded from an application's buffers into another of its buffers, with
-//! everything that it takes made once.
+//! Passes over poses, recorded from buffers of an application into another of its buffers, with all resources
+//! prepared once.
 
 use std::sync::Arc;
 
@@ -18,37 +18,37 @@ use crate::output::pose_error::{OFFSET_STEP, PoseError, check_fraction, check_we
 use crate::output::rotations::Layout;
 use crate::shader::{Kernel, Link, PoseDispatch};
 
-/// Bytes of a rotation, and of every other value that passes read and write.
+/// Bytes of a rotation, and of every other value that passes read or write.
 pub(crate) const VALUE: u64 = size_of::<[f32; 4]>() as u64;
 
-/// Values of a window of poses that are added, frame by frame: its reference rotations, which all windows share,
-/// take a megabyte.
+/// The number of values in a window when poses are added frame by frame. All windows share the reference rotations of
+/// one window, a mebibyte.
 const ADDED_AT_ONCE: usize = 1 << 16;
 
-/// A pass, and the ranges of buffers that it reads. Each is as long as the pass reads, and begins at a multiple
-/// of [`OFFSET_STEP`]; those of a blend at a whole value.
+/// A pass, and the ranges of the buffers that it reads. Each range is as long as the pass needs, and starts at a
+/// multiple of [`OFFSET_STEP`]; those of a blend start at a multiple of a value's size.
 pub(crate) enum PassJob<'a> {
     /// The weighted sum of layers.
     Blend(Vec<VulkanBuffer>),
-    /// Slerp from one to another.
+    /// Slerp from the first to the second.
     Mix([VulkanBuffer; 2]),
-    /// A base and a layer, with a reference for each track.
+    /// A base and a layer, with a reference rotation for each track.
     Add([VulkanBuffer; 2], &'a [Quat]),
     /// Poses frame by frame, and the skeleton.
     World(VulkanBuffer, &'a [Link]),
 }
 
-/// The rotations of a pass: tracks, samples, and how they lie.
+/// The shape of a pass: tracks, samples, and their layout.
 pub(crate) type PassShape = (usize, usize, Layout);
 
-/// A layer of a blend that is copied to where the others lie: from where, and to which offset.
+/// A layer of a blend that is copied next to the others: its location, and the offset that it is copied to.
 struct GatheredLayer {
     from: vk::Buffer,
     from_offset: u64,
     to_offset: u64,
 }
 
-/// Layers that are copied together before they are blended.
+/// Layers that are copied into one buffer before they are blended.
 struct Gathered {
     buffer: Buffer,
     layers: Vec<GatheredLayer>,
@@ -56,16 +56,16 @@ struct Gathered {
     size: u64,
 }
 
-/// A pass over poses that is recorded into an application's commands, and the buffers that it reads and writes
-/// ([`PassRequest::target`](crate::pose::pass::PassRequest::target)). Recording allocates nothing.
+/// A pass over poses, prepared for recording into an application's commands, and the buffers that it reads and writes
+/// ([`PassRequest::target`](crate::pose::pass::PassRequest::target)). Recording does not allocate.
 pub struct PassTarget {
     engine: Arc<VulkanEngine>,
     pipeline: Arc<Pipeline>,
     gathered: Option<Gathered>,
-    /// What the weights are, and where kernels read them.
+    /// The weights, and where kernels read them.
     weights: Vec<f32>,
     weights_at: Vec<(vk::Buffer, u64)>,
-    /// Whether the weights are fractions of the way between two rotations.
+    /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     dispatches: Vec<(vk::DescriptorSet, PoseDispatch)>,
     bytes: u64,
@@ -75,17 +75,17 @@ pub struct PassTarget {
     _buffers: Vec<Buffer>,
 }
 
-/// What a target binds while it is made.
+/// The resources of a target while it is made.
 struct Parts<'a> {
     engine: &'a VulkanEngine,
     buffers: Vec<Buffer>,
     weights_at: Vec<(vk::Buffer, u64)>,
-    /// The buffers of each dispatch, and its arguments.
+    /// The buffers and the arguments of each dispatch.
     dispatches: Vec<(Vec<Binding>, PoseDispatch)>,
 }
 
 impl Parts<'_> {
-    /// A range of `size` bytes, `start` bytes behind the beginning of a buffer's.
+    /// A range of `size` bytes that starts `start` bytes after the start of the range `of`.
     fn range(
         &self,
         subject: &'static str,
@@ -97,7 +97,7 @@ impl Parts<'_> {
         Ok(Binding::range(of.buffer, of.offset + start, size))
     }
 
-    /// Memory of the device for so many weights, which every recording writes.
+    /// Memory of the device for `count` weights, which every recording writes.
     fn weights(&mut self, count: usize) -> Result<Binding, VulkanError> {
         let size = (count * size_of::<f32>()) as u64;
         (self.engine.device.physical).check_range("the weights of a blend", size)?;
@@ -109,7 +109,7 @@ impl Parts<'_> {
         Ok(binding)
     }
 
-    /// Reference rotations of some values, with room for the weight behind the last.
+    /// A buffer of `count` reference rotations, followed by room for the weight.
     fn references(
         &mut self,
         count: usize,
@@ -135,7 +135,7 @@ impl Parts<'_> {
     }
 }
 
-/// Whether ranges of `size` bytes lie one behind the other in one buffer, and begin where a kernel may bind them.
+/// Whether ranges of `size` bytes are contiguous in one buffer and start at an offset that a kernel can bind.
 fn are_bound_together(ranges: &[VulkanBuffer], size: u64) -> bool {
     let begins = ranges
         .first()
@@ -148,7 +148,7 @@ fn are_bound_together(ranges: &[VulkanBuffer], size: u64) -> bool {
 }
 
 impl PassTarget {
-    /// For a pass and the range of a buffer that its result goes to, both of which are as they must be.
+    /// Makes a target for a pass and the range of its result, both of which were checked.
     pub(crate) fn new(
         engine: &Arc<VulkanEngine>,
         job: &PassJob<'_>,
@@ -266,17 +266,17 @@ impl PassTarget {
         })
     }
 
-    /// Bytes of the result.
+    /// The length of the result, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Other weights, for what is recorded from now on: one for each layer of a blend, one for two layers that are
-    /// mixed or added, none for a skeleton.
+    /// Sets the weights for later recordings: one for each layer of a blend, one for two layers that are mixed or
+    /// added, none for a skeleton.
     ///
     /// # Errors
-    /// When there are not as many as the pass takes, or as for the pass.
+    /// When the number of weights is wrong, or a weight is out of range for the pass.
     pub fn set_weights(&mut self, weights: &[f32]) -> Result<(), PoseError> {
         if weights.len() != self.weights.len() {
             return Err(PoseError::WeightCount {
@@ -294,17 +294,18 @@ impl PassTarget {
         Ok(())
     }
 
-    /// Records the pass into the application's command buffer. Nothing is waited for and nothing allocated: the
-    /// weights, which stay in the commands, and a dispatch; of poses that are added frame by frame one for each
-    /// 65 536 values, and before a blend a copy of each layer where the layers do not lie one behind the other. What
-    /// is recorded waits for all that was recorded before it, as the samples of a clip
-    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)), and all that comes behind it sees the
-    /// result; it may be submitted as often as the application likes.
+    /// Records the pass into the application's command buffer.
+    ///
+    /// Recording neither waits nor allocates. It records the weights, whose values stay in the commands, and one
+    /// dispatch; for poses that are added frame by frame one dispatch for each 65 536 values; and before a blend a
+    /// copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of a clip
+    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)): the pass waits for all commands
+    /// recorded before it, and later commands see the result. The commands may be submitted any number of times.
     ///
     /// # Safety
-    /// The command buffer must be of the engine's device, in recording, outside of a render pass, and of a family
-    /// that computes. The target must live until the work has ended, and what is recorded with one target must run
-    /// on one queue.
+    /// The command buffer must belong to the engine's device and to a queue family that can compute, and must be in
+    /// the recording state, outside a render pass. The target must live until the work has ended. All recordings of
+    /// one target must run on one queue.
     pub unsafe fn record(&self, commands: vk::CommandBuffer) {
         // SAFETY: promised by the caller.
         self.record_into(unsafe { Commands::new(&self.engine.device, commands) });
@@ -337,7 +338,7 @@ impl PassTarget {
         commands.barrier(Access::Kernel, Access::Any);
     }
 
-    /// Runs the pass, and waits for it.
+    /// Runs the pass and waits for its end.
     pub(crate) fn run(&self) -> Result<(), VulkanError> {
         let mut submission = Submission::new(&self.engine.device, QueueLane::Kernels)?;
         submission.begin(0)?;
@@ -348,7 +349,7 @@ impl PassTarget {
     }
 }
 
-/// Memory in which the layers of a blend lie together.
+/// Memory for a contiguous copy of the layers of a blend.
 fn gather(
     engine: &VulkanEngine,
     layers: &[VulkanBuffer],
@@ -368,7 +369,8 @@ fn gather(
     })
 }
 
-/// Frames of a window of poses that are added: as many as begin every window where a kernel may bind it.
+/// The number of frames in a window of poses that are added: a multiple with which every window starts at an offset
+/// that a kernel can bind.
 fn window_of_frames(tracks: usize) -> usize {
     let values = (OFFSET_STEP / VALUE) as usize;
     let step = values >> tracks.trailing_zeros().min(values.trailing_zeros());

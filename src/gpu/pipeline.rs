@@ -9,7 +9,7 @@ use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
 use crate::shader::{CrowdDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
 
-/// Bytes that come with a dispatch, at most; Vulkan allows at least 128.
+/// The maximum size of push constants, bytes; Vulkan guarantees at least 128.
 const PUSHED: u32 = {
     let size = size_of::<CrowdDispatch>();
     assert!(size_of::<Dispatch>() <= size && size_of::<Grid>() <= size);
@@ -24,18 +24,18 @@ pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
     pub(crate) set_layout: vk::DescriptorSetLayout,
-    /// How many buffers it binds; it writes the last one.
+    /// The number of buffers that it binds; it writes the last one.
     pub(crate) bindings: u32,
-    /// Whether the buffers that it reads are texel buffers, not storage buffers.
+    /// Whether its input buffers are texel buffers, not storage buffers.
     reads_texels: bool,
-    /// The kernel, as [`kernels`](crate::shader::kernels) names it.
+    /// The kernel's name, as in [`kernels`](crate::shader::kernels).
     pub(crate) name: &'static str,
-    /// A hash of the code that the driver got.
+    /// A hash of the code that was passed to the driver.
     pub(crate) code_hash: u64,
     pub(crate) has_run: AtomicBool,
 }
 
-/// The code of a kernel as a driver gets it.
+/// The code of a kernel as it is passed to the driver.
 fn words(device: &LogicalDevice, code: &[u32], exactness: Exactness) -> Vec<u32> {
     let words = match exactness {
         Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
@@ -45,7 +45,8 @@ fn words(device: &LogicalDevice, code: &[u32], exactness: Exactness) -> Vec<u32>
 }
 
 impl Pipeline {
-    /// Storage buffers that a kernel binds on a device: all of its buffers, or only the one that it writes.
+    /// The number of storage buffers that a kernel binds on a device: all its buffers, or only the one that it
+    /// writes.
     pub(crate) fn storage_buffers(device: &LogicalDevice, kernel: Kernel) -> u32 {
         let (.., reads_texels) = kernel.code(device.reads_texels);
         match reads_texels {
@@ -54,7 +55,7 @@ impl Pipeline {
         }
     }
 
-    /// The hash that the code of a kernel's pipeline has.
+    /// The hash of a kernel's code on this device.
     pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
         let (_, code, _) = kernel.code(device.reads_texels);
         spirv::hash(&words(device, code, Exactness::Demanded))
@@ -149,12 +150,12 @@ impl Pipeline {
     }
 }
 
-/// Whether a driver must compute as the shader is written.
+/// Whether a driver must not change the shader's operations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exactness {
-    /// Decorations and float controls: what every evaluation uses.
+    /// With decorations and float controls, as in all evaluations.
     Demanded,
-    /// Neither: what the negative control uses, to prove that they matter.
+    /// Without them, as in the negative control, which shows that they have an effect.
     LeftToTheDriver,
 }
 

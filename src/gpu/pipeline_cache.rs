@@ -1,4 +1,4 @@
-//! What a driver compiled, kept in a file from process to process.
+//! The driver's compiled kernels, kept in a file from process to process.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,24 +9,24 @@ use crate::gpu::cache::{Cache, sum};
 use crate::gpu::physical::PhysicalDevice;
 use crate::threads::lock;
 
-/// Bytes that a cache may have: all kernels of a card take a few MB.
+/// The maximum size of a cache, bytes: all kernels of a card take a few MB.
 const MAX_BYTES: usize = 64 << 20;
 
-/// A cache of Vulkan's; null where it could not be made, which costs time and nothing else.
+/// A pipeline cache of Vulkan; null if it could not be made, which only costs time.
 pub(crate) struct PipelineCache {
     pub(crate) raw: vk::PipelineCache,
     files: Cache,
     name: String,
-    /// What the driver's header must say.
+    /// The expected header of the driver.
     driver: (u32, u32, [u8; 16]),
-    /// The sum of what was last read or written.
+    /// The checksum of the data that was last read or written.
     known: Mutex<u64>,
-    /// Whether a pipeline was made since.
+    /// Whether a pipeline was made since then.
     has_grown: AtomicBool,
 }
 
 impl PipelineCache {
-    /// With what was kept for the device's driver, if it is for that.
+    /// Makes a cache with the stored data of the device's driver, if there are any.
     pub(crate) fn new(device: &ash::Device, physical: &PhysicalDevice) -> Self {
         let (vendor, model, uuid) = physical.pipeline_cache;
         let digits: String = uuid.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -46,14 +46,14 @@ impl PipelineCache {
         cache
     }
 
-    /// What is kept for the driver; nothing where only others' is kept.
+    /// The stored data of the driver; empty if there are only other drivers' data.
     fn kept(&self) -> Vec<u8> {
         let kept = self.files.read(&self.name, MAX_BYTES);
         kept.filter(|kept| is_for(kept, self.driver))
             .unwrap_or_default()
     }
 
-    /// A cache of Vulkan's with some data of the driver's; null where it cannot be made.
+    /// Makes a pipeline cache of Vulkan with data of the driver; null if that fails.
     fn with(device: &ash::Device, data: &[u8]) -> vk::PipelineCache {
         let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
         // SAFETY: the device is alive, and the data is headed as its driver heads it; whoever calls destroys
@@ -61,12 +61,13 @@ impl PipelineCache {
         unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default()
     }
 
-    /// A pipeline was made.
+    /// Records that a pipeline was made.
     pub(crate) fn note(&self) {
         self.has_grown.store(true, Ordering::Relaxed);
     }
 
-    /// Writes what was compiled since, where anything was, with what other processes kept meanwhile.
+    /// Stores the pipelines that were compiled since then, if any, together with those that other processes have
+    /// stored.
     pub(crate) fn keep(&self, device: &ash::Device) {
         let null = vk::PipelineCache::null();
         if self.raw == null || !self.has_grown.swap(false, Ordering::Relaxed) {
@@ -98,7 +99,7 @@ impl PipelineCache {
     }
 
     /// # Safety
-    /// Nothing may use it any more, and the device must be alive.
+    /// Nothing may use the cache any more, and the device must be alive.
     pub(crate) unsafe fn destroy(&self, device: &ash::Device) {
         self.keep(device);
         // SAFETY: promised by the caller; null is allowed.
@@ -106,7 +107,7 @@ impl PipelineCache {
     }
 }
 
-/// Whether data begins with the header of that driver's: its length, 1, vendor, device and UUID.
+/// Whether data start with this driver's header: its length, 1, vendor, device and UUID.
 fn is_for(data: &[u8], (vendor, model, uuid): (u32, u32, [u8; 16])) -> bool {
     let mut header = Vec::with_capacity(32);
     for number in [32, 1, vendor, model] {

@@ -17,14 +17,14 @@ use crate::shader::{Form, Kernel};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::lock;
 
-/// How often a lost device is opened again for one call.
+/// The maximum number of times that a lost device is opened again in one call.
 const REOPENINGS: usize = 3;
 
-/// An open Vulkan device, and what is known of it.
+/// An open Vulkan device, and its properties.
 pub(crate) struct Opened {
-    /// Replaced when the device is lost.
+    /// The engine, which is replaced when the device is lost.
     current: Mutex<Arc<VulkanEngine>>,
-    /// Of several callers that lost it, one opens it again.
+    /// Ensures that only one of several callers opens a lost device again.
     reopening: Exclusive<()>,
     options: EngineOptions,
     pub(crate) self_tests: Vec<SelfTestReport>,
@@ -51,7 +51,7 @@ impl Opened {
         open()
     }
 
-    /// As [`Opened::new`], for a device that is open already.
+    /// As [`Opened::new`], for a device that is already open.
     pub(crate) fn trusted(
         engine: VulkanEngine,
         options: &EngineOptions,
@@ -69,8 +69,8 @@ impl Opened {
         Arc::clone(&lock(&self.current))
     }
 
-    /// Runs `work`. When the device is lost, opens it again and repeats the work, at most three
-    /// times; repeated work gives the same bits.
+    /// Runs `work`. If the device is lost, opens it again and repeats the work, at most three times; repeated work
+    /// gives the same bits.
     fn attempt<T>(
         &self,
         mut work: impl FnMut(&VulkanEngine) -> Result<T, EvaluateError>,
@@ -93,8 +93,8 @@ impl Opened {
         work(&self.engine())
     }
 
-    /// Copies a clip's segments to the device. If memory is short, frees the buffers that are kept
-    /// for the next evaluation and tries again.
+    /// Copies a clip's segments to the device. If memory is short, frees the buffers that are kept for the next
+    /// evaluation and tries again.
     pub(crate) fn upload(
         &self,
         clip: &ClipData,
@@ -108,8 +108,8 @@ impl Opened {
         })
     }
 
-    /// Makes the pipelines for segments of a form and for what goes straight from keys, and keeps what the
-    /// driver compiled.
+    /// Makes the pipelines for segments of a form and for evaluation directly from keys, and stores the driver's
+    /// compiled kernels.
     pub(crate) fn warm(&self, form: Form, encoding: Encoding) -> Result<(), EvaluateError> {
         self.attempt(|engine| {
             for list in engine.lists() {
@@ -130,8 +130,7 @@ impl Opened {
         })
     }
 
-    /// As [`Opened::attempt`]; when memory runs out, repeats the work in windows half as large,
-    /// down to 1 MiB.
+    /// As [`Opened::attempt`]; if memory runs out, repeats the work in windows of half the size, down to 1 MiB.
     pub(crate) fn attempt_smaller<T>(
         &self,
         mut work: impl FnMut(&VulkanEngine) -> Result<T, EvaluateError>,
@@ -151,8 +150,8 @@ impl Opened {
         }
     }
 
-    /// Opens a lost device again and replaces it; false for an application's device, which only the
-    /// application can open.
+    /// Opens a lost device again and replaces it; false for an application's device, which only the application can
+    /// open.
     fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
         let _reopening = self.reopening.take();
         if !Arc::ptr_eq(&self.engine(), lost) {

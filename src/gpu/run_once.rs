@@ -1,4 +1,4 @@
-//! One run of a kernel over the host's memory, for checks and for poses.
+//! One run of a kernel on data of the host, for checks and for poses.
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
@@ -8,7 +8,7 @@ use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::Upload;
 
-/// Runs a kernel once: copies inputs to the device, and what it makes of them back.
+/// Runs a kernel once: copies inputs to the device, and its output back.
 pub(crate) fn run_once(
     pipeline: &Pipeline,
     inputs: &[&[u8]],
@@ -19,7 +19,7 @@ pub(crate) fn run_once(
     run_over(pipeline, inputs, constants, groups, false, output)
 }
 
-/// As [`run_once`], over what `output` holds before.
+/// As [`run_once`], with the previous contents of `output` in the kernel's output buffer.
 pub(crate) fn run_on(
     pipeline: &Pipeline,
     inputs: &[&[u8]],

@@ -1,5 +1,5 @@
-//! The self-test: before a device is trusted it computes some expressions, and every bit is compared with the
-//! CPU's. The check of each kernel, when it is first made, is in [`kernel_check`](crate::gpu::kernel_check).
+//! The self-test: before a device is used, it computes some expressions, and every bit is compared with the CPU's.
+//! The check of each kernel, when it is first made, is in [`kernel_check`](crate::gpu::kernel_check).
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
     expressions(&engine.device, Exactness::Demanded)
 }
 
-/// Runs them where the driver is left free to compute otherwise.
+/// Runs every expression without the decorations that forbid the driver to change it.
 pub(crate) fn negative_control(engine: &VulkanEngine) -> Result<NegativeControl, VulkanError> {
     let info = &engine.device.physical.info;
     Ok(NegativeControl {

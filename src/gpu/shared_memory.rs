@@ -1,4 +1,4 @@
-//! The memory of buffers: small ones share what is allocated.
+//! Memory of buffers: small buffers share allocations.
 
 use std::ops::Range;
 use std::ptr::NonNull;
@@ -9,30 +9,30 @@ use ash::vk;
 use crate::gpu::error::{Named, VulkanError};
 use crate::threads::lock;
 
-/// Larger buffers have memory of their own.
+/// The maximum size of a buffer in a shared allocation, bytes; larger buffers have separate allocations.
 const LARGEST: u64 = 512 << 10;
-/// The size of what is allocated for buffers to share.
+/// The size of a shared allocation, bytes.
 const BLOCK: u64 = 4 << 20;
 
-/// The blocks of a device.
+/// The shared allocations (blocks) of a device.
 #[derive(Default)]
 pub(crate) struct SharedMemory(Mutex<Vec<MemoryBlock>>);
 
-/// Which memory a buffer wants.
+/// The kind of memory for a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MemoryKind {
     pub(crate) memory_type: u32,
-    /// Whether the host sees it.
+    /// Whether the host can access it.
     pub(crate) mapped: bool,
 }
 
-/// Memory of one buffer: a part of a block, or an allocation of its own.
+/// The memory of one buffer: a part of a block, or a separate allocation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Share {
     pub(crate) memory: vk::DeviceMemory,
     pub(crate) offset: u64,
     pub(crate) size: u64,
-    /// Where the host sees the first byte.
+    /// The host's address of the first byte.
     pub(crate) mapped: Option<NonNull<u8>>,
 }
 
@@ -74,8 +74,8 @@ impl SharedMemory {
         allocate(device, kind, needs.size)
     }
 
-    /// Takes back what a buffer had. A block that nobody uses is kept if it is the only one of its
-    /// kind: whoever makes and drops clips in turn allocates nothing.
+    /// Takes back the memory of a buffer. An unused block is kept if it is the only one of its kind, so that making
+    /// and dropping clips repeatedly allocates nothing.
     ///
     /// # Safety
     /// Nothing may use the memory any more.
@@ -102,7 +102,7 @@ impl SharedMemory {
     /// Frees all blocks.
     ///
     /// # Safety
-    /// Nothing may use them any more.
+    /// Nothing may use the blocks any more.
     pub(crate) unsafe fn free(&self, device: &ash::Device) {
         for block in lock(&self.0).drain(..) {
             // SAFETY: promised by the caller.
@@ -125,7 +125,7 @@ impl MemoryBlock {
     }
 }
 
-/// An allocation, which stays mapped where the host sees it.
+/// Allocates memory, which stays mapped if the host can access it.
 fn allocate(device: &ash::Device, kind: MemoryKind, size: u64) -> Result<Share, VulkanError> {
     let info = vk::MemoryAllocateInfo::default()
         .allocation_size(size)
@@ -150,7 +150,7 @@ fn allocate(device: &ash::Device, kind: MemoryKind, size: u64) -> Result<Share, 
     Ok(share)
 }
 
-/// The free parts of a block, in order, no two of which touch.
+/// The free ranges of a block, in order; no two of them are adjacent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct FreeRanges {
     ranges: Vec<Range<u64>>,
@@ -170,7 +170,7 @@ impl FreeRanges {
         self.ranges.first() == Some(&(0..self.size))
     }
 
-    /// The first offset at which so many bytes fit.
+    /// The first offset at which `size` bytes fit.
     fn take(&mut self, size: u64, alignment: u64) -> Option<u64> {
         let found = self.ranges.iter().enumerate().find_map(|(index, range)| {
             let start = range.start.next_multiple_of(alignment.max(1));

@@ -1,5 +1,5 @@
-//! One submission at a time: a command buffer, its fence and its descriptor sets, and the semaphores by which
-//! one submission waits for another.
+//! Submissions: a command buffer with its fence and descriptor sets, and semaphores with which one submission waits
+//! for another.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -11,10 +11,10 @@ use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
 
-/// A dispatch takes milliseconds; a device that needs this long has hung.
+/// The time limit: a dispatch takes milliseconds, so a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
 
-/// Command buffer, fence and descriptor pool, used again and again.
+/// A command buffer, a fence and a descriptor pool, which are reused.
 pub(crate) struct Submission {
     device: Arc<LogicalDevice>,
     lane: QueueLane,
@@ -22,28 +22,28 @@ pub(crate) struct Submission {
     commands: vk::CommandBuffer,
     fence: vk::Fence,
     descriptors: DescriptorPool,
-    /// Two time stamps, around all that a submission does; null where the queue
-    /// takes none, and for copies beside kernels: time that both share must not count twice.
+    /// Two time stamps, at the start and the end of a submission. Null if the queue has none, and for copies beside
+    /// kernels, because shared time must be counted once.
     stamps: vk::QueryPool,
-    /// When the pending work was handed over.
+    /// The time when the pending work was submitted.
     submitted: Option<Instant>,
 }
 
-/// When a submission ran.
+/// The times of a submission.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spent {
-    /// When it was handed over.
+    /// The time when it was submitted.
     pub(crate) submitted: Instant,
-    /// When its fence was seen.
+    /// The time when its fence was seen.
     pub(crate) finished: Instant,
-    /// How long it ran, by the device's own clock; zero where it has none.
+    /// The time that it ran, by the device's clock; zero if it has none.
     pub(crate) on_device: Duration,
 }
 
-/// A point of time: a semaphore and a value of its timeline.
+/// A point on a timeline: a semaphore and its value.
 pub(crate) type Point = (vk::Semaphore, u64);
 
-/// A range of a buffer that a kernel sees.
+/// A range of a buffer that a kernel binds.
 #[derive(Clone, Copy)]
 pub(crate) struct Binding {
     pub(crate) buffer: vk::Buffer,
@@ -54,7 +54,7 @@ pub(crate) struct Binding {
 }
 
 impl Binding {
-    /// A range of a buffer that no kernel reads as texels.
+    /// A range of a buffer that kernels do not read as texels.
     pub(crate) fn range(buffer: vk::Buffer, offset: u64, size: u64) -> Self {
         Self {
             buffer,
@@ -117,7 +117,8 @@ impl Submission {
         Ok(submission)
     }
 
-    /// Where commands are recorded, after `begin`. The caller keeps what they use until `wait`.
+    /// The command buffer in the recording state, after `begin`. The caller keeps the used resources alive until
+    /// `wait`.
     pub(crate) fn commands(&mut self) -> Commands<'_> {
         // SAFETY: the command buffer is this device's, and nobody else records while `self` is lent; callers
         // have called `begin`, so recording is on.
@@ -172,13 +173,13 @@ impl Submission {
         Ok(())
     }
 
-    /// Ends recording and hands the work to the queue.
+    /// Ends recording and submits the work to the queue.
     pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
         self.submit_between(None, None)
     }
 
-    /// As [`Submission::submit`]; copies in it wait for the point `after`, and the point `reached` is
-    /// reached when all of it has ended.
+    /// As [`Submission::submit`]; its copies wait for the point `after`, and `reached` is signalled when all its work
+    /// has ended.
     pub(crate) fn submit_between(
         &mut self,
         after: Option<Point>,
@@ -219,7 +220,7 @@ impl Submission {
         Ok(())
     }
 
-    /// Waits until submitted work has finished; at once when there is none.
+    /// Waits until submitted work has ended; returns at once if there is none.
     pub(crate) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
         let Some(submitted) = self.submitted else {
             return Ok(None);
@@ -269,7 +270,7 @@ impl Submission {
     }
 }
 
-/// A command buffer in recording: a submission's, or an application's.
+/// A command buffer in the recording state: a submission's, or an application's.
 #[derive(Clone, Copy)]
 pub(crate) struct Commands<'a> {
     device: &'a ash::Device,
@@ -278,9 +279,9 @@ pub(crate) struct Commands<'a> {
 
 impl<'a> Commands<'a> {
     /// # Safety
-    /// The command buffer must be of this device, in recording, outside of a render pass, and its queue
-    /// must be able to do what is recorded. What is recorded may use only objects of this device, which
-    /// must live until the work has ended.
+    /// The command buffer must belong to this device, must be in the recording state outside a render pass, and its
+    /// queue must support the recorded commands. The commands may use only objects of this device, which must live
+    /// until the work has ended.
     pub(crate) unsafe fn new(device: &'a LogicalDevice, raw: vk::CommandBuffer) -> Self {
         let device = &device.raw;
         Self { device, raw }
@@ -304,7 +305,7 @@ impl<'a> Commands<'a> {
         self.dispatch_again(pipeline, constants, groups);
     }
 
-    /// Records another dispatch of the pipeline that was dispatched last, with the same set.
+    /// Records another dispatch of the last dispatched pipeline, with the same set.
     pub(crate) fn dispatch_again(self, pipeline: &Pipeline, constants: &[u8], [x, y, z]: [u32; 3]) {
         let stage = vk::ShaderStageFlags::COMPUTE;
         // SAFETY: as in `dispatch`, which has bound pipeline and set.
@@ -351,9 +352,9 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_copy_buffer(self.raw, from, to, &region) };
     }
 
-    /// Records that some bytes, a multiple of 4, are written into a buffer. They lie in the commands.
+    /// Records that some bytes, a multiple of 4, are written to a buffer. The bytes are stored in the commands.
     pub(crate) fn update(self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
-        /// The most bytes that one command may write.
+        /// The maximum number of bytes that one command may write.
         const UPDATE: usize = 1 << 16;
         for (start, part) in (offset..).step_by(UPDATE).zip(bytes.chunks(UPDATE)) {
             // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are copied into the
@@ -362,8 +363,8 @@ impl<'a> Commands<'a> {
         }
     }
 
-    /// Records that a range, which kernels and copies of a queue family have written, is handed to users outside
-    /// of this Vulkan.
+    /// Records a queue family ownership transfer of a range, which kernels and copies have written, to users outside
+    /// this Vulkan instance.
     pub(crate) fn release(self, range: Binding, family: u32) {
         use vk::{AccessFlags as A, PipelineStageFlags as S};
         let memory = [vk::BufferMemoryBarrier::default()
@@ -379,10 +380,10 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_pipeline_barrier(self.raw, from, to, none, &[], &memory, &[]) };
     }
 
-    /// Records a barrier over a few ranges of buffers alone: what `from` wrote there before it is visible to `to` after
-    /// it, and what `from` read there may be overwritten.
+    /// Records a barrier for a few ranges of buffers only: earlier writes by `from` are visible to `to` afterwards,
+    /// and ranges that `from` has read may be overwritten.
     pub(crate) fn barrier_over(self, from: Access, to: Access, ranges: &[Binding]) {
-        /// The most ranges; what is recorded allocates nothing.
+        /// The maximum number of ranges; recording does not allocate.
         const MAX_RANGES: usize = 6;
         let mut buffers = [vk::BufferMemoryBarrier::default(); MAX_RANGES];
         for (barrier, range) in buffers.iter_mut().zip(ranges) {
@@ -398,7 +399,7 @@ impl<'a> Commands<'a> {
         self.order(from, to, &[], &buffers[..ranges.len()]);
     }
 
-    /// Records a barrier: what `from` wrote before it is visible to `to` after it.
+    /// Records a barrier: earlier writes by `from` are visible to `to` afterwards.
     pub(crate) fn barrier(self, from: Access, to: Access) {
         let memory = vk::MemoryBarrier::default()
             .src_access_mask(from.scope(true).1)
@@ -430,7 +431,7 @@ impl<'a> Commands<'a> {
     }
 }
 
-/// Who touches memory on one side of a barrier.
+/// The users of memory on one side of a barrier.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Access {
     Kernel,
@@ -438,7 +439,7 @@ pub(crate) enum Access {
     /// Kernels and copies, which may overwrite what others have read or written.
     KernelAndCopy,
     Host,
-    /// Whatever comes before on the queue, or later.
+    /// All earlier or later work on the queue.
     Any,
 }
 
@@ -484,14 +485,13 @@ impl Drop for Submission {
     }
 }
 
-/// A timeline semaphore, whose device has that feature: what one queue has reached, for another that
-/// waits.
+/// A timeline semaphore, on a device with this feature: one queue signals it, and another one waits.
 pub(crate) struct Semaphore {
     device: Arc<LogicalDevice>,
     pub(crate) raw: vk::Semaphore,
-    /// The value of the point that was given last.
+    /// The value of the last point.
     last: u64,
-    /// Whether others than this device may wait for it.
+    /// Whether users outside this device may wait for it.
     is_exported: bool,
 }
 
@@ -500,7 +500,7 @@ impl Semaphore {
         Self::made(device, "tumble kernels done", None)
     }
 
-    /// One that may be exported as a file, of a device that can.
+    /// A semaphore that may be exported as a file descriptor, on a device that supports this.
     pub(crate) fn exportable(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         let file = vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
         Self::made(device, "tumble result done", Some(file))
@@ -530,8 +530,7 @@ impl Semaphore {
         })
     }
 
-    /// The next point, later than all that were given before. One that is never reached, because
-    /// its submission failed, does no harm.
+    /// The next point, later than all previous ones. A point may stay unreached because its submission failed.
     pub(crate) fn advance(&mut self) -> Point {
         self.last += 1;
         (self.raw, self.last)
@@ -552,15 +551,15 @@ impl Drop for Semaphore {
     }
 }
 
-/// The most buffers that a kernel binds.
+/// The maximum number of buffers that a kernel binds.
 const MAX_BINDINGS: u32 = 6;
 
-/// A pool of descriptor sets. Whoever has one drops it when no submitted work uses its sets any more.
+/// A pool of descriptor sets. It must be dropped after all submitted work with its sets has ended.
 pub(crate) struct DescriptorPool {
     device: Arc<LogicalDevice>,
-    /// Null while there is no room.
+    /// Null while the pool has no room.
     raw: vk::DescriptorPool,
-    /// Sets that it can hold.
+    /// The number of sets for which it has room.
     room: u32,
 }
 
@@ -574,7 +573,7 @@ impl DescriptorPool {
         }
     }
 
-    /// Takes back all sets, which no submitted work may use any more, and has room for so many.
+    /// Frees all sets, which no submitted work may use any more, and makes room for `sets` sets.
     pub(crate) fn make_room(&mut self, sets: u32) -> Result<(), VulkanError> {
         let raw = &self.device.raw;
         if sets <= self.room {

@@ -1,4 +1,4 @@
-//! What the host writes for kernels to read.
+//! Data that the host writes for kernels.
 
 use std::sync::Arc;
 
@@ -11,18 +11,17 @@ use crate::gpu::submission::{Access, Binding, Submission};
 /// Bytes for kernels, in memory that is kept for the next ones.
 #[derive(Default)]
 pub(crate) struct Upload {
-    /// Where the host writes.
+    /// The buffer that the host writes.
     written: Option<Buffer>,
-    /// The device's own copy, where there is one.
+    /// The copy in device memory, if there is one.
     copied: Option<Buffer>,
-    /// Bytes of the last upload.
+    /// The size of the last upload, bytes.
     used: usize,
 }
 
 impl Upload {
-    /// Room for as many bytes, on which no kernel may work. It may be memory that is fast only to
-    /// write, and in order (write-combined): the host must write all of it, from the first byte on,
-    /// and must not read it.
+    /// Room for this number of bytes, which no kernel may use at this time. The memory may be write-combined, which
+    /// is fast only for writes in order: the host must write all of it, from the first byte on, and must not read it.
     pub(crate) fn room(
         &mut self,
         device: &Arc<LogicalDevice>,
@@ -49,7 +48,7 @@ impl Upload {
         Ok(written.map_or(&mut [], |buffer| buffer.bytes_mut(0..bytes)))
     }
 
-    /// Records the copies of some uploads, where any of them are copied, and that kernels wait.
+    /// Records the copies of some uploads, if they are copied, and the barrier for kernels.
     pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
         let mut any = false;
         for upload in uploads {
@@ -71,28 +70,28 @@ impl Upload {
         self.copied.is_some()
     }
 
-    /// Frees what was written for the device to copy, when it has copied it: no more is written here.
+    /// Frees the buffer that the device has copied; the host must not write any more.
     pub(crate) fn forget_written(&mut self) {
         if self.is_copied() {
             self.written = None;
         }
     }
 
-    /// Bytes of the memory that kernels read.
+    /// The size of the memory that kernels read, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         let read = self.copied.as_ref().or(self.written.as_ref());
         read.map_or(0, |buffer| buffer.size)
     }
 
-    /// What kernels bind; nothing before there was room for anything.
+    /// The binding for kernels; `None` if nothing was uploaded yet.
     pub(crate) fn binding(&self) -> Option<Binding> {
         let buffer = self.copied.as_ref().or(self.written.as_ref());
         buffer.map(Binding::whole)
     }
 }
 
-/// A buffer for the host to write, and whether its bytes must be copied for kernels. Where the
-/// device's own memory has no room that the host sees, the host's serves.
+/// A buffer for the host to write, and whether its bytes must be copied for kernels. If device memory has no
+/// host-visible room, host memory is used.
 pub(crate) fn writable(
     device: &Arc<LogicalDevice>,
     name: &str,

@@ -1,18 +1,17 @@
-//! Rounding on the way to a kernel, the same on every machine: everything a kernel
-//! reads passes through [`canonical`], so that no driver ever meets a subnormal.
+//! Rounding of numbers for kernels, the same on every machine: all input of kernels is made [`canonical`], so that
+//! drivers never process subnormal numbers.
 
 use crate::shader::TINY_BITS;
 
-/// Replaces a magnitude below 2^-64 by +0, in inputs and outputs of kernels. Drivers may flush
-/// subnormals, which lie below 2^-126: what remains is at least 2^62 times as large.
-/// Twin: `shaders/math/canonical.wgsl`.
+/// Replaces a magnitude below 2^-64 by +0, in inputs and outputs of kernels. Drivers may flush subnormals, which are
+/// below 2^-126: the remaining numbers are at least 2^62 times as large. Twin: `shaders/math/canonical.wgsl`.
 #[inline(always)]
 pub(crate) fn canonical(value: f32) -> f32 {
     let magnitude = value.to_bits() & 0x7fff_ffff;
     if magnitude < TINY_BITS { 0.0 } else { value }
 }
 
-/// Neighbouring f64 numbers are 1 apart here, so that adding this rounds the fraction away.
+/// At this magnitude neighbouring f64 numbers are 1 apart, so that adding it rounds the fraction away.
 pub(super) const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
 
 /// The whole number nearest to `x`, for |x| < 2^51. A call of `round` would take longer than the
@@ -34,7 +33,7 @@ pub(crate) fn round_f32(value: f64) -> f32 {
     canonical(value as f32)
 }
 
-/// The largest power of two that a magnitude reaches; 1 if that is tiny.
+/// The largest power of two that does not exceed a magnitude; 1 if the magnitude is very small.
 pub(crate) fn power_of_two(magnitude: f64) -> f64 {
     if magnitude > 1e-30 {
         f64::from_bits(magnitude.to_bits() & (0x7ff << 52))

@@ -1,6 +1,5 @@
-//! The numbers in which a curve's formula can be evaluated: f64 over the full range of angles,
-//! polynomials in the principal range, or dual numbers, which carry two derivatives. Each formula
-//! is written once, for all of them.
+//! The number types with which a curve's formula can be evaluated: f64 over the full range of angles, polynomials in
+//! the principal range, or dual numbers with two derivatives. Each formula is written once, for all of them.
 
 use crate::math::operators::operators;
 use crate::math::quaternion::{Arithmetic, FullRange, Real, arc_tangent, full_waves};
@@ -63,7 +62,7 @@ impl Scalar for f64 {
     }
 }
 
-/// `1/√x`, limited to 1e150: where a curve degenerates, its values stay numbers.
+/// `1/√x`, limited to 1e150, so that the values of degenerate curves are finite.
 #[inline(always)]
 fn reciprocal_root<R: Real>(x: R) -> R {
     R::all(1.0) / x.root().larger(R::all(1e-150))
@@ -106,8 +105,8 @@ impl<R: Real> Scalar for Near<R> {
     }
 }
 
-/// A dual number of the second order: a value with its first and second derivative, in each lane of a vector
-/// the same as alone.
+/// A dual number of second order: a value with its first and second derivative. In each lane of a vector it is the
+/// same as a single number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dual<R = f64> {
     pub(crate) value: R,

@@ -1,8 +1,7 @@
 //! Arithmetic operators for types that wrap numbers.
 
-/// Implements operators of a type, generic over what stands in brackets: each operator's result is
-/// an expression of the operands, which the caller names. The last, if any, is that of a sign, for
-/// types that are not generic.
+/// Implements operators of a type, generic over the parameters in brackets: each operator's result is an expression
+/// of the operands, which the caller names. The last, if any, is the change of sign, for types that are not generic.
 macro_rules! operators {
     (@one [$($generics:tt)*] $name:ty, $a:ident, $b:ident, $operator:ident, $apply:ident, $result:expr) => {
         impl<$($generics)*> std::ops::$operator for $name {

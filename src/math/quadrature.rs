@@ -16,8 +16,8 @@ pub(crate) fn gauss(function: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
     half * GAUSS.iter().map(weighted).sum::<f64>()
 }
 
-/// The integral of a function: the interval is halved, at most so often, while both halves together
-/// differ from the whole. `differ` gets the whole and their sum.
+/// The integral of a function. The interval is halved, at most a number of times, while the sum of both halves
+/// differs from the whole. `differ` gets the whole and the sum.
 pub(crate) fn integral(
     function: &impl Fn(f64) -> f64,
     from: f64,

@@ -1,7 +1,6 @@
-//! Quaternion algebra in f64 without branches, calls or tables: in a loop over
-//! arrays all of it becomes vector instructions. Only addition, subtraction,
-//! multiplication, division and square root, each rounded once as IEEE 754 says, so
-//! that every machine and every vector width gives the same bits.
+//! Quaternion algebra in f64 without branches, calls or tables, so that loops over arrays become vector instructions.
+//! Only addition, subtraction, multiplication, division and square root are used, each rounded once according to IEEE
+//! 754, so that every machine and every vector width gives the same bits.
 //!
 //! Quaternions are plain arrays, `x y z w`: glam's types would keep such a loop scalar. Functions
 //! that are generic over [`Real`] also take vectors of f64.
@@ -79,7 +78,7 @@ impl Real for f64 {
 
 /// `x y z w`.
 pub(crate) type Quaternion = [f64; 4];
-/// Half of a rotation vector, unless said otherwise.
+/// Half of a rotation vector, unless stated otherwise.
 pub(crate) type Vector = [f64; 3];
 
 /// The inner product of vectors.
@@ -134,8 +133,8 @@ pub(crate) fn minus<N: Arithmetic>(a: [N; 3], b: [N; 3]) -> [N; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// `a / b` for positive numbers, limited to 1e150: tangents between keys that are almost at the
-/// same time are meaningless, but stay finite.
+/// `a / b` for positive numbers, limited to 1e150: tangents between keys at almost the same time have no meaning, but
+/// stay finite.
 #[inline(always)]
 pub(crate) fn ratio<R: Real>(a: R, b: R) -> R {
     (a / b).smaller(R::all(1e150))
@@ -178,16 +177,15 @@ pub(crate) fn step<N: Arithmetic + Neg<Output = N>>(a: [N; 4], b: [N; 4]) -> [N;
     product(conjugate(a), b)
 }
 
-/// `q v q⁻¹` for a unit quaternion, by two products. Kernels take fewer operations for it, as
-/// `rotated` of the twins does, which rounds differently.
+/// `q v q⁻¹` for a unit quaternion, by two products. Kernels use fewer operations, as in the twin `rotated`, which
+/// rounds differently.
 #[inline(always)]
 pub(crate) fn rotated<R: Real>(q: [R; 4], [x, y, z]: [R; 3]) -> [R; 3] {
     let [a, b, c, _] = product(product(q, [x, y, z, R::all(0.0)]), conjugate(q));
     [a, b, c]
 }
 
-/// A key in f64, normalised. Two of Newton's steps suffice for a key that is unit within the
-/// rounding of f32.
+/// A key in f64, normalised. Two Newton steps are enough for a key that is unit within the rounding of f32.
 #[inline(always)]
 pub(crate) fn unit(key: [f32; 4]) -> Quaternion {
     let q = [
@@ -230,8 +228,8 @@ const HALF_PI: [f64; 4] = [
     3.2820035428735005e-22,
 ];
 
-/// Sine and cosine, within 2e-16 up to 8e8 radians; beyond, those of some other angle.
-/// Coefficients: fdlibm (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
+/// Sine and cosine, within 2e-16 up to 8e8 radians; for larger arguments those of another angle. Coefficients: fdlibm
+/// (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
 #[inline(always)]
 pub(crate) fn sine_cosine(x: f64) -> (f64, f64) {
     // The whole number nearest to x / (pi/2); its last bits are the quadrant.
@@ -329,16 +327,15 @@ pub(crate) fn about([x, y, z]: Vector, degrees: f64) -> Quaternion {
     [x * sine, y * sine, z * sine, cosine]
 }
 
-/// The logarithm of a unit quaternion, HALF of the rotation vector, of length at
-/// most pi. By the arc tangent, not by the arc cosine: the latter loses half of the
-/// digits of a small angle.
+/// The logarithm of a unit quaternion: half of the rotation vector, of length at most pi. It is computed by the arc
+/// tangent, because the arc cosine would lose half of the digits of a small angle.
 #[inline(always)]
 pub(crate) fn log(q: Quaternion) -> Vector {
     log_toward(q, [1.0, 0.0, 0.0])
 }
 
-/// As [`log`]; `axis` gives the direction where the quaternion has none (at -1,
-/// where every direction is a logarithm of length pi).
+/// As [`log`]; `axis` is the direction if the quaternion has none (at -1, where a vector of length pi in every
+/// direction is a logarithm).
 #[inline(always)]
 pub(crate) fn log_toward(q: Quaternion, axis: Vector) -> Vector {
     let v = [q[0], q[1], q[2]];

@@ -7,9 +7,9 @@ use crate::math::quaternion::{
     Quaternion, Real, Vector, exp, exp_by, log, log_near, log_toward, scaled, square,
 };
 
-/// The exponentials and logarithms that a method's rule is made of. There are two: [`PrincipalRange`] for the
-/// principal range, in vector lanes, and [`FullRange`] for the full range, for single lanes outside
-/// it. So a lane's result depends on nothing but its own numbers.
+/// The exponentials and logarithms in a method's rule. There are two implementations: [`PrincipalRange`] for the
+/// principal range, in vector lanes, and [`FullRange`] for the full range, for single lanes outside it. Therefore a
+/// lane's result depends only on its numbers.
 pub(crate) trait Algebra {
     /// f64, or a vector of them.
     type Number: Real;
@@ -29,7 +29,7 @@ pub(crate) trait Algebra {
     ) -> [Self::Number; 3];
 }
 
-/// The full range, at the price of square roots, divisions and range reductions.
+/// The full range, with square roots, divisions and range reductions.
 pub(crate) struct FullRange;
 
 impl Algebra for FullRange {

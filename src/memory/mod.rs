@@ -1,19 +1,19 @@
-//! Allocations whose size follows from what a caller asks for: they may fail, and then they say so.
+//! Allocations whose size depends on a caller's request: they may fail, and then return an error.
 
-/// Where less than this is asked for, the system alone is asked.
+/// Below this number of bytes, only the system decides.
 #[cfg(target_os = "linux")]
 const LARGE: u128 = 1 << 30;
 
-/// Not enough memory for a result.
+/// There is not enough memory for a result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "not enough memory for {purpose}: {bytes} bytes needed; ask for less at once, as `stream` and `Clip::request` do"
 )]
 #[non_exhaustive]
 pub struct OutOfMemoryError {
-    /// What the memory was for.
+    /// The purpose of the memory.
     pub purpose: &'static str,
-    /// Bytes that were asked for.
+    /// The requested number of bytes.
     pub bytes: u128,
 }
 
@@ -24,8 +24,8 @@ impl OutOfMemoryError {
     }
 }
 
-/// Room for `count` values. The system may promise memory that it does not have and end the process
-/// that uses it, so large amounts are refused if less is available.
+/// Room for `count` values. The system may promise memory that it does not have and end the process that uses it;
+/// therefore large amounts are refused if less is available.
 pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>, OutOfMemoryError> {
     refuse_more_than_there_is::<T>(count, purpose)?;
     let mut values = Vec::new();
@@ -35,7 +35,7 @@ pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>,
     }
 }
 
-/// Zeros.
+/// Zero-initialised values.
 pub(crate) fn zeroed<T: bytemuck::Zeroable>(
     count: usize,
     purpose: &'static str,
@@ -44,7 +44,7 @@ pub(crate) fn zeroed<T: bytemuck::Zeroable>(
     bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemoryError::new::<T>(purpose, count))
 }
 
-/// Refuses a large amount if the system has less left.
+/// Refuses a large amount if the system has less available.
 pub(crate) fn refuse_more_than_there_is<T>(
     count: usize,
     purpose: &'static str,
@@ -63,7 +63,7 @@ pub(crate) fn refuse_more_than_there_is<T>(
     }
 }
 
-/// Bytes of memory and of swap space that are free or can be made so, by Linux's table.
+/// The bytes of memory and of swap space that are free or can be freed, from Linux's `/proc/meminfo`.
 #[cfg(target_os = "linux")]
 fn available(meminfo: &str) -> u128 {
     let kibibytes = |name: &str| {

@@ -14,9 +14,10 @@ use crate::method::{
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
-/// The cumulative cubic B-spline: the smoothest method, but it passes near its keys and not through
-/// them. Its knots are the key times, even or not; before the first and after the last key they
-/// continue in steps as long as the interval there.
+/// The cumulative cubic B-spline: the smoothest method; its curve passes near its keys and not through them.
+///
+/// Its knots are the key times, which may be uneven. Before the first key and after the last one, the knots continue
+/// with the length of the interval there.
 pub const B_SPLINE: Method = Method {
     name: "b-spline",
     summary: "continuous angular acceleration; passes near its keys, not through them",
@@ -35,14 +36,13 @@ pub const B_SPLINE: Method = Method {
 static CURVES: CurveKind =
     CurveKind::Smooth(SmoothCurves::new(&PRODUCT, curves).with(MethodInput::Numbers(spacing)));
 
-/// The durations of the two intervals before this one and of the two after it, in units of its own
-/// duration.
+/// The durations of the two intervals before this one and of the two after it, in units of this interval's duration.
 fn spacing(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
     let closed = matches!(interpolation.ends, Ends::Loop);
     [neighbours(track.times, interval, closed), [0.0; 4]]
 }
 
-/// As [`spacing`], of keys at these times; those of a closed curve are neighbours across the seam.
+/// As [`spacing`], for keys at these times; in a closed curve the last interval is a neighbour of the first.
 pub(crate) fn neighbours(times: &[f64], interval: usize, closed: bool) -> [f64; 4] {
     let last = times.len() as isize - 2;
     let duration = |offset: isize| {
@@ -58,8 +58,8 @@ pub(crate) fn neighbours(times: &[f64], interval: usize, closed: bool) -> [f64; 
     [-2, -1, 1, 2].map(|offset| ratio(duration(offset), length))
 }
 
-/// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval of length
-/// 1, from the lengths of the two intervals before it and of the two after it.
+/// Coefficients of 1, t, t², t³ in the three cumulative basis functions of an interval of length 1, for the lengths
+/// of the two intervals before it and of the two after it.
 pub(crate) fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64; 4]; 3] {
     let first = 1.0 / ((1.0 + before) * (1.0 + before + before_that));
     let third = 1.0 / ((1.0 + after) * (1.0 + after + after_that));
@@ -148,7 +148,7 @@ fn after_last(intervals: &Intervals, lane: usize, end: EndCondition) -> Vector {
     })
 }
 
-/// The logarithm of one more interval of the parabola through the three keys at an end.
+/// The logarithm for one more interval of the parabola through the three keys at an end.
 fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
     let (log, other) = (at(&intervals.logs, lane), at(&intervals.logs, next));
     let (h, next_h) = (intervals.durations[lane], intervals.durations[next]);

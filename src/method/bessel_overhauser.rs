@@ -1,5 +1,4 @@
-//! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
-//! its two neighbours.
+//! Bessel-Overhauser: the tangent at a key is that of the parabola through it and its two neighbours.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
 use crate::fit::exact::shape::BERNSTEIN;
@@ -9,8 +8,8 @@ use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 
-/// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
-/// equal to [`CATMULL_ROM`](crate::method::CATMULL_ROM) for even ones.
+/// Bessel-Overhauser on rotations: a continuous velocity for any key times, and the same as
+/// [`CATMULL_ROM`](crate::method::CATMULL_ROM) for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
     summary: "the default: smooth through keys at any spacing; equals catmull-rom on even spacing",

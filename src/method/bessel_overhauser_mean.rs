@@ -8,10 +8,10 @@ use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 
-/// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
-/// curve is the same forwards and backwards in time.
+/// Bessel-Overhauser whose tangents are weighted means of logarithms: they never wrap around, and the curve is the
+/// same for reversed time.
 ///
-/// The Python package `splines` calls it (non-uniform) Catmull-Rom.
+/// The Python package `splines` calls this method (non-uniform) Catmull-Rom.
 pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     name: "bessel-overhauser-mean",
     summary: "smooth through keys at any spacing; the same curve for reversed keys",
@@ -41,8 +41,8 @@ impl HandleRule for BesselOverhauserMeanRule {
     }
 }
 
-/// The handle towards an interval that lasts `duration` seconds: the mean of the slopes on both
-/// sides, each weighted by the other side's duration and by a factor of its own.
+/// The handle in an interval of `duration` seconds: the mean of the slopes on both sides, each weighted by the
+/// duration of the other side and by a factor.
 #[inline(always)]
 pub(crate) fn handle<R: Real>(
     before: KeyInterval<R>,

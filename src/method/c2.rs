@@ -19,19 +19,22 @@ use crate::threads::stop;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
-/// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
-/// and the angular velocities at the keys are such that the angular acceleration is
-/// continuous. Every key moves all of the curve, less and less with distance.
+/// The curve of `SciPy`'s `RotationSpline`: the rotation vector relative to each key is a cubic in time, and the
+/// angular velocities at the keys make the angular acceleration continuous. Every key influences the whole curve,
+/// less with distance.
 ///
-/// The equations for the velocities are not linear, and may have several solutions. The curve is the one
-/// that grows continuously out of the linear equations' solution as the quadratic terms, the *bends*, are
-/// brought in from none to all. Bends are omitted where a key is passed so fast that the curve would turn
-/// hundreds of times in an interval, and where no such solution is found; beside steps of more than 200°, the
-/// long way round as authored, no equations are solved. There only the velocity is continuous, and
-/// [`Interpolation::warnings`](crate::method::interpolation::Interpolation::warnings) says at which keys.
+/// The equations for the velocities are nonlinear and may have several solutions. The quadratic terms, called
+/// *bends*, are increased from zero, where the equations are linear, to their full size; the curve is the solution
+/// that follows continuously.
 ///
-/// Backwards in time it is another curve: a rotation vector that is a cubic as seen from one key is
-/// no cubic as seen from the next.
+/// Some bends are omitted: where a key is passed so fast that the curve would make hundreds of rotations in an
+/// interval, and where no such solution is found. Next to steps of more than 200°, which are possible with
+/// [`KeySigns::AsAuthored`](crate::curve::options::KeySigns::AsAuthored), no equations are solved. In these cases
+/// only the velocity is continuous;
+/// [`Interpolation::warnings`](crate::method::interpolation::Interpolation::warnings) lists the keys.
+///
+/// With reversed time the curve is different, because a rotation vector that is a cubic relative to one key is not a
+/// cubic relative to the next.
 pub const C2: Method = Method {
     name: "c2",
     summary: "continuous angular acceleration through keys at any spacing (W014 if impossible)",
@@ -83,14 +86,13 @@ fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
     }
 }
 
-/// The number of keys whose velocities are solved together. Where the track continues beyond such
-/// a window, [`MARGIN`] more keys are added to the equations: the influence of a key fades to a
-/// quarter from key to key.
+/// The number of keys whose velocities are solved together. If the track continues outside such a window, [`MARGIN`]
+/// more keys are added to the equations: the influence of a key decreases to a quarter from key to key.
 const WINDOW: usize = 1024;
 const MARGIN: usize = 64;
 
-/// The angular velocities at the keys of some intervals. They do not depend on which intervals are
-/// asked for together, because windows always start at multiples of [`WINDOW`].
+/// The angular velocities at the keys of some intervals. They do not depend on which intervals are requested
+/// together, because windows start at multiples of [`WINDOW`].
 fn velocities(
     track: Track,
     signs: Signs<'_>,
@@ -111,11 +113,10 @@ fn velocities(
     windows.flat_map(in_window).collect()
 }
 
-/// A jump of the acceleration counts from this part of the terms of its key's equation on.
+/// The smallest jump of the acceleration that is reported, relative to the terms of its key's equation.
 const JUMP: f64 = 1e-9;
 
-/// The keys of a track at which the angular acceleration jumps: as its curve is, not as the equations
-/// were solved.
+/// The keys of a track at which the angular acceleration of the final curve jumps.
 fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<usize> {
     let last = track.keys.len().saturating_sub(1);
     if last < 2 {
@@ -148,8 +149,8 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
     jumps
 }
 
-/// The velocities at a window of keys, and the index of the window's first key, which is negative in
-/// a copy of a closed track before it.
+/// The velocities at the keys of a window, and the index of the window's first key. The index is negative in the copy
+/// of a closed track that precedes it.
 fn solve(
     track: Track,
     signs: Signs<'_>,
@@ -180,13 +181,12 @@ fn solve(
     (first, Spline::new(&steps, [start, end]).solve())
 }
 
-/// The shortest duration in seconds; a shorter interval counts as this long, so that its rates
-/// stay finite.
+/// The shortest duration, seconds. Shorter intervals count as this long, so that their rates stay finite.
 const SHORTEST: f64 = 1e-150;
 
-/// The longest step in radians beside which equations are solved: up to it, each has more weight on the
-/// velocity at its key than on those beside it. The shortest way round is at most pi. Beside steps of nearly
-/// a whole turn the linear equations have solutions that grow without bound from key to key.
+/// The longest step, radians, next to which equations are solved. Up to this length, each equation has more weight on
+/// the velocity at its key than on those at its neighbours. Shortest paths are at most pi. Next to steps of nearly
+/// 360°, the solutions of the linear equations grow without bound from key to key.
 const LONGEST: f64 = 3.5;
 
 /// One interval of a track.
@@ -213,7 +213,7 @@ impl Step {
         }
     }
 
-    /// Whether it goes so far the long way round that the linear equations beside it may have no solution.
+    /// Whether the step is so long that the linear equations next to it may have no solution.
     fn is_long(&self) -> bool {
         self.chart.vector.dot(self.chart.vector) > LONGEST * LONGEST
     }
@@ -249,7 +249,7 @@ impl Step {
     }
 }
 
-/// The factors of [`Step::bend`] for a rotation vector: Mayorov's, and their series for small angles.
+/// The factors of [`Step::bend`] for a rotation vector: Mayorov's formulas, or their series for small angles.
 fn bend_factors(vector: DVec3) -> [f64; 3] {
     let square = vector.dot(vector);
     let angle = square.sqrt();
@@ -273,7 +273,7 @@ fn bend_factors(vector: DVec3) -> [f64; 3] {
 /// A rotation vector, with the matrices between its rate of change and the angular velocity.
 struct Chart {
     vector: DVec3,
-    /// From the angular velocity at its end to the vector's rate of change, and back.
+    /// The matrix from the angular velocity at the interval's end to the vector's rate of change, and its inverse.
     to_rate: DMat3,
     from_rate: DMat3,
 }
@@ -321,19 +321,19 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The three equations of a key, of which the velocities at the key before it, at it and behind it are
-/// the unknowns: `lower·before + diagonal velocity + upper·behind + bend_scale bend(velocity) = right`.
+/// The three equations of a key. The unknowns are the velocities at the previous key, at this key and at the next
+/// key: `lower·before + diagonal velocity + upper·behind + bend_scale bend(velocity) = right`.
 struct KeyEquation {
     lower: DMat3,
     diagonal: f64,
     upper: DMat3,
     right: DVec3,
-    /// The factor of the bend of the interval before the key; 0 where the velocity is set.
+    /// The factor of the bend of the interval before the key; 0 if the velocity is fixed.
     bend_scale: f64,
 }
 
 impl KeyEquation {
-    /// The velocity is set.
+    /// The equation of a key whose velocity is fixed.
     fn set_to(velocity: DVec3) -> Self {
         Self {
             lower: DMat3::ZERO,
@@ -344,8 +344,8 @@ impl KeyEquation {
         }
     }
 
-    /// Of an inner key: [`KeyEquation::between`], unless a step beside it is too long; then the velocity is the
-    /// mean of the secants, as Bessel's parabola has it.
+    /// The equation of an inner key: [`KeyEquation::between`]. Next to a step that is too long, the velocity is the
+    /// mean of the secants instead, as for Bessel's parabola.
     fn inner(before: &Step, after: &Step) -> Self {
         if before.is_long() || after.is_long() {
             let weight = after.duration / (before.duration + after.duration);
@@ -354,7 +354,7 @@ impl KeyEquation {
         Self::between(before, after)
     }
 
-    /// No acceleration at the start of a track.
+    /// The equation for zero acceleration at the start of a track.
     fn natural_start(step: &Step) -> Self {
         if step.is_long() {
             return Self::set_to(step.secant());
@@ -366,7 +366,7 @@ impl KeyEquation {
         }
     }
 
-    /// No acceleration at the end of a track.
+    /// The equation for zero acceleration at the end of a track.
     fn natural_end(step: &Step) -> Self {
         if step.is_long() {
             return Self::set_to(step.secant());
@@ -379,7 +379,7 @@ impl KeyEquation {
         }
     }
 
-    /// The same acceleration on both sides of a key, divided by `1/h + 1/next_h`, so that no number
+    /// The equation for equal accelerations on both sides of a key, divided by `1/h + 1/next_h` so that no number
     /// overflows.
     fn between(before: &Step, after: &Step) -> Self {
         let (h, next_h) = (before.duration, after.duration);
@@ -393,55 +393,54 @@ impl KeyEquation {
         }
     }
 
-    /// What is left of it without its bend.
+    /// The residual of the equation without its bend.
     fn residual(&self, [before, velocity, behind]: [DVec3; 3]) -> DVec3 {
         self.lower * before + velocity * self.diagonal + self.upper * behind - self.right
     }
 
-    /// The size of its terms, in radians per second.
+    /// The magnitude of the equation's terms, radians per second.
     fn size(&self, [before, velocity, behind]: [DVec3; 3]) -> f64 {
         let beside = (self.lower * before).length() + (self.upper * behind).length();
         velocity.length() + (beside + self.right.length()) / self.diagonal
     }
 }
 
-/// The equations for the velocities. But for [`Step::bend`], which depends on the velocity at its
-/// key alone, they are linear.
+/// The equations for the velocities. Except for [`Step::bend`], which depends on the velocity at one key only, they
+/// are linear.
 ///
-/// They are solved by Newton's iteration, each of whose steps is a block tridiagonal system, from the
-/// solution of the linear equations. A step must be at most half as long as the one before it; then the
-/// iteration stays near the solution that it starts towards, and which one is found does not hang on
-/// the rounding of a number. Where it is longer, bends are brought in by parts: a quarter, and twice
-/// as much when a part succeeds, half as much when it fails. Below two radians a step three to six
-/// of Newton's steps do, however unevenly keys are spaced.
+/// They are solved by Newton's iteration, which starts at the solution of the linear equations and solves a block
+/// tridiagonal system in each step. Each step must be at most half as long as the previous one. Then the iteration
+/// stays near the solution that it approaches, and rounding does not decide which solution is found. If a step is
+/// longer, the bends are increased in parts: the first part is a quarter; a part is doubled after a success and
+/// halved after a failure. With less than two radians between keys, three to six Newton steps are enough for any key
+/// times.
 struct Spline<'a> {
     steps: &'a [Step],
     equations: Vec<KeyEquation>,
 }
 
-/// How strong a bend may be that counts: the angle of the step before the key, times the rate of its rotation
-/// vector there in radians per interval, times the weight of the
-/// interval. Up to about 5 `SciPy` converges. At 1000 the curve makes a hundred turns in an
-/// interval, and the solutions lie near each other.
+/// The limit of a bend's strength: the angle of the step before the key, times the rate of its rotation vector there
+/// in radians per interval, times the weight of the interval. `SciPy` converges up to about 5. At 1000 the curve
+/// makes a hundred rotations in an interval, and the solutions are close to each other.
 const STRONGEST: f64 = 1024.0;
-/// Smaller angles count as this one: through hardly any angle a curve may be thousands of turns long.
+/// The minimum angle for the strength: with an almost zero angle, a curve may make thousands of rotations.
 const SMALLEST_ANGLE: f64 = 0.1;
-/// If no solution is found, only bends up to half as strong count, and so on; below this none.
+/// If no solution is found, only bends up to half the strength are used, and so on down to this strength.
 const WEAKEST: f64 = 0.5;
 
-/// Bends are brought in all at once at first, then by a quarter, and at least by this part.
+/// The bends are first used in full, then increased in parts, which start at this size.
 const FIRST_PART: f64 = 0.25;
 const LEAST_PART: f64 = 1.0 / 1024.0;
 
-/// The most of Newton's steps for a part of the bends, and for all that is tried.
+/// The maximum numbers of Newton steps: for one part of the bends, and in total.
 const STEPS_FOR_PART: usize = 32;
 const ALL_STEPS: usize = 1024;
 
-/// The largest quotient of the lengths of two consecutive steps; steps below [`ROUNDING`] may be rounding.
+/// The maximum ratio of the lengths of consecutive steps; steps below [`ROUNDING`] may be due to rounding.
 const CONTRACTION: f64 = 0.5;
 const ROUNDING: f64 = 1e-10;
-/// The iteration is done after a step that changed no velocity by more than this part of its size, if what is
-/// left, about its square, is nothing.
+/// The iteration ends after a step that changed each velocity by at most this fraction of its size: the remaining
+/// error is about the square of it.
 const CONVERGED: f64 = 1e-8;
 const NOTHING: f64 = 1e-15;
 
@@ -515,7 +514,7 @@ impl<'a> Spline<'a> {
         linear
     }
 
-    /// How strong the bend at a key is. See [`STRONGEST`].
+    /// The strength of the bend at a key ([`STRONGEST`]).
     fn strength(&self, key: usize, velocities: &[DVec3]) -> f64 {
         match self.equations[key].bend_scale {
             0.0 => 0.0,
@@ -533,7 +532,7 @@ impl<'a> Spline<'a> {
     }
 }
 
-/// The velocities at the key before one, at it and behind it; 0 beyond the ends.
+/// The velocities at the previous key, at this key and at the next key; 0 outside the window.
 fn around(velocities: &[DVec3], key: usize) -> [DVec3; 3] {
     let at = |key: usize| velocities.get(key).copied().unwrap_or(DVec3::ZERO);
     [at(key.wrapping_sub(1)), velocities[key], at(key + 1)]
@@ -544,16 +543,16 @@ struct Newton<'a> {
     spline: &'a Spline<'a>,
     /// The factors of the bends; 0 where a bend is omitted.
     bend_scales: Vec<f64>,
-    /// The sizes of the equations' terms, to which changes are compared.
+    /// The magnitudes of the equations' terms, with which changes are compared.
     sizes: Vec<f64>,
-    /// What is above the diagonal after elimination, and the solution.
+    /// The blocks above the diagonal after elimination, and the solution.
     above: Vec<DMat3>,
     changes: Vec<DVec3>,
     steps_left: usize,
 }
 
 impl Newton<'_> {
-    /// The solution that goes on from that of the linear equations as bends are brought in.
+    /// The solution that follows continuously from that of the linear equations as the bends are increased.
     fn with_bends(&mut self, linear: &[DVec3]) -> Option<Vec<DVec3>> {
         let mut velocities = linear.to_vec();
         let (mut part, mut more) = (0.0, 1.0);
@@ -572,7 +571,7 @@ impl Newton<'_> {
         None
     }
 
-    /// Goes from these velocities to the solution with this part of the bends.
+    /// Iterates from these velocities to the solution with this fraction of the bends.
     fn converges(&mut self, velocities: &mut [DVec3], part: f64) -> bool {
         let mut previous = f64::INFINITY;
         for _ in 0..STEPS_FOR_PART.min(self.steps_left) {
@@ -606,8 +605,8 @@ impl Newton<'_> {
         false
     }
 
-    /// Solves the equations, linear about these velocities, for how much these are too large: by elimination
-    /// from the first key on.
+    /// Solves the equations, linearised at these velocities, for the velocities' errors, by elimination from the
+    /// first key on.
     fn eliminate(&mut self, velocities: &[DVec3], part: f64) {
         for (key, equation) in self.spline.equations.iter().enumerate() {
             let velocity = velocities[key];

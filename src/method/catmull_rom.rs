@@ -8,8 +8,7 @@ use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 
-/// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
-/// on uneven keys;
+/// Catmull-Rom on rotations, in cumulative form. It ignores key times, so its velocity jumps at unevenly spaced keys;
 /// [`BESSEL_OVERHAUSER`](crate::method::BESSEL_OVERHAUSER) corrects this.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",

@@ -1,5 +1,5 @@
-//! Curves by handles: a method gives the rule for the handles of inner keys; this file computes the
-//! handles at the ends of tracks, and the curves between handles.
+//! Curves defined by handles. A method has a rule for the handles at inner keys; this file computes the handles at
+//! the ends of tracks, and the curves between handles.
 
 use std::marker::PhantomData;
 
@@ -13,7 +13,7 @@ use crate::fit::exact::handles::{
 use crate::math::quaternion::{self, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
-/// The curves of a method with that rule for handles.
+/// The curves of a method with this rule for handles.
 pub(crate) fn curves<R: HandleRule>(
     intervals: &mut Intervals,
     stretches: &[TrackStretch],

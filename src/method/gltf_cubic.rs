@@ -12,10 +12,10 @@ use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurves, defaults};
 use crate::tracks::set::Track;
 
-/// glTF's CUBICSPLINE: a cubic in each component, with given tangents
-/// ([`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents)), normalised. Keys count
-/// with the signs that they are stored with, as the specification has it, whatever path is
-/// asked for. In a track without tangents all of them are 0.
+/// glTF's CUBICSPLINE: a normalised cubic in each component, with the tangents of
+/// [`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents).
+///
+/// Keys always keep their signs, as glTF specifies. In a track without tangents all tangents are 0.
 pub const GLTF_CUBIC: Method = Method {
     name: "gltf-cubic",
     summary: "glTF's CUBICSPLINE, exactly as specified; tangents are given",
@@ -60,7 +60,7 @@ impl Formula for Hermite {
 static CURVES: CurveKind =
     CurveKind::Smooth(SmoothCurves::new(&SHAPE, curves).with(MethodInput::Numbers(numbers)));
 
-/// The tangents with which an interval leaves its first key and reaches its last.
+/// The tangents at the start and at the end of an interval.
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     let tangent = |key: usize, side: usize| {
         let tangents = track.tangents.get(key);
@@ -90,7 +90,7 @@ fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
     }
 }
 
-/// A vector as long as the component of a tangent that is orthogonal to its key.
+/// A vector with the length of the component of a tangent that is orthogonal to its key.
 fn cross3(key: Quaternion, tangent: Quaternion) -> Vector {
     let along: f64 = key.iter().zip(tangent).map(|(k, t)| k * t).sum();
     let rest: [f64; 4] = std::array::from_fn(|c| tangent[c] - key[c] * along);

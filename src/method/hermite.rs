@@ -1,4 +1,4 @@
-//! The Hermite method: angular velocities at the keys are given.
+//! The Hermite method: a cubic with specified angular velocities at the keys.
 
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, put};
@@ -11,9 +11,9 @@ use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurv
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 
-/// Hermite: the rotation and the angular velocity of every key are given
-/// ([`TrackSet::set_velocities`](crate::tracks::set::TrackSet::set_velocities)); without them every
-/// key is at rest.
+/// Hermite: the curve has the specified rotation and angular velocity at every key
+/// ([`TrackSet::set_velocities`](crate::tracks::set::TrackSet::set_velocities)). In a track without velocities they
+/// are 0.
 pub const HERMITE: Method = Method {
     name: "hermite",
     summary: "angular velocities are given at the keys; without them each key is at rest",

@@ -14,8 +14,8 @@ use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::set::key_data::Tcb;
 use crate::tracks::set::{Track, TrackSet};
 
-/// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
-/// takes. A bare [`Method`] has the default options.
+/// A method with its options, for [`Engine::upload`](crate::engine::Engine::upload) and other functions. A [`Method`]
+/// alone is converted to an interpolation with default options.
 ///
 /// ```
 /// use tumble::glam::Quat;
@@ -45,17 +45,16 @@ use crate::tracks::set::{Track, TrackSet};
 pub struct Interpolation {
     /// The method.
     pub method: Method,
-    /// Which of the two ways round between keys is taken.
+    /// Which sign of each key is used, and so the direction of the rotation between keys.
     pub signs: KeySigns,
-    /// What happens at the first and the last key.
+    /// The curve at the first and at the last key.
     pub ends: Ends,
-    /// Tension, continuity and bias for
-    /// [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS), for tracks that
-    /// have none of their own.
+    /// Tension, continuity and bias for [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS), for
+    /// tracks without values at their keys.
     pub tcb: Tcb,
     /// The quantity to evaluate: the rotation, its velocity or its acceleration.
     pub quantity: Quantity,
-    /// How fast the curve is traversed.
+    /// The speed on the curve.
     pub speed: Speed,
     /// The wrap mode before a track's first key.
     pub before: WrapMode,
@@ -64,7 +63,7 @@ pub struct Interpolation {
 }
 
 impl Interpolation {
-    /// The form that the kernels evaluate for it.
+    /// The form that the kernels evaluate.
     #[must_use]
     pub fn form(&self) -> Form {
         match self.method.form {
@@ -73,11 +72,10 @@ impl Interpolation {
         }
     }
 
-    /// Refuses numbers with which no curve can be made. Every evaluation calls it; call it to know
-    /// before.
+    /// Refuses numbers for which no curve exists. Every evaluation does this; call it to check earlier.
     ///
     /// # Errors
-    /// When an end velocity, a tension, a continuity or a bias is not finite, or too large.
+    /// When an end velocity, a tension, a continuity or a bias is not finite, or is too large.
     pub fn check(&self) -> Result<(), InterpolationError> {
         self.ends.check_velocities()?;
         match self.tcb.refused() {
@@ -86,7 +84,7 @@ impl Interpolation {
         }
     }
 
-    /// As [`Interpolation::check`], and whether the ends can be met by the `index`th track of a set.
+    /// As [`Interpolation::check`], and whether the track `index` of a set fits the ends.
     pub(crate) fn check_track(
         &self,
         keys: &[Quat],
@@ -96,9 +94,9 @@ impl Interpolation {
         self.ends.check_loop(keys, index)
     }
 
-    /// Warnings about the curves of a set, which are evaluated all the same: keys at which the angular
-    /// acceleration of [`C2`](crate::method::C2) jumps, as its curve is. It
-    /// costs as much as preparing the tracks; other methods have no warnings.
+    /// Warnings about the curves of a set that can be evaluated nevertheless: the keys at which the angular
+    /// acceleration of [`C2`](crate::method::C2) jumps. This takes as long as preparing the tracks. Other methods
+    /// have no warnings.
     ///
     /// ```
     /// use tumble::glam::Quat;
@@ -144,7 +142,7 @@ impl Interpolation {
         on_threads(together).unwrap_or_else(|_| tracks.clone().filter_map(of_track).collect())
     }
 
-    /// The smooth curves as keyed on the shortest path, if the options ask for these.
+    /// The smooth curves with key times and shortest paths, if the options request these.
     pub(crate) fn plain(&self) -> Option<SmoothCurves> {
         let is_plain = self.signs == KeySigns::Shortest
             && self.quantity == Quantity::Rotation
@@ -155,20 +153,20 @@ impl Interpolation {
         }
     }
 
-    /// Whether tracks of two keys turn about one axis at constant speed.
+    /// Whether tracks of two keys rotate about one axis at constant speed.
     pub(crate) fn is_steady_alone(&self) -> bool {
         self.plain().is_some_and(|smooth| smooth.steady_alone)
     }
 
-    /// Whether arcs are prepared by their formula, as other curves are: velocities, accelerations,
-    /// extrapolation and constant speed need derivatives.
+    /// Whether arcs are prepared by their formula, as other curves are. Velocities, accelerations, extrapolation and
+    /// constant speed need the derivatives.
     pub(crate) fn is_by_formula(&self) -> bool {
         let extrapolates = [self.before, self.after].contains(&WrapMode::Extrapolate);
         let constant = self.speed == Speed::Constant;
         self.quantity != Quantity::Rotation || extrapolates || constant
     }
 
-    /// Whether keys are held until the next one.
+    /// Whether each key is held until the next one.
     pub(crate) fn steps(&self) -> bool {
         matches!(*self.method.curves, CurveKind::Steps)
     }
@@ -182,7 +180,7 @@ impl Interpolation {
 }
 
 impl ReferenceCurve {
-    /// The curve of a track of a set, as the textbook has it.
+    /// The textbook curve of a track of a set.
     #[must_use]
     pub fn of(interpolation: &Interpolation, track: Track<'_>) -> Self {
         let &Interpolation {

@@ -12,10 +12,9 @@ use crate::method::{
 };
 use crate::tracks::set::Track;
 
-/// Kochanek-Bartels, with [`Tcb`](crate::tracks::set::key_data::Tcb) for each key
-/// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all
-/// ([`Interpolation::tcb`]). With zeros it is
-/// [`BESSEL_OVERHAUSER_MEAN`](crate::method::BESSEL_OVERHAUSER_MEAN).
+/// Kochanek-Bartels, with a [`Tcb`](crate::tracks::set::key_data::Tcb) at each key
+/// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or the same for all keys ([`Interpolation::tcb`]).
+/// With zeros it is the same as [`BESSEL_OVERHAUSER_MEAN`](crate::method::BESSEL_OVERHAUSER_MEAN).
 pub const KOCHANEK_BARTELS: Method = Method {
     name: "kochanek-bartels",
     summary: "an animator's curve: tension, continuity and bias at each key",
@@ -33,7 +32,7 @@ static CURVES: CurveKind = CurveKind::Smooth(
         .with(MethodInput::Numbers(numbers)),
 );
 
-/// Tension, continuity and bias of the key that an interval starts with.
+/// Tension, continuity and bias of the key at the start of an interval.
 fn numbers(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
     let tcb = track.tcb.get(interval).unwrap_or(&interpolation.tcb);
     [[tcb.tension, tcb.continuity, tcb.bias, 0.0], [0.0; 4]]

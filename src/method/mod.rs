@@ -1,8 +1,7 @@
-//! Methods: how the rotation between keys follows from the keys.
+//! Methods: rules that define a curve through keys.
 //!
-//! Each method has a file of its own. A method turns a track's keys into curves, one for each key
-//! interval. The kernels evaluate these curves in one of a few forms ([`Form`]). [`METHODS`] lists
-//! all methods.
+//! Each method has a source file. A method computes from a track's keys one curve for each key interval. The kernels
+//! evaluate these curves in one of a few forms ([`Form`]). [`METHODS`] lists all methods.
 
 pub(crate) mod b_spline;
 pub(crate) mod bessel_overhauser;
@@ -62,7 +61,7 @@ use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
-/// Every method, in the order in which help and reports list them.
+/// Every method, in the order of lists in help and reports.
 pub static METHODS: [Method; 15] = [
     STEP,
     NLERP,
@@ -91,45 +90,42 @@ pub static METHODS: [Method; 15] = [
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct Method {
-    /// The name by which programs call it.
+    /// The name that programs use.
     pub name: &'static str,
-    /// What it is for, in one sentence.
+    /// The purpose, in one sentence.
     pub summary: &'static str,
-    /// Its formula, in the notation of the documentation.
+    /// The formula, in the notation of the documentation.
     pub formula: &'static str,
-    /// Where the formula comes from.
+    /// The source of the formula.
     pub source: &'static str,
-    /// How smooth it is where segments meet, whatever the key times.
+    /// The smoothness where segments meet, for any key times.
     pub continuity: Continuity,
-    /// How smooth it is where keys are evenly spaced in time.
+    /// The smoothness where segments meet, for keys that are evenly spaced in time.
     pub continuity_on_even_keys: Continuity,
-    /// The key times for which it keeps a rotation at constant angular velocity.
+    /// The key times for which a rotation at constant angular velocity keeps this velocity.
     pub keeps_constant_velocity: Keys,
-    /// Whether it passes through its keys.
+    /// Whether the curve passes through its keys.
     pub interpolates: bool,
-    /// Whether the curve is the same when the keys are given backwards in time (with tangents and
-    /// bias reversed).
+    /// Whether reversed keys give the reversed curve (with tangents and bias reversed too).
     pub symmetric: bool,
-    /// Whether its curves depend on more keys than the two that they join, so that [`Ends`] matter.
+    /// Whether a curve depends on more keys than the two at its ends. Then [`Ends`] have an effect.
     pub uses_neighbours: bool,
-    /// The form of its curves that the kernels evaluate.
+    /// The form of the curves that the kernels evaluate.
     pub form: Form,
-    /// The ends that it has by default.
+    /// The default ends.
     pub ends: Ends,
-    /// The signs of keys that it always takes, if its definition prescribes them.
+    /// The signs of keys, if the method's definition prescribes them.
     pub signs: Option<KeySigns>,
-    /// Its cost on one thread.
+    /// The computing time on one thread.
     pub cost: Cost,
-    /// The method for translations and scales where this one is asked for everything.
+    /// The method for translations and scales, if one method is requested for everything.
     pub vector_method: VectorMethod,
-    /// How its curves follow from the keys. This is a reference to a static because every crate
-    /// that names a constant would compile its functions again, and all that they call, for each
-    /// vector width.
+    /// How the curves are computed. This is a reference to a static, because otherwise every crate that names a
+    /// constant would compile its functions again, and all functions that they call, for each vector width.
     pub(crate) curves: &'static CurveKind,
 }
 
-/// What most methods have in common, and how they are unless they say otherwise. Names, formula,
-/// curves and the method for vectors differ from method to method.
+/// The default values of methods. Names, formula, curves and the method for vectors differ from method to method.
 const fn defaults(vector_method: VectorMethod) -> Method {
     Method {
         name: "",
@@ -156,26 +152,26 @@ const fn defaults(vector_method: VectorMethod) -> Method {
 pub(crate) enum CurveKind {
     /// The first key is held.
     Steps,
-    /// The great-circle arc at constant speed; its formula serves where derivatives are needed.
+    /// The great-circle arc at constant speed, with its formula for derivatives.
     Arcs(SmoothCurves),
-    /// A curve that is given by a formula.
+    /// A curve that is defined by a formula.
     Smooth(SmoothCurves),
 }
 
-/// How a method's curves follow from the keys.
+/// How a method's curves are computed.
 #[derive(Clone, Copy)]
 pub(crate) struct SmoothCurves {
     pub(crate) shape: &'static Shape,
-    /// Sets the numbers of every curve in a block, with these ends where a track ends.
+    /// Sets the numbers of every curve in a block, with these ends.
     pub(crate) curves: fn(&mut Intervals, &[TrackStretch], Ends),
     pub(crate) input: MethodInput,
-    /// Whether a track of two keys turns at constant velocity, whatever the ends.
+    /// Whether a track of two keys rotates at constant velocity, for any ends.
     pub(crate) steady_alone: bool,
-    /// How curves follow in f32 straight from keys, for methods that allow it.
+    /// How curves are computed in f32 directly from keys, for methods that allow it.
     pub(crate) fast: Option<FastCurves>,
 }
 
-/// How curves follow straight from keys, without numbers that a method has beside them.
+/// How curves are computed directly from keys, without additional numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct FastCurves {
     /// The rule for the tangent weights.
@@ -184,24 +180,23 @@ pub(crate) struct FastCurves {
     pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
 }
 
-/// The numbers that a method has for an interval beside its keys.
+/// The numbers of a method for an interval in addition to its keys.
 #[derive(Clone, Copy)]
 pub(crate) enum MethodInput {
     Nothing,
     /// Numbers for the key at the interval's start, and for the key at its end.
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
     Velocities {
-        /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on
-        /// all keys of the track.
+        /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on all keys of the
+        /// track.
         solve: fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>,
-        /// The keys of a track at which these velocities do not make the curve as smooth as the
-        /// method is.
+        /// The keys of a track at which these velocities do not give the smoothness of the method.
         jumps: fn(Track, Signs<'_>, &Interpolation) -> Vec<usize>,
     },
 }
 
 impl Method {
-    /// Whether equations of many keys are solved for each of its curves.
+    /// Whether equations of many keys are solved for each curve.
     pub(crate) fn is_solved(&self) -> bool {
         match self.curves {
             CurveKind::Smooth(smooth) | CurveKind::Arcs(smooth) => {
@@ -223,7 +218,7 @@ impl SmoothCurves {
         }
     }
 
-    /// Allows curves straight from keys; tracks of two keys then turn at constant velocity.
+    /// Allows curves directly from keys; tracks of two keys then rotate at constant velocity.
     const fn fast<R: HandleRule>(self, weights: WeightRule) -> Self {
         Self {
             steady_alone: true,
@@ -251,8 +246,8 @@ impl SmoothCurves {
     }
 }
 
-/// How smooth a curve is where its segments meet. Keys with given tangents, tension or continuity
-/// may be less smooth than their method.
+/// The smoothness of a curve where its segments meet. Specified tangents, tension or continuity of keys may make it
+/// less smooth than its method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Continuity {
     /// The rotation jumps.
@@ -276,13 +271,13 @@ impl fmt::Display for Continuity {
     }
 }
 
-/// What a method costs on one thread, nanoseconds: for comparisons between methods, as
-/// measured on a machine with AVX2 for steps up to 85° (`cargo bench`).
+/// The computing time of a method on one thread, nanoseconds, for comparisons between methods. Measured with `cargo
+/// bench` on a machine with AVX2, for steps up to 85°.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
-    /// Preparing a key.
+    /// The time to prepare a key.
     pub key: f64,
-    /// Evaluating a rotation.
+    /// The time to evaluate a rotation.
     pub rotation: f64,
 }
 
@@ -295,15 +290,15 @@ impl Cost {
 /// The key times for which a property of a method holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Keys {
-    /// It holds for no key times.
+    /// The property holds for no key times.
     Never,
-    /// It holds for evenly spaced keys.
+    /// The property holds for evenly spaced keys.
     Even,
-    /// It holds for any key times.
+    /// The property holds for any key times.
     Any,
 }
 
-/// A method without a definition in the reference is an error of the compiler.
+/// The compiler refuses a method without a definition in the reference.
 const _: () = {
     let mut i = 0;
     while i < METHODS.len() {
@@ -317,7 +312,7 @@ const _: () = {
 };
 
 impl Method {
-    /// Its textbook definition in f64. A method does not carry it: only programs that compare with the
+    /// The textbook definition in f64. It is not a field of the method, so that only programs that compare with the
     /// reference link it.
     #[must_use]
     #[allow(clippy::missing_panics_doc)] // every method has one, or the engine does not compile
@@ -325,7 +320,7 @@ impl Method {
         reference::definition(self.name).expect("every method has one, as is checked above")
     }
 
-    /// How smooth it is, in words.
+    /// The smoothness, in words.
     #[must_use]
     pub fn smoothness(&self) -> String {
         match (self.continuity, self.continuity_on_even_keys) {
@@ -334,7 +329,7 @@ impl Method {
         }
     }
 
-    /// The method with that name.
+    /// The method with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         METHODS.iter().copied().find(|method| method.name == name)

@@ -9,8 +9,8 @@ use crate::math::dual::Scalar;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults};
 
-/// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
-/// another speed, slower near the keys: it is up to 8° from slerp where keys are 180° apart.
+/// Nlerp: the straight line between neighbouring keys, normalised. Its path is that of slerp with another speed,
+/// slower near the keys; it differs from slerp by up to 8° if keys are 180° apart.
 pub const NLERP: Method = Method {
     name: "nlerp",
     summary: "the path of slerp, at uneven speed; common in games",

@@ -1,4 +1,4 @@
-//! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
+//! Shoemake's approach I, from the lecture, and the handle rule of all three approaches.
 
 use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
 use crate::fit::exact::shape::DE_CASTELJAU;
@@ -7,9 +7,9 @@ use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 
-/// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
-/// times too fast and overshoots; it is here for comparison.
-/// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
+/// Approach I of Shoemake's lecture: the control rotation is the bisector itself. At its keys the curve is three
+/// times too fast, and it overshoots; it is included for comparison. [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985)
+/// corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "historical, for comparison only; three times too fast at its keys",
@@ -25,10 +25,10 @@ static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
     ends::curves::<Bisector<1>>,
 ));
 
-/// Handles that go 1/`DIVISOR` of the way from the key to the bisector.
+/// Handles at 1/`DIVISOR` of the arc from the key to the bisector.
 ///
-/// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Relative to `q_i`,
-/// `Double(q_{i-1}, q_i)` is the step before the key, taken once more.
+/// `Double(p, q) = 2 (p·q) q - p` and `Bisect(p, q) = (p + q) / |p + q|`. Relative to `q_i`, `Double(q_{i-1}, q_i)`
+/// repeats the step before the key.
 pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {

@@ -5,8 +5,8 @@ use crate::method::shoemake::Bisector;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 
-/// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
-/// time steps, so its velocity jumps on uneven keys.
+/// Shoemake's published construction: the handle is at a third of the arc from the key to the bisector. It ignores
+/// key times, so its velocity jumps at unevenly spaced keys.
 pub const SHOEMAKE_1985: Method = Method {
     name: "shoemake-1985",
     summary: "Bezier curves of rotations as published; smooth through evenly spaced keys",

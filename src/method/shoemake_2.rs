@@ -1,13 +1,12 @@
-//! Shoemake's second approach, as lectured.
+//! Shoemake's approach II, from the lecture.
 
 use crate::fit::exact::shape::DE_CASTELJAU;
 use crate::method::shoemake::Bisector;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 
-/// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
-/// one and a half times too fast;
-/// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
+/// Approach II of Shoemake's lecture: the handle is at half of the arc from the key to the bisector. At its keys the
+/// curve is one and a half times too fast; [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
     summary: "historical, for comparison only; 1.5 times too fast at its keys",

@@ -10,7 +10,7 @@ use crate::math::ranges::Algebra;
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 
-/// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
+/// Squad: spherical quadrangle interpolation. It ignores key times, so its velocity jumps at unevenly spaced keys.
 pub const SQUAD: Method = Method {
     name: "squad",
     summary: "smooth through evenly spaced keys; common in engines",
@@ -27,7 +27,7 @@ static SHAPE: Shape = shape_of::<Squad>(16);
 /// Spherical quadrangle interpolation (Shoemake 1987):
 /// `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))`.
 ///
-/// Numbers: `q0`, `s0`, `s1`, `q1`. The arcs are those that the signs give.
+/// Numbers: `q0`, `s0`, `s1`, `q1`. Their signs define the arcs.
 struct Squad;
 
 impl Formula for Squad {

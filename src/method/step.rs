@@ -1,9 +1,9 @@
-//! The step method: each key is held until the next.
+//! The step method: each key is held until the next one.
 
 use crate::method::vector_method::VectorMethod;
 use crate::method::{Continuity, Cost, CurveKind, Method, defaults};
 
-/// Holds each key until the next: for things that switch and do not move.
+/// Step: each key is held until the next one, for states that switch.
 pub const STEP: Method = Method {
     name: "step",
     summary: "holds each key until the next; for switched values",

@@ -8,7 +8,7 @@ use crate::method::b_spline;
 use crate::method::vector_method::VectorMethod;
 use crate::tracks::set::vectors::VectorTrack;
 
-/// A cubic by its ends and its slopes there, per unit of a parameter that goes from 0 to 1.
+/// A cubic that is defined by its values and slopes at its ends, per unit of a parameter from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct VectorCubic {
     pub(crate) start: DVec3,
@@ -35,7 +35,7 @@ pub(crate) struct VectorCurves<'a> {
     track: &'a VectorTrack,
     method: VectorMethod,
     ends: Ends,
-    /// The slopes at all keys, units per second, if they depend on all keys.
+    /// The slopes at all keys, units per second, for methods in which they depend on all keys.
     slopes: Vec<DVec3>,
 }
 
@@ -53,7 +53,7 @@ impl<'a> VectorCurves<'a> {
         curves
     }
 
-    /// Whether an interval is held at its first key.
+    /// Whether an interval has the constant value of its first key.
     pub(crate) fn is_held(&self, i: usize) -> bool {
         let last = self.track.keys.len() - 1;
         let at_end = last > 1 && (i == 0 || i + 1 == last);
@@ -151,9 +151,9 @@ impl<'a> VectorCurves<'a> {
         }
     }
 
-    /// The slopes at the keys, units per second, with which the second derivative is continuous:
-    /// `r v₋ + 2 v + l v₊ = 3 (r d₋ + l d₊)` at each inner key, with the parts l and r that the
-    /// intervals before and after it are of both, and their secants d.
+    /// The slopes at the keys, units per second, that make the second derivative continuous: `r v₋ + 2 v + l v₊ = 3
+    /// (r d₋ + l d₊)` at each inner key. Here l and r are the fractions of the intervals before and after it in their
+    /// sum, and d their secants.
     fn c2_slopes(&self) -> Vec<DVec3> {
         let last = self.track.keys.len() - 1;
         // The equation at the key between two intervals: below, diagonal, above, right side.
@@ -181,8 +181,8 @@ impl<'a> VectorCurves<'a> {
         solved(&equations)
     }
 
-    /// Interval `i` of the cubic B-spline in cumulative form, as it is for rotations: the basis and
-    /// the steps beyond the ends are the same, with sums in the place of products.
+    /// Interval `i` of the cubic B-spline in cumulative form, as for rotations: the basis and the steps outside the
+    /// ends are the same, with sums instead of products.
     fn b_spline(&self, i: usize) -> VectorCubic {
         let last = self.track.keys.len() - 2;
         let closed = self.ends == Ends::Loop;
@@ -236,12 +236,11 @@ impl<'a> VectorCurves<'a> {
     }
 }
 
-/// One of a system of equations: the coefficients of the unknown before its diagonal, of the diagonal and after
-/// it, and the right side.
+/// An equation of the system: the coefficients before the diagonal, on it and after it, and the right side.
 #[derive(Clone, Copy)]
 struct SlopeEquation([f64; 3], DVec3);
 
-/// Solves a system without the corners, by elimination from the first equation on.
+/// Solves a system without corner elements, by elimination from the first equation on.
 fn solved(equations: &[SlopeEquation]) -> Vec<DVec3> {
     let mut above = Vec::with_capacity(equations.len());
     let mut values: Vec<DVec3> = Vec::with_capacity(equations.len());
@@ -260,7 +259,7 @@ fn solved(equations: &[SlopeEquation]) -> Vec<DVec3> {
     values
 }
 
-/// Solves a system whose first equation follows its last, and repeats the first unknown at the end
+/// Solves a cyclic system, in which the first equation follows the last, and appends the first unknown at the end
 /// (Sherman and Morrison 1950).
 fn cyclic(mut equations: Vec<SlopeEquation>) -> Vec<DVec3> {
     let last = equations.len() - 1;

@@ -2,26 +2,24 @@
 
 use crate::names::names;
 
-/// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are
-/// at rest.
+/// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum VectorMethod {
-    /// The key at or before the time.
+    /// The value of the key at or before the time.
     Step,
     /// Straight lines.
     #[default]
     Linear,
-    /// Cubics with tangents from the neighbouring keys; they ignore the time steps.
+    /// Cubics with tangents from the neighbouring keys, regardless of key times.
     CatmullRom,
     /// Cubics with the tangents of the parabola through three keys (Bessel, Overhauser
     /// 1968).
     BesselOverhauser,
-    /// glTF's CUBICSPLINE with given tangents, which are 0 for a track without them.
+    /// glTF's CUBICSPLINE with specified tangents, which are 0 for a track without them.
     GltfCubic,
     /// The cubic spline whose second derivative is continuous.
     C2,
-    /// The cubic B-spline: its second derivative is continuous too, and it passes near its keys and
-    /// not through them.
+    /// The cubic B-spline: its second derivative is continuous too, and it passes near its keys, not through them.
     BSpline,
 }
 

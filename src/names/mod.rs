@@ -1,23 +1,22 @@
-//! The names of options' values: one list for each option, from which programs and bindings read, write and list
-//! them.
+//! The names of options' values: one list for each option, which programs and bindings read, write and print.
 
-/// No value of an option has that name.
+/// No value of an option has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no {option} `{name}`; there are {}", known.join(", "))]
 #[non_exhaustive]
 pub struct UnknownNameError {
     /// The option: `layout`, `method`.
     pub option: &'static str,
-    /// The name that none of its values has.
+    /// The unknown name.
     pub name: String,
-    /// The names of its values.
+    /// The names of the option's values.
     pub known: Vec<&'static str>,
 }
 
-/// The value of that name among all values of an option.
+/// The value of an option with this name.
 ///
 /// # Errors
-/// When none has it.
+/// When no value has this name.
 #[doc(hidden)]
 pub fn named<T: Copy>(
     option: &'static str,
@@ -33,18 +32,18 @@ pub fn named<T: Copy>(
     })
 }
 
-/// Gives the variants of an option their names: `ALL`, `name`, `Display` and `FromStr`. A variant with data names
-/// the value that stands for it: `Clamped = Self::AT_REST => "clamped"`. The packages of this workspace use it too.
+/// Defines the names of an option's variants: `ALL`, `name`, `Display` and `FromStr`. A variant with data specifies
+/// its value in `ALL`: `Clamped = Self::AT_REST => "clamped"`. The packages of this workspace use the macro too.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! names {
     ($type:ident, $option:literal, $($variant:ident $(= $value:expr)? => $name:literal),+ $(,)?) => {
         impl $type {
-            /// Every value, in the order in which help and messages list them.
+            /// Every value, in the order of lists in help and messages.
             pub const ALL: [Self; [$($name),+].len()] =
                 [$($crate::names!(@value $variant $(= $value)?)),+];
 
-            /// The name by which programs call it.
+            /// The name that programs use.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {

@@ -7,17 +7,16 @@ use glam::Quat;
 
 use crate::memory::{OutOfMemoryError, refuse_more_than_there_is, zeroed};
 
-/// For this many bytes or more, allocators take fresh pages from the system each time and give them
-/// back afterwards.
+/// From this many bytes on, allocators request fresh pages from the system each time and release them afterwards.
 #[cfg(target_os = "linux")]
 const LONG: usize = 32 << 20;
 
-/// What [`OutOfMemoryError`] calls it.
+/// The purpose in [`OutOfMemoryError`].
 const LABEL: &str = "a result";
 
-/// Memory for a result, zero at first, for functions that write to the caller's memory, such as
-/// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into). On Linux, buffers of 32 MiB or
-/// more lie on huge pages if the system has them, which halves the time to fill fresh memory.
+/// Memory for a result, initially zero, for functions that write to the caller's memory, such as
+/// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into). On Linux, buffers of 32 MiB or more use huge
+/// pages if the system has them, which halves the time to fill fresh memory.
 ///
 /// ```
 /// # use glam::Quat;
@@ -40,10 +39,10 @@ enum BufferMemory {
 }
 
 impl OutputBuffer {
-    /// A buffer for this number of rotations.
+    /// Allocates a buffer for `rotations` rotations.
     ///
     /// # Errors
-    /// When there is not so much memory.
+    /// When there is not enough memory.
     pub fn new(rotations: usize) -> Result<Self, OutOfMemoryError> {
         refuse_more_than_there_is::<Quat>(rotations, LABEL)?;
         #[cfg(target_os = "linux")]

@@ -1,15 +1,15 @@
-//! What the components of a representation are stored as.
+//! The number types of an encoding's components.
 
 use crate::names::names;
 
-/// What a component of a representation is stored as.
+/// The number type of an encoding's component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ComponentType {
     /// IEEE 754 single precision.
     F32,
     /// IEEE 754 half precision.
     F16,
-    /// A whole number of 1/32767, in 16 bits.
+    /// A multiple of 1/32767, as an integer of 16 bits.
     Snorm16,
 }
 
@@ -30,7 +30,7 @@ impl ComponentType {
         }
     }
 
-    /// The number that is stored.
+    /// The stored number as f32.
     pub(crate) fn decode(self, bytes: &[u8]) -> f32 {
         let half = || u16::from_ne_bytes([bytes[0], bytes[1]]);
         match self {

@@ -1,19 +1,19 @@
-//! What a crowd's evaluation stores, and how large it is.
+//! The values that a crowd's evaluation stores, and their sizes.
 
 use crate::names::names;
 use crate::shader::{CrowdChange, CrowdEntry};
 
-/// What is stored of every joint of every instance, `[instance][joint]`.
+/// The values that are stored for every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CrowdValues {
     /// The rotation in the parent's frame, `x y z w`.
     Rotations,
-    /// The transform in the parent's frame, `T R S`: three rows of four numbers, for column vectors,
-    /// the last column the translation.
+    /// The transform in the parent's frame, `T R S`: three rows of four numbers of a matrix for column vectors. The
+    /// last column is the translation.
     Local,
-    /// The transform in the model, as a matrix likewise.
+    /// The transform in the model's frame, as a matrix of the same layout.
     Model,
-    /// The transform in the model times the inverse bind matrix, as vertices are skinned with.
+    /// The transform in the model's frame times the inverse bind matrix, for skinning of vertices.
     Skinning,
 }
 
@@ -25,12 +25,12 @@ names! {
     Skinning => "skinning",
 }
 
-/// What a crowd's evaluation stores, and in which precision.
+/// The values that a crowd's evaluation stores, and their precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CrowdOutput {
-    /// What is stored of every joint.
+    /// The values of every joint.
     pub values: CrowdValues,
-    /// Whether numbers are of 16 bits, rounded to nearest from f32, not of 32.
+    /// Whether numbers are stored in 16 bits, rounded to nearest, instead of 32.
     pub is_half: bool,
 }
 
@@ -44,7 +44,7 @@ impl From<CrowdValues> for CrowdOutput {
 }
 
 impl CrowdOutput {
-    /// The same in 16 bits.
+    /// Output of these values in 16 bits.
     #[must_use]
     pub fn half(values: CrowdValues) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl CrowdOutput {
         }
     }
 
-    /// Vectors of four numbers for each joint.
+    /// Number of vectors of four numbers for each joint.
     #[must_use]
     pub fn vector_count(self) -> usize {
         match self.values {
@@ -62,29 +62,29 @@ impl CrowdOutput {
         }
     }
 
-    /// Bytes for each joint.
+    /// Number of bytes for each joint.
     #[must_use]
     pub fn bytes(self) -> usize {
         self.vector_count() * if self.is_half { 8 } else { 16 }
     }
 }
 
-/// What a device needs to know for an evaluation.
+/// The changes that a device needs for an evaluation.
 pub(crate) struct CrowdFrame<'a> {
     /// The clock, ticks.
     pub(crate) clock: u64,
     pub(crate) changes: EntryChanges<'a>,
-    /// How many instances are evaluated.
+    /// Number of instances that are evaluated.
     pub(crate) instances: u32,
     pub(crate) visible: VisibleInstances<'a>,
 }
 
-/// The entries that changed since the evaluation before.
+/// The entries that changed since the previous evaluation.
 pub(crate) enum EntryChanges<'a> {
     None,
-    /// Those from an index on, one after another; some of them may be as they were.
+    /// The entries from an index on, one after another; some of them may be unchanged.
     Range(usize, &'a [CrowdEntry]),
-    /// Those here and there; no more than [`listed_changes`].
+    /// Single entries, no more than [`listed_changes`].
     List(&'a [CrowdChange]),
 }
 
@@ -92,14 +92,14 @@ pub(crate) enum EntryChanges<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum VisibleInstances<'a> {
     All,
-    /// Those of the list that the device has.
+    /// The instances of the list that the device has.
     AsBefore,
-    /// Those of a list that the device does not have yet.
+    /// The instances of a list that the device does not have yet.
     List(&'a [u32]),
 }
 
-/// The most changes that are listed, of so many entries. Of more, all entries from the first that changed to the last
-/// are written.
+/// The maximum number of changes that are listed, for a crowd with `entries` entries. If more entries changed, all
+/// entries from the first to the last that changed are written.
 pub(crate) fn listed_changes(entries: usize) -> usize {
     entries.div_ceil(4)
 }

@@ -1,5 +1,5 @@
-//! The representations in which rotations are stored: one table, which says of each what it is
-//! called, what it looks like in memory, and how it is made and read on the CPU.
+//! Encodings of rotations: a table with the name, the layout in memory, and the CPU's functions to write and read
+//! each.
 
 use std::fmt;
 use std::ops::Range;
@@ -16,26 +16,25 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::twin::{axis_angle, euler, f16, matrix, snorm16};
 
-/// A row of the table of representations. What [`Encoding`] tells of it is documented there.
+/// A row of the table of encodings. [`Encoding`] documents the fields that have a function of the same name.
 pub(crate) struct Representation {
     name: &'static str,
     summary: &'static str,
     component_type: ComponentType,
     shape: &'static [usize],
     components: &'static [&'static str],
-    /// Those of its components that are angles in degrees.
+    /// The indices of the components that are angles in degrees.
     angles: Range<usize>,
-    /// The largest angle between a rotation and what is read of it, radians; `None` if no rotations
-    /// can be stored.
+    /// The maximum angle between a rotation and its decoded value, radians; `None` if rotations cannot be stored.
     pub(crate) error_bound: Option<f64>,
     /// Whether velocities and accelerations can be stored.
     pub(crate) takes_vectors: bool,
-    /// The store of the kernels for it, and that store's parameter.
+    /// The store function of the kernels for this encoding, and its parameter.
     pub(crate) store: Store,
     pub(crate) detail: u32,
-    /// Stores rotations, given the parameter.
+    /// Encodes rotations, with the parameter.
     encode: fn(&[[f32; 4]], u32, &mut [u8]),
-    /// Makes a rotation of its numbers, given the parameter.
+    /// Decodes a rotation from its numbers, with the parameter.
     decode: fn(&StoredNumbers, u32) -> [f32; 4],
 }
 
@@ -58,16 +57,15 @@ const QUATERNION: Representation = Representation {
     decode: |number, _| [0, 1, 2, 3].map(number),
 };
 
-/// What representations of rotations in f32 have in common.
+/// The fields that the encodings of rotations in f32 share.
 const OF_ROTATIONS: Representation = Representation {
     error_bound: Some(4e-6), // most of which is the error of decoding
     takes_vectors: false,
     ..QUATERNION
 };
 
-/// A function that stores rotations by the twin of a kernel's store, which takes whole rotations or
-/// single components. Each has a loop of its own, as no compiler inlines a large function that is
-/// given to a loop.
+/// A function that encodes rotations by the twin of a kernel's store, which takes whole rotations or single
+/// components. Each has its loop, because compilers do not inline a large function that is passed to a loop.
 macro_rules! by {
     ($store:path) => {
         |rotations, detail, output| {
@@ -89,7 +87,7 @@ macro_rules! by {
     };
 }
 
-/// Bytes of what the twin of a store returns.
+/// The number of bytes that the twin of a store returns.
 #[inline(always)]
 fn stored_bytes<const N: usize, S>(_: impl Fn([f32; N], u32) -> S) -> usize {
     size_of::<S>()
@@ -101,8 +99,8 @@ fn xyz([x, y, z, _]: [f32; 4], _: u32) -> [f32; 3] {
     [x, y, z]
 }
 
-/// Declares [`Encoding`]: a variant for each representation, with an option if it has one, and its
-/// row of the table. In the row the option goes by the name that it has in [`EncodingOptions`].
+/// Declares [`Encoding`]: a variant for each encoding, with an option if it has one, and its row of the table. In the
+/// row, the option's variable is named as its field of [`EncodingOptions`].
 macro_rules! representations {
     ($(
         $(#[$attribute:meta])*
@@ -111,16 +109,15 @@ macro_rules! representations {
             $($row:tt)*
         }
     )*) => {
-        /// The representation in which a rotation is stored. It is converted on the device that
-        /// evaluates it, so that only the converted numbers are moved; every device gives the same
-        /// bits.
+        /// The representation in which a rotation is stored. The device that evaluates a rotation also converts it,
+        /// so only the converted numbers are transferred; every device gives the same bits.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         #[non_exhaustive]
         pub enum Encoding {
             $($(#[$attribute])* $variant $(($type))?,)*
         }
 
-        /// Its name and its option: `matrix column by column`.
+        /// The name and the option: `matrix column by column`.
         impl fmt::Display for Encoding {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(self.name())?;
@@ -132,10 +129,10 @@ macro_rules! representations {
         }
 
         impl Encoding {
-            /// One of every kind, of matrices one in each order.
+            /// One value of every kind; matrices in both orders.
             pub const ALL: [Self; [$($(stringify!($kind)),+),*].len()] = [$($($kind),+),*];
 
-            /// The same representation with these options.
+            /// This encoding with other options.
             #[must_use]
             pub fn with(self, options: EncodingOptions) -> Self {
                 match self {
@@ -143,7 +140,7 @@ macro_rules! representations {
                 }
             }
 
-            /// Its row of the table.
+            /// The encoding's row of the table.
             #[inline]
             pub(crate) fn row(self) -> Representation {
                 match self {
@@ -173,9 +170,8 @@ representations! {
         encode: by!(f16::store),
         ..OF_ROTATIONS
     }
-    /// `x y z w` as whole numbers of 1/32767 in 16 bits, rounded to nearest, ties to even
-    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each
-    /// component.
+    /// `x y z w` as multiples of 1/32767 in 16 bits, rounded to nearest, ties to even
+    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each component.
     Snorm16 {
         kinds: [Self::Snorm16],
         name: "snorm16",
@@ -186,8 +182,8 @@ representations! {
         encode: by!(snorm16::store),
         ..OF_ROTATIONS
     }
-    /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360. If `v` is
-    /// zero the axis is x. Four f32.
+    /// The axis, a unit vector, and the angle in degrees, `2 atan2(|v|, w)`, 0 to 360. If `v` is zero, the axis is x.
+    /// Four f32.
     AxisAngle {
         kinds: [Self::AxisAngle],
         name: "axis-angle",
@@ -202,7 +198,7 @@ representations! {
         },
         ..OF_ROTATIONS
     }
-    /// The 3 × 3 matrix that turns column vectors: nine f32.
+    /// The 3 × 3 matrix that rotates column vectors: nine f32.
     Matrix3x3(order: MatrixOrder) {
         kinds: [Self::Matrix3x3(MatrixOrder::RowMajor), Self::Matrix3x3(MatrixOrder::ColumnMajor)],
         name: "matrix",
@@ -218,7 +214,7 @@ representations! {
         decode: |number, order| of_matrix(number, 3, order),
         ..OF_ROTATIONS
     }
-    /// The same with a translation of 0: twelve f32.
+    /// The 3 × 4 matrix that rotates column vectors, with a translation of 0: twelve f32.
     Matrix3x4(order: MatrixOrder) {
         kinds: [Self::Matrix3x4(MatrixOrder::RowMajor), Self::Matrix3x4(MatrixOrder::ColumnMajor)],
         name: "matrix-3x4",
@@ -244,9 +240,9 @@ representations! {
         decode: |number, order| of_matrix(number, if order == 0 { 4 } else { 3 }, order),
         ..OF_ROTATIONS
     }
-    /// Three angles in degrees, in the order of the sequence: the first and the third within ±180,
-    /// the second within ±90, or from 0 to 180 if the third axis equals the first. In gimbal lock,
-    /// where the first and the third angle turn about the same axis, the third is 0. Three f32.
+    /// Three angles in degrees, in the order of the sequence: the first and the third within ±180; the second within
+    /// ±90, or from 0 to 180 if the third axis equals the first. In gimbal lock, where the first and the third angle
+    /// rotate about the same axis, the third is 0. Three f32.
     Euler(sequence: EulerSequence) {
         kinds: [Self::Euler(EulerSequence::XYZ)],
         name: "euler",
@@ -260,7 +256,7 @@ representations! {
         decode: EulerSequence::decode,
         ..OF_ROTATIONS
     }
-    /// `x y z` alone, for velocities and accelerations: three f32.
+    /// `x y z` only, for velocities and accelerations: three f32.
     Vector {
         kinds: [Self::Vector],
         name: "vector",
@@ -275,7 +271,7 @@ representations! {
     }
 }
 
-/// What some representations leave open; see [`Encoding::with`].
+/// The options of some encodings; see [`Encoding::with`].
 ///
 /// ```
 /// use tumble::{Encoding, EncodingOptions, MatrixOrder};
@@ -289,26 +285,26 @@ representations! {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EncodingOptions {
-    /// How matrices lie in memory.
+    /// The order of matrix elements in memory.
     pub order: MatrixOrder,
     /// The axes of Euler angles.
     pub sequence: EulerSequence,
 }
 
-/// Memory is not as long as the rotations that are to be stored in it.
+/// The length of memory does not fit the number of rotations.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{rotations} rotations take {needed} bytes, and {bytes} were given")]
 #[non_exhaustive]
 pub struct EncodingLengthError {
-    /// Number of rotations.
+    /// The number of rotations.
     pub rotations: usize,
-    /// Bytes of the memory.
+    /// The length of the memory, bytes.
     pub bytes: usize,
-    /// Bytes that they take.
+    /// The required length, bytes.
     pub needed: usize,
 }
 
-/// How a matrix lies in memory. The kernels' stores take these numbers as their parameter.
+/// The order of matrix elements in memory. The discriminants are the parameter of the kernels' stores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixOrder {
     /// Row by row.
@@ -324,7 +320,7 @@ names! {
 }
 
 impl MatrixOrder {
-    /// How matrices are described: `matrix column by column`.
+    /// The order in words: `matrix column by column`.
     fn in_words(self) -> &'static str {
         match self {
             Self::RowMajor => "row by row",
@@ -333,7 +329,7 @@ impl MatrixOrder {
     }
 }
 
-/// The representation of that name, with the first of its options: row by row, XYZ.
+/// The encoding with this name, with the default options: row by row, XYZ.
 impl FromStr for Encoding {
     type Err = UnknownNameError;
 
@@ -344,19 +340,19 @@ impl FromStr for Encoding {
 }
 
 impl Encoding {
-    /// The name by which programs call it, whatever its options.
+    /// The name that programs use; it does not depend on the options.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// What it is, in a few words.
+    /// A short description.
     #[must_use]
     pub fn summary(self) -> &'static str {
         self.row().summary
     }
 
-    /// Bytes of one rotation.
+    /// The number of bytes of one rotation.
     #[must_use]
     pub fn bytes(self) -> usize {
         let row = self.row();
@@ -369,25 +365,26 @@ impl Encoding {
         self.row().shape
     }
 
-    /// The names of its numbers, in order.
+    /// The names of the components, in order.
     #[must_use]
     pub fn components(self) -> &'static [&'static str] {
         self.row().components
     }
 
-    /// Those of its numbers that are angles, in degrees: the last of an axis and an angle, all of Euler angles.
+    /// The indices of the components that are angles, in degrees: the last one of axis and angle, all of Euler
+    /// angles.
     #[must_use]
     pub fn angles(self) -> Range<usize> {
         self.row().angles
     }
 
-    /// What each of its numbers is stored as.
+    /// The number type of the components.
     #[must_use]
     pub fn component_type(self) -> ComponentType {
         self.row().component_type
     }
 
-    /// One for each name, with the first of its options: row by row, XYZ.
+    /// One encoding for each name, with the default options: row by row, XYZ.
     pub fn kinds() -> impl Iterator<Item = Self> {
         let all = Self::ALL.into_iter().enumerate();
         let kinds = all.filter(|(index, encoding)| {
@@ -397,13 +394,14 @@ impl Encoding {
         kinds.map(|(_, encoding)| encoding)
     }
 
-    /// Whether rotations are stored in it, and can be read again; else it is for velocities and accelerations alone.
+    /// Whether rotations can be stored and read again; otherwise the encoding is for velocities and accelerations
+    /// only.
     #[must_use]
     pub fn stores_rotations(self) -> bool {
         self.row().error_bound.is_some()
     }
 
-    /// Every representation with every value of its options, in the order of [`Encoding::ALL`].
+    /// Every encoding with every value of its options, in the order of [`Encoding::ALL`].
     pub(crate) fn with_all_options() -> Vec<Self> {
         let mut all = Vec::new();
         for encoding in Self::ALL {
@@ -419,20 +417,20 @@ impl Encoding {
         all
     }
 
-    /// Those that a store of the kernels makes.
+    /// The encodings of a store function of the kernels.
     pub(crate) fn of_store(store: Store) -> Vec<Self> {
         let mut all = Self::with_all_options();
         all.retain(|encoding| encoding.row().store == store);
         all
     }
 
-    /// Whether its numbers are `x y z w`, in any precision.
+    /// Whether the components are `x y z w`, in any precision.
     #[must_use]
     pub fn is_quaternion(self) -> bool {
         self.components() == QUATERNION.components
     }
 
-    /// Stores rotations, `x y z w` each, in the machine's byte order.
+    /// Encodes rotations, `x y z w` each, in the machine's byte order.
     ///
     /// ```
     /// use tumble::Encoding;
@@ -443,7 +441,7 @@ impl Encoding {
     /// ```
     ///
     /// # Errors
-    /// When `output` has not [`Encoding::bytes`] for each rotation.
+    /// When the length of `output` is not [`Encoding::bytes`] for each rotation.
     pub fn encode(
         self,
         rotations: &[[f32; 4]],
@@ -454,16 +452,16 @@ impl Encoding {
         Ok(())
     }
 
-    /// As [`Encoding::encode`], into as many bytes as it takes.
+    /// As [`Encoding::encode`], for memory of the right length.
     pub(crate) fn encode_all(self, rotations: &[[f32; 4]], output: &mut [u8]) {
         let row = self.row();
         (row.encode)(rotations, row.detail, output);
     }
 
-    /// Reads what is stored: the rotation, up to rounding and sign, or the vector.
+    /// Decodes one rotation, which is equal up to rounding and sign, or one vector.
     ///
     /// # Errors
-    /// When `bytes` are not those of one rotation.
+    /// When the length of `bytes` is not that of one rotation.
     pub fn decode(self, bytes: &[u8]) -> Result<[f32; 4], EncodingLengthError> {
         self.check_length(1, bytes.len())?;
         Ok(self.decode_one(bytes))
@@ -482,7 +480,7 @@ impl Encoding {
         }
     }
 
-    /// As [`Encoding::decode`], from as many bytes as one rotation takes.
+    /// As [`Encoding::decode`], for bytes of the right length.
     pub(crate) fn decode_one(self, bytes: &[u8]) -> [f32; 4] {
         let row = self.row();
         let size = row.component_type.bytes();

@@ -9,8 +9,8 @@ use crate::shader::{INTRINSIC, NEGATIVE, SYMMETRIC};
 /// The axes x, y and z.
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The three axes of Euler angles: one of twelve sequences, about axes that turn with the body
-/// (intrinsic) or that stay fixed (extrinsic).
+/// The three axes of Euler angles: one of twelve sequences, about axes that rotate with the body (intrinsic) or are
+/// fixed (extrinsic).
 ///
 /// ```
 /// use tumble::EulerSequence;
@@ -26,13 +26,13 @@ pub struct EulerSequence {
 }
 
 impl EulerSequence {
-    /// Intrinsic: about x, then about the turned y, then about the turned z.
+    /// Intrinsic: about x, then about the rotated y, then about the rotated z.
     pub const XYZ: Self = Self {
         axes: [0, 1, 2],
         intrinsic: true,
     };
 
-    /// All 24: twelve intrinsic ones, then twelve extrinsic ones.
+    /// All 24 sequences: twelve intrinsic ones, then twelve extrinsic ones.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let axes = (0..27u8).map(|code| [code / 9, code / 3 % 3, code % 3]);
@@ -46,7 +46,7 @@ impl EulerSequence {
         self.axes.map(usize::from)
     }
 
-    /// The names of the angles: the axis, and the place in the sequence.
+    /// The names of the angles: the axis, and its index in the sequence from 1.
     pub(crate) fn angle_names(self) -> &'static [&'static str; 3] {
         const NAMES: [[&str; 3]; 27] = {
             let [first, second, third] =
@@ -62,7 +62,7 @@ impl EulerSequence {
         &NAMES[9 * i + 3 * j + k]
     }
 
-    /// Whether each angle is about an axis that the angles before it have turned.
+    /// Whether each angle is about an axis that was rotated by the angles before it.
     #[must_use]
     pub fn is_intrinsic(self) -> bool {
         self.intrinsic
@@ -87,8 +87,7 @@ impl EulerSequence {
             | flag(self.intrinsic, INTRINSIC)
     }
 
-    /// The rotation of three angles in degrees, by the sequence that the parameter of the kernels'
-    /// store stands for.
+    /// The rotation of three angles in degrees, for the sequence that the parameter of the kernels' store encodes.
     pub(crate) fn decode(degrees: &dyn Fn(usize) -> f32, detail: u32) -> [f32; 4] {
         let axis = |index: u32| AXES[(detail >> (2 * index) & 3) as usize];
         let last_axis = axis(if detail & SYMMETRIC != 0 { 0 } else { 2 });
@@ -101,7 +100,7 @@ impl EulerSequence {
 }
 
 impl EulerSequence {
-    /// How angles are described: `euler XYZ`.
+    /// The sequence in words: `euler XYZ`.
     pub(crate) fn in_words(self) -> String {
         self.to_string()
     }
@@ -121,7 +120,7 @@ impl fmt::Display for EulerSequence {
     "`{name}` is not a sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … for intrinsic angles, xyz, zxz … for extrinsic ones"
 )]
 pub struct EulerSequenceError {
-    /// What was given.
+    /// The text.
     pub name: String,
 }
 

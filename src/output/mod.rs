@@ -1,5 +1,5 @@
-//! Results in memory: their layout, the representations in which rotations are stored, the windows
-//! into which long results are cut, and what crowds leave.
+//! Results in memory: their layouts, their encodings, the windows into which long results are divided, and the
+//! results of crowds.
 
 pub(crate) mod buffer;
 pub(crate) mod component_type;

@@ -1,4 +1,4 @@
-//! Why poses cannot be put together as asked, and why parents make no skeleton.
+//! Errors of combining poses, and of making skeletons.
 
 use std::fmt;
 
@@ -7,14 +7,14 @@ use glam::Vec3;
 use crate::memory::OutOfMemoryError;
 use crate::output::rotations::Layout;
 
-/// Why poses cannot be put together as asked. Indices count from 0.
+/// Why poses cannot be combined as requested. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// Nothing to blend.
+    /// There is no layer to blend.
     #[error("there is no layer to blend; give at least one")]
     NoLayer,
-    /// Layers must be of the same tracks and samples, in the same order in memory.
+    /// The layers differ in tracks, samples or layout.
     #[error(
         "layer {layer} has {} tracks with {} samples, {}, and the first {} with {}, {}; evaluate them at the same frames",
         shape.0, shape.1, shape.2, first.0, first.1, first.2
@@ -22,9 +22,9 @@ pub enum PoseError {
     Shape {
         /// The layer's index.
         layer: usize,
-        /// Its tracks, samples and layout.
+        /// The layer's tracks, samples and layout.
         shape: (usize, usize, Layout),
-        /// Those of the first layer.
+        /// The first layer's tracks, samples and layout.
         first: (usize, usize, Layout),
     },
     /// A weight is NaN, infinite, or too large.
@@ -37,89 +37,89 @@ pub enum PoseError {
         /// Its weight.
         weight: f32,
     },
-    /// Slerp goes from 0 to 1.
+    /// A weight is outside 0 to 1.
     #[error("the weight is {weight}; between two rotations it is 0 to 1")]
     WeightOutOfRange {
-        /// What was given.
+        /// The weight.
         weight: f32,
     },
-    /// Other weights than a pass takes.
+    /// The number of weights does not fit the pass.
     #[error("{weights} weights were given, and the pass takes {needed}; give one for each")]
     WeightCount {
-        /// Weights given.
+        /// The number of weights.
         weights: usize,
-        /// Layers of a blend; 1 for two layers that are mixed or added, and 0 for a skeleton.
+        /// The required number: the layers of a blend; 1 for two layers that are mixed or added; 0 for a skeleton.
         needed: usize,
     },
-    /// An additive layer needs a reference rotation for each track.
+    /// The number of an additive layer's reference rotations is not the number of tracks.
     #[error("{references} reference rotations were given for {tracks} tracks; give one for each")]
     References {
-        /// Rotations given.
+        /// The number of reference rotations.
         references: usize,
-        /// Tracks of the layer.
+        /// The number of the layer's tracks.
         tracks: usize,
     },
-    /// A skeleton of other tracks.
+    /// The skeleton's number of tracks differs from the poses'.
     #[error(
         "the skeleton has {skeleton_tracks} tracks, the poses have {tracks}; give one that has as many"
     )]
     Skeleton {
-        /// Tracks of the skeleton.
+        /// The number of the skeleton's tracks.
         skeleton_tracks: usize,
-        /// Tracks of the poses.
+        /// The number of the poses' tracks.
         tracks: usize,
     },
-    /// A skeleton is walked frame by frame.
+    /// The poses for a skeleton are in track-major layout.
     #[error(
         "the poses of a skeleton lie track by track in the buffer; evaluate them frame by frame (Layout::FrameMajor)"
     )]
     TrackMajor,
-    /// The range of a buffer does not fit what a pass reads or writes there.
+    /// The range of a buffer does not fit the input or the result of a pass.
     #[error(
         "{operand}: the buffer's range of {size} bytes at {offset} does not fit; {needed} bytes are needed, from a multiple of {step} on"
     )]
     Buffer {
-        /// What lies there.
+        /// The input or the result.
         operand: PassOperand,
-        /// Where the range starts, bytes.
+        /// The start of the range, bytes.
         offset: u64,
-        /// Its length, bytes.
+        /// The length of the range, bytes.
         size: u64,
-        /// Bytes that are read or written there.
+        /// The required length, bytes.
         needed: u64,
-        /// The range starts at a multiple of so many bytes.
+        /// The range must start at a multiple of this number of bytes.
         step: u64,
     },
-    /// A pass would overwrite what it reads.
+    /// The result of a pass would overwrite an input.
     #[error("the result overlaps input {input} of the pass in its buffer; write it elsewhere")]
     Overlap {
-        /// The input's index, in the order in which the pass names its inputs.
+        /// The input's index, in the order of the pass's fields.
         input: usize,
     },
-    /// It must be known of each track whether it has translations.
+    /// `has_translation` does not have one entry for each track.
     #[error("`has_translation` has {entries} entries for {tracks} tracks; give one for each")]
     HasTranslation {
-        /// Entries given.
+        /// The number of entries.
         entries: usize,
-        /// Tracks of the poses.
+        /// The number of the poses' tracks.
         tracks: usize,
     },
-    /// An inverse bind matrix is needed for each track.
+    /// The number of inverse bind matrices differs from the number of tracks.
     #[error(
         "{matrices} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
     )]
     InverseBind {
-        /// Matrices given.
+        /// The number of matrices.
         matrices: usize,
-        /// Tracks of the poses.
+        /// The number of the poses' tracks.
         tracks: usize,
     },
 }
 
-/// What lies in a buffer for a pass over poses.
+/// An operand of a pass over poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PassOperand {
-    /// An input, by its index in the order in which the pass names its inputs.
+    /// An input, by its index in the order of the pass's fields.
     Input(usize),
     /// The result.
     Result,
@@ -134,11 +134,11 @@ impl fmt::Display for PassOperand {
     }
 }
 
-/// Where the range of a buffer may start that a kernel binds: no device may ask for more (Vulkan's limit of
-/// `minStorageBufferOffsetAlignment`).
+/// The alignment of buffer ranges that works on every device: the maximum of Vulkan's limit
+/// `minStorageBufferOffsetAlignment`, bytes.
 pub(crate) const OFFSET_STEP: u64 = 256;
 
-/// Refuses weights of a blend that are not finite, or too large.
+/// Refuses weights of a blend that are not finite, or are too large.
 pub(crate) fn check_weights(weights: &[f32]) -> Result<(), PoseError> {
     let is_refused = |weight: &f32| weight.is_nan() || weight.abs() > LARGEST_WEIGHT;
     match weights.iter().position(is_refused) {
@@ -150,7 +150,7 @@ pub(crate) fn check_weights(weights: &[f32]) -> Result<(), PoseError> {
     }
 }
 
-/// Refuses a weight that is no fraction of the way from one rotation to another.
+/// Refuses a weight that is not from 0 to 1.
 pub(crate) fn check_fraction(weight: f32) -> Result<(), PoseError> {
     match (0.0..=1.0).contains(&weight) {
         true => Ok(()),
@@ -158,7 +158,7 @@ pub(crate) fn check_fraction(weight: f32) -> Result<(), PoseError> {
     }
 }
 
-/// Refuses a number of reference rotations that is not that of the tracks.
+/// Refuses reference rotations that are not one for each track.
 pub(crate) fn check_references(references: usize, tracks: usize) -> Result<(), PoseError> {
     match references == tracks {
         true => Ok(()),
@@ -166,7 +166,7 @@ pub(crate) fn check_references(references: usize, tracks: usize) -> Result<(), P
     }
 }
 
-/// Refuses a skeleton of other tracks.
+/// Refuses a skeleton with another number of tracks.
 pub(crate) fn check_skeleton(skeleton_tracks: usize, tracks: usize) -> Result<(), PoseError> {
     match skeleton_tracks == tracks {
         true => Ok(()),
@@ -177,55 +177,55 @@ pub(crate) fn check_skeleton(skeleton_tracks: usize, tracks: usize) -> Result<()
     }
 }
 
-/// The largest magnitude of a weight of a blend: squares of sums of thousands of layers are finite.
+/// The largest magnitude of a blend's weight: with it, the squares of sums of thousands of layers are finite.
 pub(crate) const LARGEST_WEIGHT: f32 = 1e9;
 
-/// The most tracks of a skeleton.
+/// The maximum number of tracks of a skeleton.
 pub(crate) const MAX_TRACKS: usize = u32::MAX as usize;
 
-/// Why parents make no skeleton. Indices count from 0.
+/// Why a skeleton cannot be made. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkeletonError {
     /// The numbers of parents and offsets differ.
     #[error("there are {parents} parents but {offsets} offsets; give one of each for every track")]
     Lengths {
-        /// Parents given.
+        /// The number of parents.
         parents: usize,
-        /// Offsets given.
+        /// The number of offsets.
         offsets: usize,
     },
-    /// A parent that does not exist.
+    /// A parent does not exist.
     #[error("the parent of track {track} is track {parent}, but there are {tracks} tracks")]
     NoSuchParent {
-        /// The track.
+        /// The track's index.
         track: usize,
-        /// Its parent.
+        /// The parent's index.
         parent: usize,
-        /// How many there are.
+        /// The number of tracks.
         tracks: usize,
     },
-    /// A track that is its own ancestor.
+    /// The parents contain a cycle.
     #[error("track {track} is its own ancestor")]
     Cycle {
-        /// One track of the circle.
+        /// The index of a track in the cycle, or of a descendant of one.
         track: usize,
     },
     /// An offset is NaN or infinite.
     #[error("the offset of track {track} is {offset}, which is not finite")]
     OffsetNotFinite {
-        /// The track.
+        /// The track's index.
         track: usize,
-        /// Its offset.
+        /// The offset.
         offset: Vec3,
     },
-    /// Tracks are counted in 32 bits on a device.
+    /// There are more tracks than 32 bits can count.
     #[error("a skeleton of {tracks} tracks; the limit is {}", MAX_TRACKS)]
     TooMany {
-        /// Tracks given.
+        /// The number of tracks.
         tracks: usize,
     },
-    /// Not enough memory.
+    /// There is not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
 }

@@ -15,10 +15,10 @@ use crate::tracks::rotation::Rotation;
 /// The order of a result in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Layout {
-    /// `[track][frame]`: the samples of one track lie together.
+    /// `[track][frame]`: the samples of one track are contiguous.
     #[default]
     TrackMajor,
-    /// `[frame][track]`: the tracks of one frame lie together.
+    /// `[frame][track]`: the tracks of one frame are contiguous.
     FrameMajor,
 }
 
@@ -29,13 +29,13 @@ names! {
 }
 
 impl Layout {
-    /// The layout for this number of samples. With a single sample both orders are the same, and
-    /// track-major stands for either.
+    /// The normal form of the layout for this number of samples: with a single sample both orders are the same, and
+    /// it is track-major.
     pub(crate) fn of(self, samples: usize) -> Self {
         if samples == 1 { Self::TrackMajor } else { self }
     }
 
-    /// Where a sample of a track lies among `tracks × samples` rotations; `None` out of range.
+    /// The index of a track's sample among `tracks × samples` values; `None` out of range.
     #[must_use]
     pub fn index(
         self,
@@ -64,7 +64,7 @@ impl Layout {
     }
 }
 
-/// Memory that holds a result: the process's own, or mapped memory of a device.
+/// Memory of a result: the process's memory, or mapped memory of a device.
 pub(crate) trait Storage: Send + Sync {
     fn quats(&self) -> &[Quat];
 }
@@ -75,8 +75,8 @@ impl Storage for OutputBuffer {
     }
 }
 
-/// The result of an evaluation: a value of every track at every sample, 16 bytes each, of shape
-/// `(tracks, samples)` or `(samples, tracks)`, as the [`Layout`] says.
+/// The result of an evaluation: a value of every track at every sample, 16 bytes each. The shape is `(tracks,
+/// samples)` or `(samples, tracks)`, depending on the [`Layout`].
 pub struct Samples<T> {
     storage: Box<dyn Storage>,
     tracks: usize,
@@ -91,11 +91,11 @@ pub type Rotations = Samples<Quat>;
 /// Vectors, `x y z 0` in memory: velocities, accelerations, translations or scales.
 pub type Vectors = Samples<Vec3>;
 
-/// Why values from elsewhere make no result.
+/// Why values cannot be used as a result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplesError {
-    /// Every track has the same number of samples.
+    /// The number of values is not a multiple of the number of tracks.
     #[error(
         "{values} values do not divide among {tracks} tracks; give every track the same number"
     )]
@@ -105,15 +105,15 @@ pub enum SamplesError {
         /// Number of tracks.
         tracks: usize,
     },
-    /// A rotation is no unit quaternion as far as [`NORM_TOLERANCE`], or a vector is not finite.
+    /// A rotation's norm is not within [`NORM_TOLERANCE`] of 1, or a vector is not finite.
     #[error("value {index} is {value:?}; rotations are unit quaternions, and vectors finite")]
     OutOfRange {
-        /// Its index among the values.
+        /// The value's index.
         index: usize,
-        /// `x y z w`, or `x y z 0` of a vector.
+        /// The value: `x y z w` of a rotation, `x y z 0` of a vector.
         value: [f32; 4],
     },
-    /// Not enough memory.
+    /// There is not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
 }
@@ -156,7 +156,7 @@ impl<T> Samples<T> {
         Ok(Self::new(Box::new(storage), tracks, samples, layout))
     }
 
-    /// All values without a copy, four numbers each: `x y z w` of rotations, `x y z 0` of vectors.
+    /// All values without a copy, as four numbers each: `x y z w` of rotations, `x y z 0` of vectors.
     #[must_use]
     pub fn as_arrays(&self) -> &[[f32; 4]] {
         bytemuck::cast_slice(self.storage.quats())
@@ -168,7 +168,7 @@ impl<T> Samples<T> {
         self.tracks
     }
 
-    /// Samples of each track.
+    /// Number of samples of each track.
     #[must_use]
     pub fn sample_count(&self) -> usize {
         self.samples
@@ -185,15 +185,15 @@ impl<T> Samples<T> {
         (self.tracks, self.samples, self.layout)
     }
 
-    /// Where the value of one track at one sample lies; `None` out of range.
+    /// The index of the value of a track at a sample; `None` out of range.
     fn offset(&self, track: usize, sample: usize) -> Option<usize> {
         (self.layout).index(track, sample, self.tracks, self.samples)
     }
 }
 
 impl Rotations {
-    /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order. Components
-    /// below 2^-64 become 0, as in every result.
+    /// Makes a result from rotations of another source, [`Quat`] or `[f32; 4]`, of `tracks` tracks in this layout.
+    /// Components below 2^-64 in magnitude become 0, as in every result.
     ///
     /// ```
     /// use tumble::{Device, Engine, Layout, Rotations, Smoothing, SmoothingKernel};
@@ -207,8 +207,8 @@ impl Rotations {
     /// ```
     ///
     /// # Errors
-    /// When their number is not a multiple of the tracks', when one is no unit quaternion, or when there
-    /// is not the memory.
+    /// When the number of rotations is not a multiple of `tracks`, one is not a unit quaternion, or there is not
+    /// enough memory.
     pub fn of<R: Rotation>(
         rotations: &[R],
         tracks: usize,
@@ -219,8 +219,7 @@ impl Rotations {
         Self::of_rows(quats, is_unit, tracks, layout)
     }
 
-    /// All rotations, without a copy: where a device maps its memory, these are the
-    /// values that the device wrote.
+    /// All rotations, without a copy. If a device maps its memory, these are the values that the device wrote.
     #[must_use]
     pub fn as_quats(&self) -> &[Quat] {
         self.storage.quats()
@@ -234,10 +233,10 @@ impl Rotations {
 }
 
 impl Vectors {
-    /// Vectors from elsewhere, [`Vec3`] or `[f32; 3]`; otherwise as [`Rotations::of`].
+    /// Makes a result from vectors of another source, [`Vec3`] or `[f32; 3]`; otherwise as [`Rotations::of`].
     ///
     /// # Errors
-    /// As there; also when one is not finite.
+    /// As [`Rotations::of`], but when a vector is not finite instead of when a rotation is not a unit quaternion.
     pub fn of<V: Copy + Into<Vec3>>(
         vectors: &[V],
         tracks: usize,
@@ -247,7 +246,7 @@ impl Vectors {
         Self::of_rows(rows, Quat::is_finite, tracks, layout)
     }
 
-    /// All of them, without a copy, each followed by 0.
+    /// All vectors, without a copy, each followed by 0.
     #[must_use]
     pub fn as_slice(&self) -> &[Vec4] {
         bytemuck::cast_slice(self.storage.quats())

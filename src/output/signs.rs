@@ -1,27 +1,27 @@
-//! The one rule of signs. `q` and `-q` are one rotation, but a player that joins samples without a
-//! test goes the long way round where neighbours differ in sign: of the two, whatever is written has
-//! the one that is nearer to the sample of the track before it.
+//! Signs of results. `q` and `-q` are the same rotation, but programs that interpolate linearly between samples
+//! rotate by more than 180° if neighbouring samples differ in sign. Therefore written rotations have the sign that is
+//! nearer to the track's previous sample.
 
 use glam::{Quat, Vec4};
 
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
-/// Of half the angle between two rotations; negative where their signs differ.
+/// The cosine of half the angle between two rotations; negative if their signs differ.
 #[inline]
 fn cosine(a: Quat, b: Quat) -> f32 {
     (a.x * b.x + a.y * b.y) + (a.z * b.z + a.w * b.w)
 }
 
-/// Whether two neighbours differ in sign: the second one is nearer to the first with the other sign. Near half turns
-/// rounding decides, here in one order on every processor.
+/// Whether two neighbouring rotations differ in sign: `-after` is nearer to `before` than `after` is. Near angles of
+/// 180° the result depends on rounding, which is the same on every processor.
 #[must_use]
 #[inline]
 pub fn signs_differ(before: Quat, after: Quat) -> bool {
     cosine(before, after) < 0.0
 }
 
-/// Gives each rotation, in the order `[sample][track]`, the sign that is nearer to the sample before.
+/// Changes the signs of rotations, in the order `[sample][track]`, to those that are nearer to the previous sample.
 pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
     for next in tracks..rotations.len() {
         if signs_differ(rotations[next - tracks], rotations[next]) {
@@ -30,7 +30,7 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
     }
 }
 
-/// Whether [`continue_signs`] would change any of them.
+/// Whether [`continue_signs`] would change any rotation.
 #[must_use]
 pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     let after = rotations.get(tracks..).unwrap_or_default();
@@ -59,7 +59,7 @@ pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     }
 }
 
-/// Whether any of the second rotations has another sign than the first one beside it.
+/// Whether any pair of rotations at the same index differs in sign.
 #[inline]
 fn jump(before: &[Quat], after: &[Quat]) -> bool {
     let least = before.iter().zip(after).fold(0.0f32, |least, (a, b)| {
@@ -69,19 +69,19 @@ fn jump(before: &[Quat], after: &[Quat]) -> bool {
     least < 0.0
 }
 
-/// Rotations that are compared before it is asked whether any sign jumps.
+/// The number of rotations that are compared before a branch on the result.
 const BLOCK: usize = 48;
 
-/// Counts the blocks of one track, up to the first that is too lively, whose sum shows that no two rotations differ
-/// in sign: one instruction a vector of any width, where cosines are seven a rotation.
+/// Counts the blocks of one track, up to the first with large differences, whose sum shows that no neighbouring
+/// rotations differ in sign. The sum takes one instruction for each vector; cosines take seven for each rotation.
 struct NearBlocks<'a> {
     rotations: &'a [Quat],
     count: usize,
 }
 
 impl NearBlocks<'_> {
-    /// A sum of `BLOCK + 1` unit vectors of which two are more than a right angle apart, and these two add up to less
-    /// than √2, is shorter than `BLOCK - 1 + √2`; the rest is more than norms and sums are off by.
+    /// If two of `BLOCK + 1` unit vectors are more than 90° apart, these two add up to less than √2, and the sum of
+    /// all is shorter than `BLOCK - 1 + √2`. The constant is larger by more than the errors of norms and sums.
     const LONGEST: f32 = (BLOCK - 1) as f32 + 1.43;
 }
 

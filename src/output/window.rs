@@ -1,4 +1,4 @@
-//! Cuts a result into windows: the parts that are evaluated at once, on a device or into a stream.
+//! Division of a result into windows: the parts that are evaluated at once, on a device or into a stream.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use crate::output::rotations::Layout;
 /// A part of a result that is contiguous in memory: some samples of some tracks.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Window {
-    /// Where it starts in the result that it was cut from, in rotations.
+    /// The window's start in the result that it is a part of, in rotations.
     pub(crate) start: usize,
     pub(crate) tracks: Range<usize>,
     pub(crate) samples: Range<usize>,
@@ -19,7 +19,7 @@ impl Window {
         Self::of(0..tracks, 0..samples, layout)
     }
 
-    /// Some samples of some tracks, as a result of its own.
+    /// Some samples of some tracks, as a separate result.
     pub(crate) fn of(tracks: Range<usize>, samples: Range<usize>, layout: Layout) -> Self {
         Self {
             start: 0,
@@ -33,7 +33,7 @@ impl Window {
         self.tracks.len() * self.samples.len()
     }
 
-    /// Distance between neighbouring samples of a track.
+    /// The distance between neighbouring samples of a track, in rotations.
     pub(crate) fn stride(&self) -> usize {
         match self.layout {
             Layout::TrackMajor => 1,
@@ -41,14 +41,14 @@ impl Window {
         }
     }
 
-    /// Where a rotation lies in the window.
+    /// The index of a rotation in the window.
     pub(crate) fn offset(&self, track: usize, sample: usize) -> usize {
         let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
         self.layout
             .offset(track, sample, self.tracks.len(), self.samples.len())
     }
 
-    /// Cuts it into windows of at most `limit` rotations, in the order in which they lie in memory.
+    /// Divides the window into windows of at most `limit` rotations, in the order of memory.
     pub(crate) fn cut(&self, limit: usize) -> impl Iterator<Item = Self> + Send + use<> {
         let layout = self.layout;
         let (rows, columns) = match layout {
@@ -81,7 +81,7 @@ impl Window {
         })
     }
 
-    /// Cuts it further; the new windows start in the result that this one was cut from.
+    /// Divides the window further; the starts of the new windows are relative to the same result as this one's.
     pub(crate) fn within(&self, limit: usize) -> impl Iterator<Item = Self> + use<> {
         let first = self.start;
         self.cut(limit).map(move |window| Self {

@@ -13,14 +13,15 @@ use crate::path::rolls::{Rolls, unwrapped, wrapped};
 use crate::path::stretch::{Heading, PathStretch, signed};
 use crate::path::timed_path::TimedPath;
 
-/// How the rotations of a stretch are found.
+/// The method by which the rotations of a stretch are computed.
 enum FrameSource {
-    /// A carried frame: the range of its pieces, and the index of the rolls added to it.
+    /// A carried (rotation-minimising) frame: the range of its pieces, and the index of the rolls that are added to
+    /// it.
     Carried(Range<usize>, usize),
-    /// The x axis is this polynomial's direction. Within the given distance of the upward direction
-    /// it has none, and the axis before is kept.
+    /// The x axis is the direction of this polynomial. Near the upward direction, within the specified distance, the
+    /// polynomial has no direction, and the previous axis is kept.
     Fixed(Option<Polynomial>, DVec3),
-    /// The x axis is this polynomial's direction: `P' × P''`, its zeros divided out.
+    /// The x axis is the direction of this polynomial: `P' × P''`, divided by its zeros.
     Frenet(Polynomial),
 }
 
@@ -32,24 +33,24 @@ pub(crate) struct BodyOnPath {
     /// The pieces of all carried frames.
     pieces: Vec<CarriedPiece>,
     rolls: Vec<Rolls>,
-    /// The largest angle by which a minimal frame was off, where its roll is given.
+    /// The largest roll of a minimal frame after one round, radians, if the roll is kept.
     pub(crate) left_over: f64,
     up: DVec3,
     body_axes: DQuat,
 }
 
-/// The path bows less than this many steps of f32 where it counts as straight: the keys' rounding
-/// alone would give it a normal.
+/// A path counts as straight if it deviates by less than this many steps of f32, because the rounding of keys would
+/// define a normal.
 const STRAIGHT: f64 = 4.0 * f32::EPSILON as f64;
 
 /// The sine of the angle to the upward direction below which a fixed frame keeps its x axis.
 const UPRIGHT: f64 = 1e-6;
 
-/// `P' × P''` below this part of its largest coefficient vanishes: about the rounding of f32 keys.
+/// `P' × P''` counts as zero below this fraction of its largest coefficient, about the rounding of f32 keys.
 const INFLECTED: f64 = 1e-7;
 
 impl BodyOnPath {
-    /// A body on a path that is cut into these stretches.
+    /// A body on a path that is divided into these stretches.
     pub(crate) fn new(timed_path: TimedPath, stretches: Vec<PathStretch>, follow: &Follow) -> Self {
         Self {
             timed_path,
@@ -63,8 +64,8 @@ impl BodyOnPath {
         }
     }
 
-    /// Finds the rotations on a path that has upward directions at some keys. If the frame is minimal,
-    /// its stretches are those from `first` on of `relative_pieces`.
+    /// Computes the rotations on a path, which has upward directions at some keys. For a minimal frame, its stretches
+    /// are those of `relative_pieces` from `first` on.
     pub(crate) fn find_rotations(
         &mut self,
         follow: &Follow,
@@ -90,8 +91,8 @@ impl BodyOnPath {
         }
     }
 
-    /// The vector nearest to which the x axis is to be, at a parameter of a stretch whose frame is not
-    /// carried, for the direction there.
+    /// The vector to which the x axis is as near as possible, at a parameter of a stretch whose frame is not carried,
+    /// for the direction there.
     pub(crate) fn side(&self, index: usize, t: f64, direction: DVec3) -> DVec3 {
         let stretch = &self.stretches[index];
         match &self.sources[index] {
@@ -109,12 +110,12 @@ impl BodyOnPath {
         }
     }
 
-    /// The rotation of the body with such a side.
+    /// The rotation of the body with this side vector.
     pub(crate) fn rotation(&self, side: DVec3, direction: DVec3) -> DQuat {
         of_axes(side, direction) * self.body_axes
     }
 
-    /// Makes the y axis as near to the upward direction as it can be.
+    /// Computes a fixed frame: the y axis is as near to the upward direction as possible.
     fn fix(&mut self) {
         let up = self.up;
         let mut kept = DVec3::ZERO;
@@ -161,8 +162,8 @@ impl BodyOnPath {
         self.stretches = parts;
     }
 
-    /// Carries a frame along the whole path, and spreads the angles by which it misses the requested upward
-    /// directions and, on a closed path, the start.
+    /// Carries a frame along the whole path, and distributes the angles by which it differs from the requested upward
+    /// directions and, on a closed path, from the start.
     fn carry_all(
         &mut self,
         follow: &Follow,
@@ -212,7 +213,7 @@ impl BodyOnPath {
         self.left_over = largest;
     }
 
-    /// Carries a rotation along a stretch, to which the next rolls are added; returns it at the end.
+    /// Carries a rotation along a stretch, to which the next rolls are added; returns the rotation at its end.
     fn carry_one(
         &mut self,
         start: DQuat,
@@ -227,8 +228,8 @@ impl BodyOnPath {
         end
     }
 
-    /// Frenet's frame, its flips by 180° undone. Straight parts are carried, and rolled evenly from the
-    /// frame before to the nearer of the two after.
+    /// Computes Frenet's frame without its flips by 180°. On straight parts the frame is carried, and rolled evenly
+    /// from the frame before to the nearer of the two frames after.
     fn frenet(&mut self) {
         let normals: Vec<Option<Polynomial>> = (self.stretches.iter())
             .map(|part| self.normal(part))
@@ -292,7 +293,7 @@ impl BodyOnPath {
         }
     }
 
-    /// A rotation at the end of the stretch before, carried over the corner to a stretch.
+    /// The rotation at the end of the previous stretch, carried around the corner to a stretch.
     fn carried_to(&self, stretch: usize, rotation: DQuat) -> DQuat {
         let [arriving, leaving] = [self.ends(stretch - 1)[1], self.ends(stretch)[0]];
         around_corner(rotation, arriving, leaving)
@@ -304,7 +305,7 @@ impl BodyOnPath {
         [stretch.from, stretch.to].map(|t| stretch.direction(&self.timed_path, t)[0])
     }
 
-    /// `P' × P''` on a stretch, with the sign that it has at the start; `None` where it is straight.
+    /// `P' × P''` on a stretch, with the sign at the start; `None` if the stretch is straight.
     fn normal(&self, stretch: &PathStretch) -> Option<Polynomial> {
         let curve = &self.timed_path.curves[stretch.interval];
         let start = curve.at(stretch.from);
@@ -337,12 +338,12 @@ fn of_axes(side: DVec3, direction: DVec3) -> DQuat {
     DQuat::from_array(lanes::of_axes(side.to_array(), direction.to_array()))
 }
 
-/// The part of a vector across a direction, of unit length.
+/// The component of a vector orthogonal to a direction, normalised.
 fn across(vector: DVec3, direction: DVec3) -> DVec3 {
     (vector - direction * direction.dot(vector)).normalize_or(direction.any_orthonormal_vector())
 }
 
-/// The first x axis: `up × direction`, with another vector for `up` where both are parallel.
+/// The first x axis: `up × direction`, with another vector instead of `up` if both are parallel.
 fn first_side(up: DVec3, direction: DVec3) -> DVec3 {
     let up = up.normalize();
     let side = up.cross(direction);
@@ -364,7 +365,7 @@ fn first_rotation(up: DVec3, direction: DVec3) -> DQuat {
     of_axes(first_side(up, direction), direction)
 }
 
-/// The angle about z of the step between two rotations that face in one direction.
+/// The angle about z between two rotations with the same direction.
 fn about_forward(from: DQuat, to: DQuat) -> f64 {
     let directions = [from, to].map(|rotation| rotation * DVec3::Z);
     let step = (rotation_between(directions[0], directions[1]) * from).conjugate() * to;

@@ -1,5 +1,5 @@
-//! A piece of a stretch along which a frame is carried. Its roll ψ ([`carry`](crate::path::carry)) is a polynomial through
-//! Chebyshev nodes.
+//! A piece of a stretch along which a frame is carried. Its roll ψ ([`carry`](crate::path::carry)) is a polynomial
+//! through Chebyshev nodes.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 
 use crate::math::quaternion::sine_cosine;
 
-/// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
+/// The number of Chebyshev nodes of a piece; the integrand of ψ is the polynomial through them.
 pub(crate) const NODES: usize = 11;
 
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
@@ -27,7 +27,7 @@ pub(crate) static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     }
 });
 
-/// The indices of a piece's middle and ends among its samples; those of the nodes come first.
+/// The indices of a piece's middle and ends among its samples, after those of the nodes.
 pub(crate) const MIDDLE: usize = NODES;
 pub(crate) const FROM: usize = NODES + 1;
 pub(crate) const TO: usize = NODES + 2;

@@ -1,8 +1,8 @@
-//! The frame that never turns about its direction, carried along stretches.
+//! The frame that does not rotate about its direction, carried along stretches.
 //!
-//! In a piece with the direction m at its middle, `q(t) = A(m→w) q_m R_z(ψ)`, with the shortest rotation
-//! (the swing) `A = [1 + m·w; m × w] / |·|` from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` from
-//! the middle on. Only the constant roll of a piece depends on the pieces before it.
+//! In a piece with the direction m at its middle, `q(t) = A(m→w) q_m R_z(ψ)`. Here `A = [1 + m·w; m × w] / |·|` is
+//! the shortest rotation (the swing) from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` is the roll
+//! since the middle. Only the constant roll of a piece depends on the pieces before it.
 
 use glam::{DQuat, DVec3};
 
@@ -16,23 +16,23 @@ use crate::simd::dispatch::in_lanes;
 use crate::simd::lanes::MAX_LANES;
 use crate::threads::stop;
 
-/// The largest sum of its last two Chebyshev coefficients: the integral errs by a tenth of that.
+/// The largest sum of the last two Chebyshev coefficients; the error of the integral is a tenth of it.
 const TOLERANCE: f64 = 3e-10;
 
-/// No piece is shorter.
+/// The minimum length of a piece.
 const SHORTEST: f64 = 1e-12;
 
-/// A stretch has no more pieces: where numbers are so large or so near that none ever fits, they stay as
-/// they are.
+/// The maximum number of pieces of a stretch. For very large or very close numbers no piece fits; the pieces then
+/// stay as they are.
 const MAX_PIECES: usize = 1 << 14;
 
-/// A piece whose rotation is not known yet, with the rotations from its start to its end.
+/// A piece whose rotation is not known yet, with the relative rotations from its start to its end.
 struct RelativePiece {
     stretch: usize,
     piece: CarriedPiece,
     /// The directions at its ends.
     directions: [DVec3; 2],
-    /// The shortest rotations to these from that at the middle.
+    /// The shortest rotations from the direction at the middle to these directions.
     swings: [DQuat; 2],
     /// The rolls from the start to the middle, and from there to the end.
     rolls: [DQuat; 2],
@@ -42,12 +42,12 @@ struct RelativePiece {
 pub(crate) struct RelativePieces {
     /// In the order of stretches and parameters.
     pieces: Vec<RelativePiece>,
-    /// Where the pieces of each stretch begin, and where those of the last one end.
+    /// The index of each stretch's first piece, then the number of pieces.
     firsts: Vec<usize>,
 }
 
 impl RelativePieces {
-    /// Cuts stretches of any paths into pieces in which the roll is exact.
+    /// Divides stretches of any paths into pieces in which the roll is exact.
     pub(crate) fn new(stretches: &[(&TimedPath, &PathStretch)]) -> Self {
         let mut block = Box::<PieceBlock>::default();
         let whole = |(stretch, (_, part)): (usize, &(&TimedPath, &PathStretch))| PieceRange {
@@ -110,8 +110,7 @@ impl RelativePieces {
         ]
     }
 
-    /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
-    /// end.
+    /// Carries a rotation along a stretch, appends its pieces to a list, and returns the rotation at its end.
     pub(crate) fn carry(
         &self,
         stretch: usize,
@@ -132,7 +131,7 @@ impl RelativePieces {
     }
 }
 
-/// A part of a stretch that waits to become a piece.
+/// A part of a stretch that is to become a piece.
 #[derive(Clone, Copy)]
 struct PieceRange {
     stretch: usize,
@@ -140,7 +139,7 @@ struct PieceRange {
     to: f64,
 }
 
-/// Pieces that are found at once, one in each lane.
+/// Pieces that are computed at once, one in each lane.
 #[derive(Default)]
 struct PieceBlock {
     parameters: [LaneValues; SAMPLES],
@@ -214,7 +213,7 @@ pub(crate) fn rotation_between(from: DVec3, to: DVec3) -> DQuat {
     or_identity(lanes::rotation_between(from.to_array(), to.to_array()))
 }
 
-/// The rotation, or none where numbers overflow.
+/// The rotation, or the identity if numbers overflow.
 fn or_identity(rotation: Quaternion) -> DQuat {
     let rotation = DQuat::from_array(rotation);
     if rotation.is_nan() {
@@ -224,8 +223,8 @@ fn or_identity(rotation: Quaternion) -> DQuat {
     }
 }
 
-/// The rotation carried over a corner: by the shortest rotation, and where the direction is reversed
-/// by 180° about the body's y axis.
+/// The rotation carried around a corner: by the shortest rotation, or by 180° about the body's y axis if the
+/// direction is reversed.
 pub(crate) fn around_corner(rotation: DQuat, from: DVec3, to: DVec3) -> DQuat {
     if (from + to).length() < REVERSED {
         let half_turn = DQuat::from_xyzw(0.0, 1.0, 0.0, 0.0);
@@ -234,7 +233,7 @@ pub(crate) fn around_corner(rotation: DQuat, from: DVec3, to: DVec3) -> DQuat {
     rotation_between(from, to) * rotation
 }
 
-/// Directions nearer than this to being opposite are reversed.
+/// Directions count as reversed if they are nearer than this to being opposite.
 const REVERSED: f64 = 1e-6;
 
 /// The rotation about z by an angle.

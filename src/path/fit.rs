@@ -1,5 +1,5 @@
-//! Fits samples along paths by the polynomials that the kernels evaluate; spans are cut in two until
-//! they fit.
+//! Fitting of samples along paths by the polynomials that the kernels evaluate; spans are divided into two until they
+//! fit.
 
 use bytemuck::Zeroable;
 
@@ -18,24 +18,23 @@ use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::threads::stop;
 use crate::time::spans::SpanSource;
 
-/// How often a span is cut in two. A part that does not fit even then is shorter than the resolution
-/// of time; the value at its middle is used for all of it.
+/// The maximum number of times that a span is divided. A part that does not fit even then is shorter than the
+/// resolution of time; the value at its middle is used for the whole part.
 const MAX_CUTS: u32 = 44;
 
-/// The most pieces of a span. A corner takes two for each cut; more are asked for only where rounding
-/// leaves a curve no direction at all, and then the middle of each stands for it.
+/// The maximum number of pieces of a span. A corner takes two for each division. More are needed only if rounding
+/// leaves a curve without a direction; then the value at each piece's middle is used.
 const MAX_PIECES: u32 = 4096;
 
 /// The largest error at the ends of a span, where a polynomial through inner nodes errs most.
 const MAX_END_ERROR: f64 = 2.5e-7;
 
-/// The part of the latest time that the rounding of times, and of lengths made of them, may hide.
+/// The fraction of the latest time that the rounding of times, and of lengths computed from them, may hide.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Segments and constants that give the values of paths.
 pub(crate) struct Fitted {
-    /// Pieces of spans in order: the span's index in the list, when the piece starts, and what gives
-    /// its values.
+    /// Pieces of spans in order: the span's index in the list, the start of the piece, and the source of its values.
     pub(crate) pieces: Vec<(u32, f64, SpanSource)>,
     /// The values at the start and at the end of each span of the list.
     pub(crate) ends: Vec<[Quaternion; 2]>,
@@ -134,7 +133,7 @@ struct FittedLanes {
 }
 
 impl FittedLanes {
-    /// Whether the polynomial of a lane is near its curve, with this error allowed for the rounding of times.
+    /// Whether the polynomial of a lane is near to its curve, with this error allowed for the rounding of times.
     fn fits(&self, lane: usize, hidden_error: f64) -> bool {
         self.are_too_long[lane] == 0.0
             && f64::from(self.tails[lane]) <= f64::from(TOLERANCE) + hidden_error

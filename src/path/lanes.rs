@@ -1,5 +1,5 @@
-//! Directions and carried rotations in vector lanes. A lane is a piece of a stretch, or a span of
-//! time on one, of as many paths as it takes to fill a block; all lanes are evaluated at one sample after the other.
+//! Directions and carried rotations in vector lanes. A lane is a piece of a stretch, or a span of time on one; a
+//! block is filled with those of several paths. All lanes are evaluated at one sample after the other.
 
 use crate::fit::block::{load, put, store};
 use crate::math::quaternion::{
@@ -15,8 +15,7 @@ use crate::simd::lanes::{Lanes, MAX_LANES};
 /// A number for each lane.
 pub(crate) type LaneValues = [f64; MAX_LANES];
 
-/// Finds the directions at parameters of stretches, one stretch in each lane, and their derivatives if
-/// they are asked for.
+/// Computes the directions at parameters of stretches, one stretch in each lane, and optionally their derivatives.
 pub(crate) fn find_directions<'a, const SAMPLES: usize>(
     stretches: impl ExactSizeIterator<Item = (&'a TimedPath, &'a PathStretch)> + Clone,
     parameters: &[LaneValues; SAMPLES],
@@ -52,7 +51,7 @@ pub(crate) fn find_directions<'a, const SAMPLES: usize>(
     }
 }
 
-/// The directions of polynomials at some parameters, and their derivatives if they are asked for.
+/// The directions of polynomials at some parameters, and optionally their derivatives.
 struct Directions<'a, const SAMPLES: usize> {
     /// How many lanes there are.
     count: usize,
@@ -124,7 +123,7 @@ pub(crate) struct Rolling<'a, const SAMPLES: usize> {
 pub(crate) struct RollResults {
     /// Chebyshev coefficients of the roll.
     pub(crate) roll: [LaneValues; NODES + 1],
-    /// The least cosine of the angles from the middle's direction.
+    /// The smallest cosine of the angles to the middle's direction.
     pub(crate) least: LaneValues,
     /// The magnitudes of the integrand's last two coefficients.
     pub(crate) tail: LaneValues,
@@ -286,7 +285,7 @@ pub(crate) struct ByAxes<'a, const SAMPLES: usize> {
     /// The rotation from the body to z forward, y up, if it is not the identity.
     pub(crate) body_axes: Option<Quaternion>,
     pub(crate) rotations: &'a mut [[LaneValues; 4]; SAMPLES],
-    /// Not 0 where at some sample the side lies along the direction.
+    /// Not 0 if the side vector is parallel to the direction at some sample.
     pub(crate) are_along: &'a mut LaneValues,
 }
 
@@ -315,8 +314,8 @@ impl<const SAMPLES: usize> InLanes for ByAxes<'_, SAMPLES> {
     }
 }
 
-/// The rotation with this x and z axis, which are of unit length: of its four components the largest,
-/// or one that is nearly as large, divides the others.
+/// The rotation with these x and z axes, which are unit vectors. The largest of its four components, or one that is
+/// nearly as large, divides the others.
 #[inline(always)]
 pub(crate) fn of_axes<R: Real>(x: [R; 3], z: [R; 3]) -> [R; 4] {
     let (zero, one) = (R::all(0.0), R::all(1.0));
@@ -382,7 +381,7 @@ fn sines_and_cosines(angles: &LaneValues) -> [LaneValues; 2] {
     found
 }
 
-/// A rotation times one about z, given by the sine and the cosine of half its angle.
+/// A rotation times one about z, whose half-angle has this sine and cosine.
 #[inline(always)]
 fn about_z<R: Real>([x, y, z, w]: [R; 4], [sine, cosine]: [R; 2]) -> [R; 4] {
     [

@@ -1,4 +1,4 @@
-//! Lengths along a path, by which bodies travel at a given speed and look ahead.
+//! Lengths along a path, for bodies with a specified speed, and for looking ahead.
 
 use crate::math::quadrature::{gauss, integral};
 use crate::path::polynomial::Polynomial;
@@ -7,21 +7,21 @@ use crate::threads::stop;
 /// Lengths along the intervals of a path.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lengths {
-    /// Of each interval: parameters in order, with the length from the path's start up to each.
+    /// For each interval, increasing parameters, each with the length from the path's start to it.
     marks: Vec<Vec<(f64, f64)>>,
     /// The slopes of each interval's curve.
     slopes: Vec<Polynomial>,
 }
 
-/// Each interval has this many marks, and one where it stops.
+/// The number of marks of each interval; there is another one where the curve stops.
 const PARTS: usize = 8;
 
-/// The most halvings of a quadrature.
+/// The maximum number of halvings of a quadrature.
 const MAX_HALVINGS: u32 = 24;
 
 impl Lengths {
-    /// The lengths of curves with these slopes, which vanish at these parameters: their speed has a
-    /// corner there.
+    /// The lengths of curves with these slopes, which are zero at the parameters `stops`; their speed has a corner
+    /// there.
     pub(crate) fn new<'a>(slopes: Vec<Polynomial>, stops: impl Iterator<Item = &'a [f64]>) -> Self {
         let mut lengths = Self {
             marks: Vec::with_capacity(slopes.len()),
@@ -52,7 +52,7 @@ impl Lengths {
         lengths
     }
 
-    /// Whether there are no intervals, or their lengths are not known yet.
+    /// Whether there are no intervals, or their lengths were not computed yet.
     pub(crate) fn is_empty(&self) -> bool {
         self.marks.is_empty()
     }
@@ -78,7 +78,7 @@ impl Lengths {
         length + between(&self.slopes[interval], from, t)
     }
 
-    /// The interval in which a length is reached; the last one that has a length if it is beyond.
+    /// The interval in which a length is reached; for larger lengths the last one that has a length.
     pub(crate) fn interval(&self, length: f64) -> usize {
         let after = self.marks.partition_point(|marks| marks[0].1 <= length);
         let mut interval = after.saturating_sub(1);
@@ -88,8 +88,8 @@ impl Lengths {
         interval
     }
 
-    /// The parameter of an interval where a length is reached: Newton's method, or bisection where
-    /// that leaves the part which contains it.
+    /// The parameter of an interval at which a length is reached, by Newton's method, or by bisection if Newton's
+    /// method leaves the part that contains it.
     pub(crate) fn parameter(&self, interval: usize, length: f64) -> f64 {
         let marks = &self.marks[interval];
         let after = marks.partition_point(|mark| mark.1 <= length);

@@ -1,32 +1,31 @@
-//! Bodies that follow paths: in which direction they face on curves through points, and when they are
-//! where.
+//! Bodies that follow paths: their directions on curves through points, and their speed.
 //!
-//! **Why it is so.** A pose on a path depends on all of the path before it: a rotation-minimising frame
-//! is an integral, a constant speed needs arc lengths, and a closed path spreads what is left over at its
-//! end. No kernel can do that sample by sample. So everything is sampled once in f64 on the host and
-//! fitted by the polynomials ([`fit`]) that serve all other smooth curves: devices then evaluate
-//! positions and rotations as those of any clip, with the same bits, at any frame rate.
+//! **Principle.** A pose on a path depends on the whole path before it: a rotation-minimising frame is an integral, a
+//! constant speed needs arc lengths, and a closed path distributes the roll that remains at its end. A kernel cannot
+//! compute this sample by sample. Therefore everything is sampled once in f64 on the host and fitted by the
+//! polynomials ([`fit`]) of all other smooth curves: devices then evaluate positions and rotations as those of any
+//! clip, with the same bits, at any frame rate.
 //!
-//! **The way of the data**, for about 256 keys of one or more tracks at a time ([`prepare`]):
+//! **Steps**, for about 256 keys of one or more tracks at a time ([`prepare`]):
 //!
 //! 1. [`TimedPath`](timed_path::TimedPath): the cubics through a track's points, their slopes with the
 //!    zeros divided out ([`polynomial`]), arc lengths where they are needed ([`lengths`]), and the
 //!    relation between time and the parameter of an interval ([`speed`]).
-//! 2. [`PathStretch`](stretch::PathStretch): each interval is cut where the direction jumps or the motion
-//!    is not smooth. On a stretch the direction is one smooth function ([`Heading`](stretch::Heading)).
-//! 3. [`RelativePieces`](carry::RelativePieces), for the minimal frame: stretches of all paths are cut into
-//!    pieces in which the roll is a polynomial of degree 11, a piece in each vector lane ([`lanes`]). This
-//!    is the costly part, and does not depend on the rotation at the start.
-//! 4. [`BodyOnPath`](body::BodyOnPath): the rotations along one path. Minimal frames are carried from
-//!    piece to piece, fixed and Frenet's ones follow from a side vector; [`rolls`] are angles about the
-//!    direction that are added, spread over the length.
-//! 5. [`Span`](sample::Span): a part of a path's time on one stretch. [`sample`] evaluates position or
-//!    rotation at its 13 nodes, a span in each lane; [`fit()`](fit::fit) makes polynomials of them and cuts a span
-//!    in two where one does not fit.
+//! 2. [`PathStretch`](stretch::PathStretch): each interval is divided where the direction jumps or the motion is not
+//!    smooth. On a stretch the direction is one smooth function ([`Heading`](stretch::Heading)).
+//! 3. [`RelativePieces`](carry::RelativePieces), for the minimal frame: stretches of all paths are divided into
+//!    pieces in which the roll is a polynomial of degree 11, one piece in each vector lane ([`lanes`]). This takes
+//!    most of the time, and does not depend on the rotation at the start.
+//! 4. [`BodyOnPath`](body::BodyOnPath): the rotations along one path. Minimal frames are carried from piece to piece;
+//!    fixed frames and Frenet's follow from a side vector. [`rolls`] are angles about the direction that are added,
+//!    distributed over the length.
+//! 5. [`Span`](sample::Span): a part of a path's time on one stretch. [`sample`] evaluates position or rotation at
+//!    its 13 nodes, one span in each lane; [`fit()`](fit::fit) converts them to polynomials and divides a span into
+//!    two if its polynomial does not fit.
 //!
-//! The result are two [`ClipData`](crate::prepare::clip_data::ClipData), positions and rotations, and
-//! warnings. The oracle for all this is [`reference::follow`](crate::reference::follow), by differential
-//! equation and small steps.
+//! The results are two [`ClipData`](crate::prepare::clip_data::ClipData), positions and rotations, and warnings.
+//! Tests compare them with [`reference::follow`](crate::reference::follow), which integrates the differential
+//! equation with small steps.
 
 pub(crate) mod body;
 pub(crate) mod carried_piece;

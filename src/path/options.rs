@@ -1,4 +1,4 @@
-//! How bodies follow paths: the options, and the errors and warnings about them and about paths.
+//! Options for bodies that follow paths, and errors and warnings about the options and the paths.
 
 use glam::{DQuat, DVec3};
 
@@ -8,7 +8,7 @@ use crate::names::names;
 use crate::path::speed::PathSpeed;
 use crate::threads::stop::StoppedError;
 
-/// How the bodies of a set follow their paths, which are the tracks' translations.
+/// Options for the bodies of a set that follow their paths. The paths are the tracks' translations.
 ///
 /// ```
 /// use tumble::glam::{DVec3, Vec3};
@@ -33,26 +33,26 @@ use crate::threads::stop::StoppedError;
 pub struct Follow {
     /// The curve through the points.
     pub method: VectorMethod,
-    /// Its ends. With [`Ends::Loop`] the path is closed: its last point repeats the first, and so
-    /// does its last pose.
+    /// The ends of the curve. With [`Ends::Loop`] the path is closed: its last point equals the first, and its last
+    /// pose equals the first.
     pub ends: Ends,
     /// The direction in which a body faces.
     pub direction: Direction,
-    /// How it is turned about its direction.
+    /// The rotation of the body about its direction.
     pub frame: PathFrame,
-    /// The upward direction: at the start for [`PathFrame::Minimal`], everywhere for [`PathFrame::Fixed`].
+    /// The upward direction: for [`PathFrame::Minimal`] at the start, for [`PathFrame::Fixed`] everywhere.
     pub up: DVec3,
-    /// What is done with the roll by which a closed path misses its first pose.
+    /// The treatment of the roll by which the last pose of a closed path differs from its first.
     pub twist: Twist,
-    /// When a body is where.
+    /// The speed on the path.
     pub speed: PathSpeed,
-    /// The axis of the body that faces forward, and the one that faces up.
+    /// The axis of the body that faces forward, and the axis that faces up.
     pub axes: [BodyAxis; 2],
 }
 
 impl Default for Follow {
-    /// Along the tangent of a Bessel-Overhauser curve, without a roll about it, as keyed, with z
-    /// forward and y up.
+    /// A Bessel-Overhauser curve with the speed of its keys; the body faces along the tangent without a roll about
+    /// it, with z forward and y up.
     fn default() -> Self {
         Self {
             method: VectorMethod::BesselOverhauser,
@@ -67,31 +67,32 @@ impl Default for Follow {
     }
 }
 
-/// The direction in which a body on a path faces. One that stands still keeps its last direction, at the start
-/// the first to come.
+/// The direction in which a body on a path faces. A body that stands still keeps its last direction; at the start it
+/// has the first direction that follows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Direction {
     /// Along the path.
     #[default]
     Tangent,
-    /// To the point this far ahead along the path; beyond an open path's end straight on.
+    /// To the point at this distance ahead along the path. After the end of an open path, the path continues
+    /// straight.
     Ahead(f64),
     /// To a point.
     Point(DVec3),
-    /// To the body on a track of the set, which itself faces along its path.
+    /// To the body on the track with this index in the set. That body faces along its path.
     Track(usize),
 }
 
-/// How a body is turned about its direction.
+/// The rotation of a body about its direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PathFrame {
-    /// It never turns about its direction (Bishop 1975; Wang et al. 2008).
+    /// The body does not rotate about its direction (Bishop 1975; Wang et al. 2008).
     #[default]
     Minimal,
-    /// Its upward axis is as near to the upward direction as it can be.
+    /// The body's upward axis is as near to the upward direction as possible.
     Fixed,
-    /// As the path's principal normal has it, without its flips by 180°: they are undone where the
-    /// path has an inflection and where its second derivative jumps.
+    /// The body follows the path's principal normal. The normal's flips by 180°, at inflections and at jumps of the
+    /// second derivative, are removed.
     Frenet,
 }
 
@@ -102,13 +103,13 @@ names! {
     Frenet => "frenet",
 }
 
-/// What is done with the angle by which a minimal frame is off after one round of a closed path.
+/// The treatment of the roll that a minimal frame has gained after one round of a closed path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Twist {
-    /// It is spread evenly over the path, so that the last pose is the first.
+    /// The roll is removed evenly over the path, so that the last pose equals the first.
     #[default]
     Spread,
-    /// It stays.
+    /// The roll is not changed.
     Free,
 }
 
@@ -122,7 +123,7 @@ names! {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyAxis(pub(crate) usize, pub(crate) f64);
 
-/// `+x` is a name of `x` too.
+/// Parses the name of an axis; `+x` is the same as `x`.
 impl std::str::FromStr for BodyAxis {
     type Err = FollowError;
 
@@ -153,7 +154,7 @@ impl BodyAxis {
         Self(2, -1.0),
     ];
 
-    /// The name by which programs call it: `x`, `-y`.
+    /// The name that programs use: `x`, `-y`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match (self.0 % 3, self.1 < 0.0) {
@@ -166,7 +167,7 @@ impl BodyAxis {
         }
     }
 
-    /// Its direction in the body.
+    /// The direction of the axis in the body's frame.
     #[must_use]
     pub fn direction(self) -> DVec3 {
         DVec3::AXES[self.0 % 3] * self.1
@@ -174,7 +175,7 @@ impl BodyAxis {
 }
 
 impl Follow {
-    /// Refuses options that mean nothing.
+    /// Refuses invalid options.
     pub(crate) fn check(&self) -> Result<(), FollowError> {
         if !(self.up.is_finite() && self.up.length() > 0.0) {
             return Err(FollowError::Up { up: self.up });
@@ -203,7 +204,7 @@ impl Follow {
         Ok(())
     }
 
-    /// The rotation from the body's own axes to z forward, y up.
+    /// The rotation from the body's axes to z forward, y up.
     pub(crate) fn body_axes(&self) -> DQuat {
         let [forward, up] = self.axes.map(BodyAxis::direction);
         let axes = glam::DMat3::from_cols(up.cross(forward), up, forward);
@@ -215,7 +216,7 @@ impl Follow {
     }
 }
 
-/// Why bodies cannot follow as asked. Indices count from 0.
+/// Why bodies cannot follow paths as requested. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FollowError {
@@ -225,23 +226,23 @@ pub enum FollowError {
         /// The track's index in the set.
         track: usize,
     },
-    /// A closed path's ends are apart.
+    /// The last point of a closed path differs from the first.
     #[error(
         "track {track}: the last point of the loop is {gap:e} from the first, more than a millionth of its size; repeat the first point at the end"
     )]
     OpenLoop {
         /// The track's index in the set.
         track: usize,
-        /// The distance.
+        /// The distance between the two points.
         gap: f64,
     },
-    /// No direction.
+    /// The upward direction has no length, or is not finite.
     #[error("the upward direction ({}, {}, {}) has no length", up.x, up.y, up.z)]
     Up {
-        /// The value.
+        /// The upward direction.
         up: DVec3,
     },
-    /// An upward direction at a key, with a frame that has its own.
+    /// Keys have upward directions, but the frame is not [`PathFrame::Minimal`].
     #[error(
         "track {track} has upward directions at its keys, which only the minimal frame follows; choose that \
          frame, or leave the directions out"
@@ -250,60 +251,60 @@ pub enum FollowError {
         /// The track's index in the set.
         track: usize,
     },
-    /// The distance must be positive.
+    /// The distance of [`Direction::Ahead`] is not positive.
     #[error("the body cannot look {distance} ahead; give a distance above 0")]
     Ahead {
-        /// The value.
+        /// The distance.
         distance: f64,
     },
-    /// The point is not finite.
+    /// The point of [`Direction::Point`] is not finite.
     #[error("the body cannot look at ({}, {}, {}); give finite numbers", point.x, point.y, point.z)]
     Point {
-        /// The value.
+        /// The point.
         point: DVec3,
     },
-    /// There is no track to look at.
+    /// The track of [`Direction::Track`] does not exist.
     #[error("track {track} cannot look at track {target}: the set has no such track")]
     Target {
         /// The track's index in the set.
         track: usize,
-        /// The track to look at.
+        /// The index of the target track.
         target: usize,
     },
-    /// Frenet's frame belongs to the tangent.
+    /// [`PathFrame::Frenet`] is requested with a direction other than [`Direction::Tangent`].
     #[error(
         "Frenet's frame faces along the path only; choose another frame, or the tangent as the direction"
     )]
     FrenetAside,
-    /// The parts must be between 0 and 1, together too.
+    /// The fractions of [`PathSpeed::Eased`] are not between 0 and 1, or their sum exceeds 1.
     #[error(
         "speed cannot grow over {start} and fall over {end} of the time; both parts together are at most 1"
     )]
     Eased {
-        /// The first part.
+        /// The fraction at the start.
         start: f64,
-        /// The last part.
+        /// The fraction at the end.
         end: f64,
     },
     /// The work was stopped ([`Stop`](crate::Stop)).
     #[error(transparent)]
     Stopped(#[from] StoppedError),
-    /// Forward and upward must be different axes.
+    /// The forward and the upward axis are not different axes.
     #[error("a body's forward and upward axes must be two different ones of x, y, z, -x, -y, -z")]
     Axes,
 }
 
-/// Something unusual about a path, which is followed all the same.
+/// A warning about a path that is followed nevertheless.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FollowWarning {
-    /// There is no direction.
+    /// The body stands still on the whole path, so it has no direction.
     #[error("track {track} stands still; it looks along +z")]
     StandsStill {
         /// The track's index in the set.
         track: usize,
     },
-    /// Both ways round are equally far.
+    /// The roll after one round is 180°, so it can be removed in two directions.
     #[error(
         "track {track}: the roll left over at the end of the path is 180°, so its direction is ambiguous"
     )]

@@ -6,7 +6,7 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Polynomial(pub(crate) [DVec3; 4]);
 
-/// Points in which zeros are looked for between.
+/// The number of subintervals that are searched for zeros.
 const GRID: u32 = 16;
 
 impl Polynomial {
@@ -30,23 +30,22 @@ impl Polynomial {
         Self(self.0.map(f))
     }
 
-    /// The cross product of two polynomials of degree 2 and 1: `P' × P''`, whose terms of degree 3
-    /// vanish.
+    /// The cross product of two polynomials of degree 2 and 1: `P' × P''`, whose terms of degree 3 are zero.
     pub(crate) fn binormal(position: &Self) -> Self {
         let [_, c, b, a] = position.0;
         let (ab, ca, cb) = (a.cross(b), c.cross(a), c.cross(b));
         Self([cb * 2.0, ca * 6.0, ab * -6.0, DVec3::ZERO])
     }
 
-    /// The same divided by `t - zero`.
+    /// This polynomial divided by `t - zero`.
     fn divided(&self, zero: f64) -> Self {
         let [_, c1, c2, c3] = self.0;
         let q1 = c2 + c3 * zero;
         Self([c1 + q1 * zero, q1, c3, DVec3::ZERO])
     }
 
-    /// The zeros from 0 to 1, within a tolerance, and the polynomial divided by all of them: where
-    /// a direction vanishes, this gives the direction on either side of it, but for its sign.
+    /// The zeros from 0 to 1, within a tolerance, and the polynomial divided by all of them, which is, except for its
+    /// sign, the direction on both sides of a zero.
     pub(crate) fn without_zeros(&self, tolerance: f64) -> (Vec<f64>, Self) {
         let mut rest = *self;
         let mut zeros = Vec::new();

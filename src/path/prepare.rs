@@ -1,4 +1,4 @@
-//! Prepares the paths of a set: positions and rotations become segments, as those of other tracks.
+//! Preparation of the paths of a set: positions and rotations become segments, as those of other tracks.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,8 +26,8 @@ use crate::time::spans::SpanSource;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::{Channel, VectorTrack};
 
-/// The most keys, beside those of one path, that are followed together: as many as fill the vector
-/// lanes, and whose numbers stay in a thread's cache.
+/// The maximum number of keys, in addition to those of one path, that are processed together: they fill the vector
+/// lanes, and their numbers stay in a thread's cache.
 const MAX_BATCH_KEYS: usize = 256;
 
 /// Prepared positions and rotations, and warnings about them.
@@ -37,12 +37,12 @@ pub(crate) struct PreparedPaths {
     pub(crate) warnings: Vec<FollowWarning>,
 }
 
-/// The largest gap of a closed path, as a part of its size.
+/// The largest gap of a closed path, as a fraction of its size.
 const MAX_GAP: f64 = 1e-6;
 
 impl PreparedPaths {
-    /// Prepares the paths of all tracks of a set. Segments of at most `group_bytes` go into one
-    /// buffer of a device. Called on the engine's threads.
+    /// Prepares the paths of all tracks of a set. A buffer of a device gets segments of at most `group_bytes`. Must
+    /// be called on the engine's threads.
     pub(crate) fn new(
         set: &TrackSet,
         follow: &Follow,
@@ -196,7 +196,7 @@ fn prepared(
     Ok(([positions, rotations], warnings))
 }
 
-/// The stretches of a path that are used: of one on which a body stands the first alone.
+/// The stretches of a path that are used: for a body that stands still only the first.
 fn used(body: &BodyOnPath) -> &[PathStretch] {
     let all = &body.stretches[..];
     match body.timed_path.stands() {
@@ -205,7 +205,7 @@ fn used(body: &BodyOnPath) -> &[PathStretch] {
     }
 }
 
-/// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
+/// Adds the spans of a path: its stretches, divided where the speed is not smooth.
 fn add_spans(spans: &mut Vec<Span>, body: &BodyOnPath, path: usize) {
     let (timed_path, used) = (&body.timed_path, used(body));
     let (start, end) = timed_path.span();
@@ -239,10 +239,10 @@ struct PathPreparation<'a> {
     /// The path of each track, and the body on it.
     paths: &'a [&'a VectorTrack],
     bodies: &'a [BodyOnPath],
-    /// Those of the first path, then those of the next.
+    /// The spans of the first path, then those of the next.
     spans: &'a [Span],
     follow: &'a Follow,
-    /// That of positions.
+    /// The interpolation of positions.
     interpolation: &'a Interpolation,
 }
 
@@ -303,8 +303,8 @@ impl PathPreparation<'_> {
     }
 }
 
-/// Adds a part: a track with keys at these times, and its pieces of spans. The first and last values
-/// are used outside the keys; if it repeats, the last is the first.
+/// Adds a part: a track with keys at these times, and its pieces of spans. The first and last values are used outside
+/// the keys; if the track repeats, the last one is equal to the first.
 fn add_part(
     prepared: &mut Prepared,
     track: usize,

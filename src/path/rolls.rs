@@ -1,4 +1,4 @@
-//! Rolls that are added to a frame, spread over the length of its path.
+//! Rolls that are added to a frame, distributed over the length of its path.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 pub(crate) struct Rolls(Vec<[f64; 3]>);
 
 impl Rolls {
-    /// Through these points: lengths, which do not decrease, and angles.
+    /// Makes the curve through these points: lengths, which do not decrease, and angles.
     pub(crate) fn through(points: &[(f64, f64)]) -> Self {
         let mut keys: Vec<(f64, f64)> = Vec::with_capacity(points.len());
         for &point in points {
@@ -33,7 +33,7 @@ impl Rolls {
         Self((0..keys.len()).map(row).collect())
     }
 
-    /// Whether there are any but one for all.
+    /// Whether the roll varies along the path.
     pub(crate) fn are_spread(&self) -> bool {
         self.0.len() > 1
     }
@@ -65,7 +65,7 @@ pub(crate) fn unwrapped(angle: f64, near: f64) -> f64 {
     near + wrapped(angle - near)
 }
 
-/// Whether an angle is 180°, so that it could be undone in either direction.
+/// Whether an angle is 180°, so that it could be removed in either direction.
 pub(crate) fn is_half_turn(angle: f64) -> bool {
     wrapped(angle).abs() > PI - 1e-6
 }

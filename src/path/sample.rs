@@ -1,5 +1,5 @@
-//! Samples spans of followed paths in f64: positions and rotations at the nodes to which polynomials
-//! are fitted, a span in each vector lane.
+//! Sampling of spans of paths in f64: positions and rotations at the nodes of the fitted polynomials, one span in
+//! each vector lane.
 
 use glam::DVec3;
 
@@ -26,7 +26,7 @@ pub(crate) const START: usize = MIDDLE + 1;
 pub(crate) const END: usize = MIDDLE + 2;
 const SAMPLES: usize = MIDDLE + 3;
 
-/// Where the samples lie, as parts of the span.
+/// The positions of the samples, as fractions of the span.
 const PARTS: [f64; SAMPLES] = {
     let mut parts = [0.0; SAMPLES];
     let mut k = 0;
@@ -82,8 +82,7 @@ pub(crate) struct Sampler<'a> {
 /// The numbers of a block of spans.
 #[derive(Default)]
 struct SpanRows {
-    /// The times at which spans start and end, those of their intervals' keys, and the parameters between
-    /// which their stretches lie.
+    /// The start and the end of spans, those of their intervals, and the range of parameters of their stretches.
     times: [LaneValues; 6],
     parameters: [LaneValues; SAMPLES],
     directions: [[LaneValues; 3]; SAMPLES],

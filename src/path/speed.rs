@@ -1,25 +1,25 @@
-//! When a body is where on its path: by its keys, at one speed, or eased in and out.
+//! The speed of a body on its path: by its keys, constant, or eased in and out.
 
-/// When a body is where on its path.
+/// The speed of a body on its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum PathSpeed {
-    /// As the key times say.
+    /// According to the key times.
     #[default]
     Keys,
-    /// At one speed from the first key time to the last.
+    /// Constant from the first key time to the last.
     Constant,
-    /// From rest to rest: the speed grows over the first part of the time and falls over the last
-    /// (smoothstep), and is constant between.
+    /// From rest to rest: the speed increases (as smoothstep) at the start, decreases at the end, and is constant
+    /// between.
     Eased {
-        /// The part of the time in which the speed grows.
+        /// The fraction of the time in which the speed increases.
         start: f64,
-        /// The part of the time in which it falls; both parts together are at most 1.
+        /// The fraction of the time in which the speed decreases. The sum of both is at most 1.
         end: f64,
     },
 }
 
 impl PathSpeed {
-    /// The part of the time at which a part of the length is covered.
+    /// The fraction of the time at which a fraction of the length is covered.
     pub(crate) fn moment(self, part: f64) -> f64 {
         let Self::Eased { start, end } = self else {
             return part;
@@ -47,8 +47,8 @@ impl PathSpeed {
     }
 }
 
-/// The part of the length covered at the part `x` of the time: the speed grows as smoothstep over
-/// the part `a` of the time, and falls so over the part `b`.
+/// The fraction of the length that is covered at the fraction `x` of the time. The speed increases as smoothstep over
+/// the fraction `a` of the time, and decreases over the fraction `b`.
 pub(crate) fn eased(a: f64, b: f64, x: f64) -> f64 {
     let top = 2.0 / (2.0 - a - b);
     let rise = |part: f64, x: f64| {

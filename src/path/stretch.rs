@@ -1,4 +1,4 @@
-//! Cuts a path into stretches of one smooth direction each.
+//! Division of a path into stretches with a smooth direction each.
 
 use std::sync::Arc;
 
@@ -25,13 +25,13 @@ pub(crate) struct PathStretch {
 /// The direction on a stretch.
 #[derive(Debug, Clone)]
 pub(crate) enum Heading {
-    /// One direction; not known yet where it is 0.
+    /// A constant direction; 0 if it is not known yet.
     Still(DVec3),
-    /// That of a polynomial.
+    /// The direction of a polynomial.
     Polynomial(Polynomial),
-    /// To the point ahead on the path.
+    /// To the point at this distance ahead on the path.
     Ahead(f64),
-    /// To a body on another path, or the direction before where both are at one point.
+    /// To a body on another path; if both are at one point, the previous direction.
     Body(Arc<TimedPath>, DVec3),
 }
 
@@ -81,10 +81,10 @@ impl PathStretch {
     }
 }
 
-/// A body nearer to its centre of interest than this part of the path's size keeps its direction.
+/// A body that is nearer to its target than this fraction of the path's size keeps its direction.
 const COINCIDENT: f64 = 1e-9;
 
-/// A vector as short as this has no direction.
+/// A vector of this length or less has no direction.
 pub(crate) const NO_DIRECTION: f64 = 1e-300;
 
 /// The direction of a vector and its derivative, from the vector and its derivative.
@@ -97,7 +97,7 @@ fn normalized([vector, change]: VectorAndRate) -> VectorAndRate {
     [unit, (change - unit * unit.dot(change)) / length]
 }
 
-/// A polynomial whose zeros are divided out, with the sign that these give at a parameter.
+/// A polynomial divided by its zeros, with the sign that the zeros define at a parameter.
 pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynomial {
     let passed = zeros.iter().filter(|&&zero| at < zero).count();
     match passed % 2 {
@@ -106,8 +106,8 @@ pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynom
     }
 }
 
-/// Cuts a path into stretches. Where a body stands still it keeps the direction before, at the start
-/// that after; there are none if it never moves.
+/// Divides a path into stretches. A body that stands still keeps the previous direction, or at the start the next
+/// one. There are no stretches if it never moves.
 pub(crate) fn stretches(
     timed_path: &TimedPath,
     direction: Direction,
@@ -183,7 +183,7 @@ pub(crate) fn stretches(
     all
 }
 
-/// Fills in the directions of bodies that stand; takes all stretches where there is none.
+/// Sets the directions of bodies that stand still; removes all stretches if there is no direction.
 fn settle(timed_path: &TimedPath, all: &mut Vec<PathStretch>) {
     let mut first = all
         .iter()

@@ -1,4 +1,4 @@
-//! A path with its curves, when a body is where on it, and where it is when.
+//! A path with its curves, and the relation between time and position on it.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::path::polynomial::Polynomial;
 use crate::path::speed::{PathSpeed, eased, eased_speed};
 use crate::tracks::set::vectors::VectorTrack;
 
-/// The curves of a path, and when a body is where on them.
+/// The curves of a path, and the relation between time and position on them.
 #[derive(Debug, Clone)]
 pub(crate) struct TimedPath {
     /// The first point.
@@ -19,7 +19,7 @@ pub(crate) struct TimedPath {
     /// The positions of each interval.
     pub(crate) curves: Vec<Polynomial>,
     pub(crate) slopes: Vec<Polynomial>,
-    /// Where each interval's curve stops, and its slope divided by these zeros.
+    /// The parameters at which each interval's curve stops, and its slope divided by these zeros.
     pub(crate) divided: Vec<(Vec<f64>, Polynomial)>,
     /// Empty until they are [measured](Self::measure).
     pub(crate) lengths: Lengths,
@@ -33,10 +33,10 @@ pub(crate) struct TimedPath {
     pub(crate) max_coordinate: f64,
 }
 
-/// A slope below this part of the largest coefficient vanishes.
+/// A slope counts as zero below this fraction of the largest coefficient.
 const STOPPED: f64 = 1e-9;
 
-/// A curve whose slope is this part of the path's size everywhere stands still: it is the rounding of
+/// A curve stands still if its slope is below this fraction of the path's size everywhere: it is the rounding of
 /// equal keys.
 const STILL: f64 = 1e-14;
 
@@ -84,7 +84,7 @@ impl TimedPath {
         timed
     }
 
-    /// Finds the lengths, which not every path needs.
+    /// Computes the lengths, which not every path needs.
     pub(crate) fn measure(&mut self) {
         let stops = self.divided.iter().map(|curve| &curve.0[..]);
         self.lengths = Lengths::new(self.slopes.clone(), stops);
@@ -121,7 +121,7 @@ impl TimedPath {
         times
     }
 
-    /// The parameters of an interval from which the point this far ahead lies between two intervals.
+    /// The parameters of an interval for which the point at this distance ahead passes from one interval to the next.
     pub(crate) fn passings(&self, interval: usize, distance: f64) -> Vec<f64> {
         let (lengths, total) = (&self.lengths, self.lengths.total());
         let [from, to] = lengths.of(interval);
@@ -137,22 +137,22 @@ impl TimedPath {
             .collect()
     }
 
-    /// When the path starts and ends.
+    /// The start and the end of the path, seconds.
     pub(crate) fn span(&self) -> (f64, f64) {
         (self.times[0], self.times[self.times.len() - 1])
     }
 
-    /// The key times between which an interval lies.
+    /// The key times at the ends of an interval.
     pub(crate) fn keys_of(&self, interval: usize) -> [f64; 2] {
         [self.times[interval], self.times[interval + 1]]
     }
 
-    /// Whether a body is where its speed says, and not where its keys do.
+    /// Whether the position depends on the speed instead of the key times.
     pub(crate) fn is_retimed(&self) -> bool {
         self.speed != PathSpeed::Keys && self.lengths.total() > 0.0
     }
 
-    /// Whether a body stands on its path; it may rotate all the same.
+    /// Whether a body stands still on its path; it may rotate nevertheless.
     pub(crate) fn stands(&self) -> bool {
         self.speed != PathSpeed::Keys && !self.is_retimed()
     }
@@ -189,7 +189,7 @@ impl TimedPath {
         (interval, self.parameter(interval, time))
     }
 
-    /// The change of time with an interval's parameter where its curve has this speed.
+    /// The derivative of time by an interval's parameter where the body has this speed.
     pub(crate) fn pace(&self, interval: usize, t: f64, speed: f64) -> f64 {
         if self.speed == PathSpeed::Keys {
             let [from, to] = self.keys_of(interval);
@@ -207,7 +207,7 @@ impl TimedPath {
         speed * (end - start) / (total * rate).max(1e-300)
     }
 
-    /// The times at which the speed is not smooth, inside of a range.
+    /// The times within a range at which the speed is not smooth.
     pub(crate) fn joints(&self, times: Range<f64>) -> impl Iterator<Item = f64> + use<> {
         let (from, to) = self.span();
         let parts = match self.speed {

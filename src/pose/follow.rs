@@ -21,8 +21,8 @@ pub struct Followed {
 }
 
 impl Engine {
-    /// Moves a body along the path of every track of a set: its translations, as
-    /// [`TrackSet::push_path`] takes them. On every device the bits are the same.
+    /// Moves a body along the path of every track of a set. The path is the track's translations
+    /// ([`TrackSet::push_path`]). Every device gives the same bits.
     ///
     /// ```
     /// use glam::Vec3;
@@ -41,8 +41,8 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When a track has no path or cannot be followed as asked, the frames do not fit the set, or
-    /// the device fails.
+    /// When a track has no path or cannot be followed as requested, the frames do not fit the set, or the device
+    /// fails.
     pub fn follow(
         &self,
         set: &TrackSet,

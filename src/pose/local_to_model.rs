@@ -1,5 +1,5 @@
-//! Local to model: the transforms of a skeleton's joints in their parents' frames become matrices in
-//! the model's frame.
+//! Local to model: conversion of the transforms of a skeleton's joints from their parents' frames to matrices in the
+//! model's frame.
 
 use glam::{Affine3A, Vec3};
 use rayon::prelude::*;
@@ -22,11 +22,12 @@ use crate::twin::matrix;
 type AffineRows = [[f32; 4]; 3];
 
 impl Engine {
-    /// Walks a skeleton from its roots down: `M = M_parent T R S` for every joint, with its
-    /// translation, rotation and scale, and `M B` with inverse bind matrices `B`, one for
-    /// each track, as a renderer skins vertices with. The translation of a track that has keys of it
-    /// replaces the skeleton's offset, as in glTF and BVH; other tracks stay at their
-    /// offsets. The host computes them in f32 for every device, so the bits are the same.
+    /// Computes model matrices along a skeleton: `M = M_parent T R S` for every joint, from its translation, rotation
+    /// and scale. With inverse bind matrices `B`, one for each track, the result is `M B`, with which renderers skin
+    /// vertices.
+    ///
+    /// For tracks with translation keys, the translation replaces the skeleton's offset, as in glTF and BVH; other
+    /// tracks keep their offsets. For every device the host computes the matrices in f32, so the bits are the same.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
@@ -47,8 +48,8 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the three are not of the same tracks and samples, the skeleton or the inverse bind
-    /// matrices are of other tracks, or there is not enough memory.
+    /// When translations, rotations and scales differ in tracks or samples, the skeleton, the inverse bind matrices
+    /// or `has_translation` do not fit the tracks, or there is not enough memory.
     #[doc(alias = "skinning")]
     #[doc(alias = "model space")]
     #[doc(alias = "object space")]
@@ -119,7 +120,7 @@ fn check(local: &Transforms) -> Result<(), PoseError> {
     }
 }
 
-/// Finds the matrix of one joint, after that of its parent.
+/// Computes the matrix of one joint; the matrix of its parent is known.
 fn walk(local: &Transforms, link: &Link, sample: usize, model: &mut [AffineRows]) {
     let (track, layout) = (link.track as usize, local.rotations.layout());
     let (tracks, samples) = (
@@ -165,8 +166,8 @@ fn rows(matrix: Affine3A) -> AffineRows {
     std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]])
 }
 
-/// The matrix of every joint at every sample, `[sample][track]`: three rows of four numbers, for column
-/// vectors, the last column the translation.
+/// The matrix of every joint at every sample, `[sample][track]`: three rows of four numbers, for column vectors. The
+/// last column is the translation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelMatrices {
     matrices: Vec<AffineRows>,
@@ -181,14 +182,13 @@ impl ModelMatrices {
         self.tracks
     }
 
-    /// Samples of each track.
+    /// Number of samples of each track.
     #[must_use]
     pub fn sample_count(&self) -> usize {
         self.samples
     }
 
-    /// All matrices, `[sample][track][row][column]`, as a shader of row-major 3 × 4 matrices reads
-    /// them.
+    /// All matrices, `[sample][track][row][column]`, the memory layout of row-major 3 × 4 matrices in shaders.
     #[must_use]
     pub fn as_arrays(&self) -> &[[[f32; 4]; 3]] {
         &self.matrices
@@ -203,7 +203,7 @@ impl ModelMatrices {
         Some(Affine3A::from_cols_array_2d(&columns))
     }
 
-    /// Where a track's origin is at a sample; `None` out of range.
+    /// The position of a track's origin in the model at a sample; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
         let rows = self.rows_of(track, sample)?;

@@ -1,5 +1,5 @@
-//! Poses from poses, on the engine's device: layers are blended, mixed or added, and a skeleton is
-//! walked from its roots down to rotations and positions in the world.
+//! Poses computed from poses, on the engine's device: layers are blended, mixed or added, and rotations along a
+//! skeleton are converted to rotations and positions in the world.
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -23,12 +23,12 @@ use crate::threads::{OutOfThreadsError, on_threads};
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
-    /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
-    /// sign that is nearer to the first layer's. Weights need not add up to 1.
+    /// Blends layers: the normalised weighted sum of their rotations. Each layer's rotation has the sign that is
+    /// nearer to the first layer's. The sum of the weights need not be 1.
     ///
     /// # Errors
-    /// When there is no layer, their shapes differ, a weight is not finite or beyond 1e9, or the device
-    /// fails.
+    /// When there is no layer, the layers' shapes differ, a weight is not finite or exceeds 1e9 in magnitude, or the
+    /// device fails.
     pub fn blend(&self, layers: &[(&Rotations, f32)]) -> Result<Rotations, Error> {
         let Some((&(first, _), others)) = layers.split_first() else {
             return Err(PoseError::NoLayer.into());
@@ -56,11 +56,11 @@ impl Engine {
         })
     }
 
-    /// Mixes two results: slerp along the shorter arc from every rotation of one to that of the other,
-    /// by `weight` from 0 to 1.
+    /// Mixes two results: slerp along the shorter arc from each rotation of `from` to that of `to`. `weight` is from
+    /// 0 to 1.
     ///
     /// # Errors
-    /// When their shapes differ, the weight lies outside, or the device fails.
+    /// When the shapes differ, the weight is outside 0 to 1, or the device fails.
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to, 1)?;
         check_fraction(weight)?;
@@ -76,12 +76,11 @@ impl Engine {
         })
     }
 
-    /// Adds a layer to a base: `base · (reference⁻¹ layer)^weight`, with one reference rotation
-    /// for each track and a weight from 0 to 1.
-    ///
+    /// Adds the difference of a layer from a reference to a base: `base · (reference⁻¹ layer)^weight`. The reference
+    /// has one rotation for each track; the weight is from 0 to 1.
     /// # Errors
-    /// When the shapes differ, there is not one reference for each track, the weight lies
-    /// outside, or the device fails.
+    /// When the shapes differ, there is not one reference rotation for each track, the weight is outside 0 to 1, or
+    /// the device fails.
     #[doc(alias = "additive")]
     pub fn add(
         &self,
@@ -115,8 +114,8 @@ impl Engine {
         })
     }
 
-    /// Converts rotations in their parents' frames to rotations and positions in the world, at the
-    /// skeleton's offsets. With translations and scales [`Engine::local_to_model`] does so.
+    /// Converts rotations in their parents' frames to rotations and positions in the world, with the skeleton's
+    /// offsets. [`Engine::local_to_model`] does this with translations and scales.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
@@ -134,7 +133,7 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the skeleton has not one link for each track, or the device fails.
+    /// When the skeleton does not have one joint for each track, or the device fails.
     pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
         let (tracks, samples) = (local.track_count(), local.sample_count());
         check_skeleton(skeleton.len(), tracks)?;
@@ -173,8 +172,8 @@ impl Engine {
         })
     }
 
-    /// Makes a result shaped like another, some rotations at a time: `work` gets the device, where
-    /// they start and their memory. It reads `layers` values for each of them.
+    /// Makes a result of the same shape as `like`, some rotations at a time. `work` gets the device, the index of the
+    /// first rotation, and the memory of the rotations. It reads `layers` values for each of them.
     fn each_rotation(
         &self,
         like: &Rotations,
@@ -192,7 +191,7 @@ impl Engine {
         })
     }
 
-    /// Does some work on the engine's device; `None` stands for the CPU.
+    /// Does work on the engine's device; `None` is the CPU.
     pub(crate) fn on_device<T>(
         &self,
         mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, EvaluateError>,
@@ -204,10 +203,10 @@ impl Engine {
     }
 }
 
-/// Values that one pass takes on the CPU: enough for all threads, and gathered in 16 MiB.
+/// The number of values of one pass on the CPU: enough for all threads, and gathered in 16 MiB.
 const CPU_PASS: usize = 1 << 20;
 
-/// The largest number of values of 16 bytes in one pass.
+/// The maximum number of values of 16 bytes in one pass.
 fn limit(device: Option<&VulkanEngine>) -> usize {
     device.map_or(CPU_PASS, VulkanEngine::window)
 }
@@ -215,7 +214,7 @@ fn limit(device: Option<&VulkanEngine>) -> usize {
 /// Rotations and positions in the world, `[frame][track]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorldPoses {
-    /// For each frame and track the rotation, then the position.
+    /// The rotation and the position for each frame and track.
     values: Vec<[f32; 4]>,
     tracks: usize,
     samples: usize,
@@ -228,7 +227,7 @@ impl WorldPoses {
         self.tracks
     }
 
-    /// Samples of each track.
+    /// Number of samples of each track.
     #[must_use]
     pub fn sample_count(&self) -> usize {
         self.samples
@@ -241,14 +240,14 @@ impl WorldPoses {
         Some(Quat::from_array(self.values[index]))
     }
 
-    /// The position of a track at a sample, in the world; `None` out of range.
+    /// The position of a track in the world at a sample; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
         let [x, y, z, _] = self.values[self.index_of(track, sample)? + 1];
         Some(Vec3::new(x, y, z))
     }
 
-    /// `[frame][track]`: the rotation `x y z w`, then the position `x y z 0`.
+    /// All values, `[frame][track]`: a rotation `x y z w` and a position `x y z 0` each.
     #[must_use]
     pub fn as_slice(&self) -> &[[f32; 4]] {
         &self.values
@@ -260,7 +259,7 @@ impl WorldPoses {
     }
 }
 
-/// Refuses a layer of another shape than the first.
+/// Refuses a layer whose shape differs from the first layer's.
 fn same_shape(first: &Rotations, other: &Rotations, layer: usize) -> Result<(), PoseError> {
     let (first, shape) = (first.shape(), other.shape());
     match first == shape {
@@ -281,7 +280,7 @@ pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
-/// Values in one task of the CPU.
+/// The number of values in one task of the CPU.
 const TASK: usize = 8192;
 
 struct PoseTask<'a, F> {

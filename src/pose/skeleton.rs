@@ -10,16 +10,17 @@ use crate::shader::{Link, ROOT};
 /// The parent of each track, and its offset in the parent's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    /// The tracks in the order in which the kernels walk them, parents before their children.
+    /// The tracks in the order of evaluation, parents before their children.
     links: Vec<Link>,
 }
 
 impl Skeleton {
-    /// A skeleton of these parents (`None` for a root) and offsets, in any unit of length. An
-    /// offset is in the parent's frame, and that of a root in the world.
+    /// Makes a skeleton from the parent of each track (`None` for a root) and its offset, in any unit of length.
+    /// Offsets are in the parent's frame; those of roots are in the world.
     ///
     /// # Errors
-    /// A [`SkeletonError`] that names the track.
+    /// When the numbers of parents and offsets differ, an offset is not finite, a parent does not exist, the parents
+    /// contain a cycle, or there is not enough memory.
     pub fn new(parents: Vec<Option<usize>>, offsets: Vec<Vec3>) -> Result<Self, SkeletonError> {
         let tracks = parents.len();
         if tracks > MAX_TRACKS {
@@ -72,11 +73,11 @@ impl Skeleton {
         Ok(Self { links })
     }
 
-    /// A chain of joints: the first is at the origin, each other at the lower end of
-    /// the one before it, `(0, -length, 0)`.
+    /// Makes a chain of joints: the first joint is at the origin, and each other joint is at `(0, -length, 0)`
+    /// relative to the one before it.
     ///
     /// # Errors
-    /// When the length is not finite, or there are too many.
+    /// When the length is not finite, there are too many joints, or there is not enough memory.
     pub fn chain(boxes: usize, length: f64) -> Result<Self, SkeletonError> {
         if boxes > MAX_TRACKS {
             return Err(SkeletonError::TooMany { tracks: boxes });
@@ -97,7 +98,7 @@ impl Skeleton {
         self.links.len()
     }
 
-    /// Whether it has no tracks.
+    /// Whether the skeleton has no tracks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.links.is_empty()

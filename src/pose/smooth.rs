@@ -16,10 +16,11 @@ use crate::smooth::rows::{SampleRow, SmoothingBlock, SmoothingPass};
 use crate::threads::on_threads;
 
 impl Engine {
-    /// Smooths the rotations of every track over its samples, which are to be evenly spaced:
-    /// `q' = q exp(Σ b_m (d_{i+m} - d_{i-1-m}))` with the steps `d` between neighbours (Lee and Shin
-    /// 2002). A track that stands still keeps its bits, even motion stays, and a rotation of all
-    /// samples from either side turns the result.
+    /// Smooths the rotations of every track over its samples, which must be evenly spaced in time: `q' = q exp(Σ b_m
+    /// (d_{i+m} - d_{i-1-m}))` with the steps `d` between neighbours (Lee and Shin 2002).
+    ///
+    /// A track that stands still keeps its bits, and motion with constant velocity does not change. If all samples
+    /// are multiplied by a rotation, from either side, the result is multiplied by it too.
     ///
     /// ```
     /// use glam::Quat;
@@ -37,7 +38,7 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the kernel means nothing, or the device fails.
+    /// When the smoothing options are invalid, there is not enough memory, or the device fails.
     pub fn smooth(&self, rotations: &Rotations, smoothing: &Smoothing) -> Result<Rotations, Error> {
         self.smoothed(rotations, smoothing, true)
     }
@@ -45,7 +46,7 @@ impl Engine {
     /// Smooths vectors; otherwise as [`Engine::smooth`].
     ///
     /// # Errors
-    /// As there.
+    /// As [`Engine::smooth`].
     pub fn smooth_vectors(
         &self,
         vectors: &Vectors,
@@ -104,7 +105,7 @@ impl Engine {
     }
 }
 
-/// Samples of each track that a thread smooths at once, for a kernel that is not wider: their steps
+/// The number of samples of each track that a thread smooths at once, for a kernel that is not wider. Their steps
 /// stay in the caches.
 const BLOCK: usize = 1024;
 
@@ -127,7 +128,7 @@ impl PassInput<'_> {
         }
     }
 
-    /// On the engine's threads.
+    /// Runs the pass on the engine's threads.
     fn on_cpu(&self, pass: &SmoothingPass<'_>, output: &mut [[f32; 4]]) {
         let length = BLOCK.max(4 * pass.weights.len());
         let block =
@@ -164,8 +165,8 @@ impl PassInput<'_> {
         }
     }
 
-    /// The same on a device, as many tracks at once as one pass takes. Steps beyond the ends of rows
-    /// are copied there by the host.
+    /// Runs the pass on a device, for as many tracks at once as one pass can process. The host writes the steps
+    /// outside the ends of rows.
     fn on(
         &self,
         pass: &SmoothingPass<'_>,

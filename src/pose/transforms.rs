@@ -1,4 +1,4 @@
-//! Rotations with the translations and the scales beside them.
+//! Rotations together with translations and scales.
 
 use crate::engine::Engine;
 use crate::engine::clip::Clip;
@@ -12,23 +12,23 @@ use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
 
-/// The transform of every track at every sample: scaled first, then rotated, then translated.
+/// The transform of every track at every sample: first scaled, then rotated, then translated.
 #[derive(Debug)]
 pub struct Transforms {
-    /// Translations; 0 for tracks that have no keys of them.
+    /// Translations; 0 for tracks without translation keys.
     pub translations: Vectors,
     /// Rotations.
     pub rotations: Rotations,
-    /// Scales; 1 for tracks that have no keys of them.
+    /// Scales; 1 for tracks without scale keys.
     pub scales: Vectors,
-    /// Whether each track has keys of a translation;
-    /// [`local_to_model`](Engine::local_to_model) leaves others at their skeleton's offsets.
+    /// Whether each track has translation keys. [`local_to_model`](Engine::local_to_model) uses the skeleton's
+    /// offsets for the others.
     pub has_translation: Vec<bool>,
 }
 
 impl Engine {
-    /// Evaluates rotations, translations and scales of a set at the same frames. Translations and
-    /// scales follow the method `vectors`, with the ends and wrap modes of `interpolation`.
+    /// Evaluates rotations, translations and scales of a set at the same times. Translations and scales are
+    /// interpolated by the method `vectors`, with the ends and wrap modes of `interpolation`.
     ///
     /// ```
     /// use glam::{Quat, Vec3};
@@ -70,7 +70,7 @@ impl Engine {
         })
     }
 
-    /// Evaluates the translations or the scales alone; otherwise as [`Engine::transforms`].
+    /// Evaluates only translations or only scales; otherwise as [`Engine::transforms`].
     ///
     /// # Errors
     /// As [`Engine::evaluate`].

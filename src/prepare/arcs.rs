@@ -1,5 +1,5 @@
-//! Prepares arcs from keys in vector lanes: one key interval to a lane, of as many tracks as it
-//! takes to fill a block.
+//! Preparation of arcs from keys in vector lanes: one key interval in each lane. A block is filled with intervals of
+//! several tracks.
 
 use std::ops::Range;
 
@@ -18,16 +18,16 @@ use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
 
-/// The most arcs that are computed together.
+/// The maximum number of arcs that are computed together.
 const BLOCK_ARCS: usize = 64;
 
-/// Intervals that wait for their block, and the arcs that they become.
+/// Intervals that wait until their block is full, and the arcs that are computed from them.
 #[derive(Zeroable)]
 pub(crate) struct ArcPreparation {
-    /// Whether no arc is longer than half a turn.
+    /// Whether no arc exceeds 180°.
     is_shortest: bool,
     from: [[f32; 4]; BLOCK_ARCS],
-    /// The key at the end of each interval, in the sign nearer to `from`.
+    /// The key at the end of each interval, with the sign nearer to `from`.
     to: [[f32; 4]; BLOCK_ARCS],
     count: usize,
     middles: [[f32; 4]; BLOCK_ARCS],
@@ -57,7 +57,7 @@ impl ArcPreparation {
         }
     }
 
-    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    /// Adds some intervals of the track `index` of a set, as a separate part.
     pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,
@@ -97,7 +97,7 @@ impl ArcPreparation {
         prepared.push_part(index, times, &intervals, spans, [first_key, last_key]);
     }
 
-    /// Takes intervals between these keys, none of more than half a turn.
+    /// Adds intervals between these keys, none of which exceeds 180°.
     fn push(
         &mut self,
         prepared: &mut Prepared,
@@ -118,7 +118,7 @@ impl ArcPreparation {
         }
     }
 
-    /// Takes one arc as the next span.
+    /// Adds one arc as the next span.
     fn push_arc(
         &mut self,
         prepared: &mut Prepared,
@@ -145,7 +145,7 @@ impl ArcPreparation {
     }
 }
 
-/// The middle of an arc between two keys that is longer than half a turn; it becomes two arcs.
+/// The middle of an arc between two keys if the arc exceeds 180°; then it becomes two arcs.
 fn middle_of_long(keys: [[f32; 4]; 2]) -> Option<[f32; 4]> {
     let [from, to] = keys.map(unit);
     (dot(from, to) < 0.0).then(|| {

@@ -1,4 +1,4 @@
-//! A set, prepared: its tracks in groups, and the indices of each track's parts.
+//! A prepared set: its tracks in groups, and the indices of each track's parts.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -27,7 +27,7 @@ use crate::tracks::set::vectors::{Channel, VectorTrack};
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
-/// The prepared tracks on the host, from which every device's schedule is made.
+/// The prepared tracks on the host, from which the work of every device is computed.
 pub(crate) struct ClipData {
     pub(crate) interpolation: Interpolation,
     pub(crate) groups: Vec<Prepared>,
@@ -35,7 +35,7 @@ pub(crate) struct ClipData {
     parts: Vec<(u32, u32)>,
     /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
-    /// When the first key of the set is, and the last.
+    /// The first and the last key time of the set, seconds.
     pub(crate) time_span: Option<(f64, f64)>,
 }
 
@@ -46,14 +46,14 @@ pub(crate) struct PartRef<'a> {
     pub(crate) part: &'a TrackPart,
 }
 
-/// Which tracks of a set to prepare, and for which timelines.
+/// The tracks of a set to prepare, and the timelines for which they are prepared.
 pub(crate) struct PrepareRequest<'a> {
     pub(crate) batch: Batch,
-    /// Groups are merged while the segments of each stay within this many bytes, as each becomes a
-    /// buffer of a device. With `None` they stay as they were prepared.
+    /// Groups are merged while the segments of each stay within this number of bytes, because each becomes a buffer
+    /// of a device. With `None` they are not merged.
     pub(crate) group_bytes: Option<usize>,
-    /// Groups are made large from the start and not merged: copying them together would cost more
-    /// than one dispatch for each.
+    /// Groups are made large from the start and not merged, because copying them together would take longer than one
+    /// dispatch for each.
     pub(crate) large_groups: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
@@ -73,8 +73,8 @@ impl PrepareRequest<'_> {
         }
     }
 
-    /// The most keys of a group. If groups are to be large, it is as many as leave four groups for
-    /// each thread, within the limit of bytes.
+    /// The maximum number of keys of a group. If groups are to be large, there are four groups for each thread,
+    /// within the limit of bytes.
     fn group_keys(&self, set: &TrackSet, form: Form) -> usize {
         let (Some(limit), true) = (self.group_bytes, self.large_groups) else {
             return PART_INTERVALS;
@@ -146,7 +146,7 @@ impl ClipData {
         }
     }
 
-    /// Of a set that can be interpolated so, with nothing prepared: its tracks have no parts.
+    /// The data of a set that can be interpolated as requested, with nothing prepared: its tracks have no parts.
     pub(crate) fn unprepared(
         set: &TrackSet,
         interpolation: Interpolation,
@@ -335,8 +335,8 @@ impl ClipData {
         Some(first.part.extension.as_ref()?.span)
     }
 
-    /// The timeline with explicit times folded into the time range of their track's keys, if the
-    /// wrap mode repeats tracks.
+    /// The timeline with explicit times folded into the time range of their track's keys, if the wrap mode repeats
+    /// tracks.
     pub(crate) fn folded<'t>(
         &self,
         timeline: &'t Timeline,

@@ -1,5 +1,5 @@
-//! Tracks at constant speed. The curves of a track wait until all of them are known; then each gets
-//! the fraction of the track's time that its arc length is of the track's.
+//! Tracks at constant speed. The curves of a track are collected until all are known. Then the duration of each in
+//! the track's time becomes proportional to its arc length.
 
 use std::sync::Arc;
 
@@ -12,22 +12,22 @@ use crate::threads::stop;
 use crate::time::runs::NONE;
 use crate::time::spans::{SpanSource, TrackPart};
 
-/// A smaller angle than this, radians, shows in no result in f32.
+/// The largest angle that has no effect on results in f32, radians.
 const VISIBLE: f64 = 1e-8;
 
-/// An interval that waits until all of its track is there.
+/// An interval of a track whose other intervals are not complete yet.
 pub(crate) struct PendingInterval {
     /// Its part of the prepared tracks.
     pub(crate) part: usize,
-    /// When it starts as keyed, in seconds.
+    /// The start according to the key times, seconds.
     pub(crate) start: f64,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) key: u32,
-    /// `None` if it stands still.
+    /// The curve; `None` if it stands still.
     pub(crate) curve: Option<IntervalCurve>,
 }
 
-/// Gives the curves of every track their times, and hands them over to be fitted.
+/// Sets the times of the curves of every track, and passes them on to be fitted.
 pub(crate) fn retime(
     prepared: &mut Prepared,
     waiting: &mut [PendingInterval],

@@ -1,4 +1,4 @@
-//! Why a set cannot be evaluated as asked, on any device.
+//! Errors of evaluating a set, on any device.
 
 use crate::curve::options::InterpolationError;
 use crate::memory::OutOfMemoryError;
@@ -6,7 +6,7 @@ use crate::threads::OutOfThreadsError;
 use crate::threads::stop::StoppedError;
 use crate::time::error::SampleTimesError;
 
-/// Why a set cannot be evaluated as asked, on any device.
+/// Why a set cannot be evaluated as requested, on any device.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SetError {
     #[error(transparent)]

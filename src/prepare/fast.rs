@@ -1,6 +1,5 @@
-//! Smooth curves straight from keys, in f32: small angles by a series, longer curves by a Hermite
-//! fit of the whole or of its halves. Intervals that f32 cannot prepare wait for a block of their
-//! own, in f64.
+//! Smooth curves directly from keys, in f32: small angles by a series, longer curves by a Hermite fit of the whole
+//! curve or of its halves. Intervals that f32 cannot prepare are collected in a separate block, in f64.
 
 use std::ops::Range;
 
@@ -27,7 +26,7 @@ use crate::time::runs::NONE;
 
 type CurveSlots = [CurveSlot; ROW_LEN + SPARE_LANES];
 
-/// Places in the lists of lanes.
+/// Indices in the lists of lanes.
 const SMALL_ANGLE: usize = 0;
 const HALVES: usize = 3;
 const LEFT_OVER: usize = 4;
@@ -37,16 +36,15 @@ pub(crate) struct FastPreparation {
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     handles: HandlesF32,
-    /// Where the curve of each lane goes; of one that is split, the first half.
+    /// The destination of each lane's curve; for a divided curve that of the first half.
     slots: CurveSlots,
-    /// The lanes that were queued, by what becomes of their curves: small-angle cubics, curves
-    /// fitted with degree 8, curves fitted with degree 10, curves split at their middle, and those
-    /// that f32 cannot prepare.
+    /// The queued lanes, by the kind of their curves: small-angle cubics, curves fitted with degree 8, curves fitted
+    /// with degree 10, curves divided at their middle, and those that f32 cannot prepare.
     lists: [LaneList; 5],
-    /// The starts and the keys of the spans that lanes become, which are at most two each.
+    /// The starts and the keys of the spans of the lanes, at most two spans each.
     starts: [f64; 2 * LANES],
     keys: [u32; 2 * LANES],
-    /// Intervals that f32 cannot prepare wait here; made for the first one.
+    /// Intervals that f32 cannot prepare; allocated for the first one.
     left_over: Option<Box<LeftOver>>,
     /// See [`FastCurves`].
     set_long: fn(&mut HandlesF32, &[usize], &Intervals),
@@ -89,9 +87,9 @@ impl FastPreparation {
         });
     }
 
-    /// Queues the curves in some lanes: they become the next spans, two for each that is split at
-    /// its middle. `key` is the constant at the start of the first. Nothing branches on how far a
-    /// curve turns, which no processor can predict.
+    /// Queues the curves in some lanes: they become the next spans, two for each that is divided at its middle. `key`
+    /// is the constant at the start of the first. There is no branch on the angle of a curve, which processors cannot
+    /// predict.
     pub(crate) fn queue(
         &mut self,
         prepared: &mut Prepared,
@@ -129,8 +127,8 @@ impl FastPreparation {
         prepared.push_segments(&self.starts[..count], &self.keys[..count]);
     }
 
-    /// Fits the curves that were queued. Those left over wait, here or in `fitting`. `is_exact` says
-    /// that the f64 numbers of the intervals are computed already.
+    /// Fits the queued curves. Those that f32 cannot prepare are collected here or in `fitting`. `is_exact`: the f64
+    /// numbers of the intervals are computed already.
     pub(crate) fn fit(
         &mut self,
         prepared: &mut Prepared,
@@ -165,8 +163,7 @@ impl FastPreparation {
         fit_list(&Halves, halves, 2, all, numbers, slots, prepared);
     }
 
-    /// Moves intervals that are left over to `rest`, each run of them between its neighbours as
-    /// context.
+    /// Moves intervals that f32 cannot prepare to `rest`; each run of them has its neighbours as context.
     fn leave(
         &mut self,
         prepared: &mut Prepared,
@@ -192,7 +189,7 @@ impl FastPreparation {
         }
     }
 
-    /// Fits the curves that still wait, and hands those left over to `fitting`.
+    /// Fits the remaining curves, and passes those that f32 cannot prepare to `fitting`.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
         self.fit_lists(prepared, true);
         if let Some(rest) = &mut self.left_over {
@@ -205,7 +202,7 @@ impl FastPreparation {
 #[derive(Clone, Copy, Zeroable)]
 struct LaneList {
     count: usize,
-    /// Those after `count` are any lanes.
+    /// The lanes; entries after `count` are arbitrary.
     all: [u32; 2 * LANES],
 }
 
@@ -220,9 +217,9 @@ impl LaneList {
     }
 }
 
-/// Fits the curves in the listed lanes into the segments of their slots, all or as many as fill
-/// vectors. Those that do not fill a vector move to spare lanes, which start with the `spare`th row of
-/// [`MAX_LANES`], and are fitted with the next block.
+/// Fits the curves in the listed lanes into the segments of their slots, all or as many as fill vectors. Curves that
+/// do not fill a vector move to spare lanes, which start with the row `spare` of [`MAX_LANES`], and are fitted with
+/// the next block.
 fn fit_list<const PAIRS: usize>(
     key_fit: &impl KeyFit<PAIRS>,
     list: &mut LaneList,
@@ -265,7 +262,7 @@ fn fit_list<const PAIRS: usize>(
 
 struct ListFit<'a, F, const PAIRS: usize> {
     key_fit: &'a F,
-    /// The lanes to fit, and any lanes up to whole vectors.
+    /// The lanes to fit, followed by arbitrary lanes up to whole vectors.
     lanes: &'a [u32],
     count: usize,
     curves: &'a CurveNumbers,
@@ -302,7 +299,7 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for ListFit<'_, F, PAIRS> {
     }
 }
 
-/// Intervals that are left over, each run of them between its neighbours as context.
+/// Intervals that f32 cannot prepare; each run of them has its neighbours as context.
 struct LeftOver {
     intervals: Intervals,
     stretches: Vec<TrackStretch>,
@@ -318,7 +315,7 @@ impl LeftOver {
         }
     }
 
-    /// Adds some intervals of a stretch, whose curves go to these slots; there must be room for them.
+    /// Adds some intervals of a stretch, with these slots for their curves; there must be room for them.
     fn push(
         &mut self,
         intervals: &Intervals,

@@ -1,5 +1,5 @@
-//! Fits curves into segments. Curves wait until they fill a block. Each has one span at once;
-//! that span is replaced by several if the curve has to be cut.
+//! Fitting of curves into segments. Curves are collected until they fill a block. Each has one span immediately; that
+//! span is replaced by several if the curve must be divided.
 
 use crate::curve::options::Quantity;
 use crate::fit::block::Intervals;
@@ -19,14 +19,15 @@ pub(crate) struct Fitting {
     cutter: Cutter,
 }
 
-/// Curves of one tier that wait to fill a block.
+/// Curves of one tier that are collected for a block.
 #[derive(Default)]
 struct FitQueue {
-    /// Made for the first curve: making a block takes longer than fitting a few curves.
+    /// The block, which is allocated for the first curve, because making a block takes longer than fitting a few
+    /// curves.
     block: Option<Box<FitBlock>>,
-    /// The lanes of curves that are not copied into the block yet.
+    /// The lanes of curves that are not copied to the block yet.
     lanes: Vec<u8>,
-    /// Where the curves go: those in the block, then those in `lanes`.
+    /// The destinations of the curves: those in the block, then those in `lanes`.
     slots: Vec<CurveSlot>,
 }
 
@@ -41,8 +42,8 @@ impl Fitting {
         }
     }
 
-    /// Queues the curve in a lane of `curves`, which has its span and its segment.
-    /// The lane is read later, by [`Fitting::copy_queued`], which comes before the lanes of `curves` change.
+    /// Queues the curve in a lane of `curves`, which has a span and a segment already. The lane is read later, by
+    /// [`Fitting::copy_queued`], which must be called before the lanes of `curves` change.
     #[inline]
     pub(crate) fn queue(&mut self, curves: &Intervals, lane: usize, slot: CurveSlot) {
         let queue = match self.shape.tier(curves.squared_extents[lane]) {
@@ -77,8 +78,8 @@ impl Fitting {
         }
     }
 
-    /// Queues a curve of any length as the next span, with this constant at its start.
-    /// [`Fitting::finish`] fits it, and cuts it if necessary; until then it has no segment.
+    /// Queues a curve of any length as the next span, with this constant at its start. [`Fitting::finish`] fits it,
+    /// and divides it if necessary; until then it has no segment.
     pub(crate) fn queue_curve(
         &mut self,
         prepared: &mut Prepared,
@@ -90,8 +91,7 @@ impl Fitting {
         prepared.push_span(start, SpanSource::Segment(NONE), key);
     }
 
-    /// Fits the curves that still wait, and replaces the spans of cut curves by those of their
-    /// parts.
+    /// Fits the remaining curves, and replaces the spans of divided curves by those of their parts.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         for queue in [&mut self.small_angle, &mut self.full] {
             if let Some(block) = &mut queue.block {
@@ -108,7 +108,7 @@ impl Fitting {
     }
 }
 
-/// Fits the curves of a block, which go to the first of the `slots`.
+/// Fits the curves of a block, whose destinations are the first `slots`.
 fn run(
     block: &mut FitBlock,
     slots: &mut Vec<CurveSlot>,

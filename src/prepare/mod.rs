@@ -1,13 +1,13 @@
-//! Prepares tracks: turns their keys into segments, the coefficients that the kernels evaluate,
-//! once per clip. They do not depend on frame rate or device, so the CPU and every Vulkan device
-//! evaluate the same segments.
+//! Preparation of tracks: their keys are converted once per clip to segments, the coefficients that the kernels
+//! evaluate. They do not depend on the frame rate or the device, so the CPU and every Vulkan device evaluate the same
+//! segments.
 //!
-//! # Why so
+//! # Principle
 //!
-//! Tracks of a crowd have few keys, and a vector has up to 16 lanes: blocks are filled with intervals of as
-//! many tracks as it takes, and what is left of a block waits for the next one. Batches are small: on the
-//! CPU the segments of a batch are evaluated while they lie in a thread's cache, and then forgotten. Arcs are
-//! computed in f32 with the operations of the arc kernel's twin, curves as [`crate::fit`] says.
+//! Tracks of a crowd have few keys, and a vector has up to 16 lanes. Therefore blocks are filled with intervals of
+//! several tracks, and the rest of a block waits for the next one. Batches are small: on the CPU the segments of a
+//! batch are evaluated while they are in a thread's cache, and then dropped. Arcs are computed in f32 with the
+//! operations of the arc kernel's twin, curves as described in [`crate::fit`].
 //!
 //! # Types
 //!
@@ -23,7 +23,7 @@
 //! | [`prepared::Prepared`] | what comes of a batch |
 //! | [`clip_data::ClipData`] | all that is prepared of a clip, and which parts a track has |
 //!
-//! # From a key to its stored curve
+//! # Steps
 //!
 //! ```text
 //! TrackSet ─► Batch ─► Preparation ─┬─ steps ──────────────────────────────► constants
@@ -33,13 +33,13 @@
 //!                                                                        └─► exact (f64)
 //! ```
 //!
-//! Each interval has a span at once, in order of time, and an empty segment; the block that is fitted later
-//! fills the segment. A curve that had to be cut has its span replaced by several at the end.
+//! Each interval immediately has a span, in order of time, and an empty segment; the block that is fitted later fills
+//! the segment. The span of a divided curve is replaced by several spans at the end.
 //!
 //! # Memory
 //!
-//! [`prepared::Prepared`] is lists and indices into them: a part is a range of spans, and a span (three lists of
-//! one length, which are searched in vectors) says where its value is.
+//! [`prepared::Prepared`] is lists and indices into them: a part is a range of spans, and a span (three lists of one
+//! length, which are searched in vectors) has the source of its value.
 //!
 //! ```text
 //! parts      track 0           track 1        track 2, first 4096 intervals …

@@ -1,5 +1,5 @@
-//! Cuts sets into batches (whole tracks, or some intervals of a long track) and prepares them as their
-//! method says: key intervals become segments.
+//! Division of sets into batches (whole tracks, or some intervals of a long track), and preparation of them by their
+//! method: key intervals become segments.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ pub(crate) struct Preparation {
     strategy: Strategy,
 }
 
-/// How intervals become segments: in blocks with intervals of several tracks, except for steps,
+/// The method of converting intervals to segments: in blocks with intervals of several tracks, except for steps,
 /// which have no segments.
 enum Strategy {
     Steps,
@@ -50,7 +50,7 @@ impl Preparation {
         }
     }
 
-    /// Refuses a set whose tracks cannot be interpolated so.
+    /// Refuses a set whose tracks cannot be interpolated as requested.
     pub(crate) fn check(
         interpolation: &Interpolation,
         set: &TrackSet,
@@ -61,7 +61,7 @@ impl Preparation {
         })
     }
 
-    /// Refuses keys of the `track`th track that cannot be interpolated so, wherever they lie.
+    /// Refuses keys of the track `track` that cannot be interpolated as requested.
     pub(crate) fn check_track(
         interpolation: &Interpolation,
         keys: &[Quat],
@@ -75,15 +75,14 @@ impl Preparation {
         }
     }
 
-    /// Whether an option chooses the path between keys. Steps have no path, and a method that fixes the path also
-    /// defines the curve between opposite keys.
+    /// Whether an option selects the path between keys. Steps have no path, and a method that prescribes the path
+    /// also defines the curve between opposite keys.
     fn has_path(interpolation: &Interpolation) -> bool {
         !interpolation.steps() && interpolation.method.signs.is_none()
     }
 
-    /// From now on intervals without a sample of this timeline may be left out, which is done if
-    /// the timeline has fewer samples than tracks have keys on average. The segments then serve no
-    /// other timeline.
+    /// Allows intervals without a sample of this timeline to be left out. This is done if the timeline has fewer
+    /// samples than tracks have keys on average. The segments can then be used for this timeline only.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
         if let Strategy::Smooth(smooth) = &mut self.strategy {
@@ -134,8 +133,8 @@ impl Preparation {
     }
 }
 
-/// Adds some intervals of the `index`th track of a set, whose keys are held until the next key, as a
-/// part of their own: every sample is a constant.
+/// Adds some intervals of the track `index` of a set as a separate part. Its keys are held until the next key: every
+/// sample is a constant.
 fn add_steps(
     prepared: &mut Prepared,
     set: &TrackSet,
@@ -173,8 +172,8 @@ pub(crate) enum Batch {
         track: usize,
         intervals: Range<usize>,
     },
-    /// The intervals of some tracks in which samples between two times lie, seconds, and some beside them: a time
-    /// within rounding of a key may lie on either side of it.
+    /// The intervals of some tracks that contain samples between two times, seconds, and some intervals next to them:
+    /// a time within rounding of a key may be on either side of it.
     Span {
         tracks: Range<usize>,
         from: f64,
@@ -182,8 +181,8 @@ pub(crate) enum Batch {
     },
 }
 
-/// The intervals between keys at these times in which samples between two times lie, and one more on either side.
-/// Before the first key and after the last that is the interval beside it.
+/// The intervals between keys at these times that contain samples between two times, and one more on each side.
+/// Before the first key and after the last one, the nearest interval is included.
 pub(crate) fn around(times: &[f64], from: f64, to: f64) -> Range<usize> {
     let all = times.len() - 1;
     let first = times.partition_point(|&time| time <= from);
@@ -214,8 +213,8 @@ impl Batch {
         })
     }
 
-    /// The samples that the batch gives: those from its first key up to its end, and those before a
-    /// track's first key or after its last. `steps` is whether keys are held until the next one.
+    /// The samples of the batch: those from its first key to its end, and those before a track's first key or after
+    /// its last. `steps` is whether keys are held until the next one.
     pub(crate) fn samples(&self, set: &TrackSet, timeline: &Timeline, steps: bool) -> Range<usize> {
         let Self::Intervals { track, intervals } = self else {
             return 0..timeline.len();
@@ -243,13 +242,13 @@ fn first_sample(time: f64, timeline: &Timeline, steps: bool) -> usize {
     (clock.first_frame(time) as usize).min(timeline.len())
 }
 
-/// How a set is cut into batches.
+/// The sizes of the batches of a set.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BatchSize {
-    /// The most keys and the most tracks of a batch; a track with more keys is a batch by itself.
+    /// The maximum number of keys and of tracks of a batch; a track with more keys is a separate batch.
     pub(crate) keys: usize,
     pub(crate) tracks: usize,
-    /// A track with more keys is cut after this many intervals; `None` if it may not be cut.
+    /// The number of intervals after which a track with more keys is divided; `None` if it must not be divided.
     pub(crate) cut: Option<usize>,
 }
 
@@ -309,8 +308,7 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
     all
 }
 
-/// What is evaluated of a set: some of its tracks, by a method, at the samples of a timeline, which is
-/// that of the whole set.
+/// A request for a set: some of its tracks, by a method, at the samples of a timeline of the whole set.
 #[derive(Clone)]
 pub(crate) struct SetRequest<'a> {
     pub(crate) set: &'a TrackSet,

@@ -23,7 +23,7 @@ use crate::twin::Evaluate as _;
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 pub(crate) struct Prepared {
     pub(crate) segments: Segments,
-    /// Rotations that are stored as they are: keys and end values.
+    /// Rotations that are stored without a curve: keys and end values.
     pub(crate) constants: Vec<[f32; 4]>,
     /// Curves that the host evaluates in f64: pieces that no polynomial fits, and the continuation
     /// of tracks outside their keys.
@@ -34,21 +34,20 @@ pub(crate) struct Prepared {
     pub(crate) wrap: Wrap,
 }
 
-/// Segments behind the last to which lanes without a curve write while others are fitted.
+/// Segments after the last one, which lanes without a curve write while others are fitted.
 pub(crate) const SPARE_SEGMENTS: usize = 2;
 
-/// What [`OutOfMemoryError`] calls it.
+/// The purpose in [`OutOfMemoryError`].
 pub(crate) const SEGMENTS: &str = "the segments of a set";
 
-/// Where a curve goes: its span, and the segment of that.
+/// The destination of a curve: its span, and the span's segment.
 #[derive(Debug, Clone, Copy, Zeroable)]
 pub(crate) struct CurveSlot {
     pub(crate) span: usize,
     pub(crate) segment: usize,
 }
 
-/// Segments that are zero, at most two for each lane of a block. They are copied, which is faster
-/// than clearing segments one by one.
+/// Zero segments, two for each lane of a block. They are copied, which is faster than clearing segments one by one.
 static ZEROS: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
     coefficients: [[0.0; 4]; 11],
 }; 2 * LANES];
@@ -68,8 +67,8 @@ impl Prepared {
         }
     }
 
-    /// Makes room for this many keys, so that the lists are not copied as they grow, and do not keep twice the
-    /// memory that they need.
+    /// Reserves memory for this number of keys, so that the lists are not copied as they grow, and do not use twice
+    /// the memory.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
         let refused = |_| OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
@@ -79,7 +78,7 @@ impl Prepared {
         self.spans.try_reserve(keys).map_err(refused)
     }
 
-    /// Forgets everything and keeps the memory.
+    /// Removes everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.segments.arcs.clear();
         self.segments.polynomials.clear();
@@ -89,7 +88,7 @@ impl Prepared {
         self.parts.clear();
     }
 
-    /// All groups in the first, whose lists get room for all at once; `None` of no groups.
+    /// Merges all groups into the first, with memory reserved for all at once; `None` if there are no groups.
     pub(crate) fn together(groups: Vec<Self>) -> Option<Self> {
         let total = |count: fn(&Self) -> usize| groups.iter().skip(1).map(count).sum();
         let [segments, constants, exact, spans, parts]: [usize; 5] = [
@@ -183,9 +182,9 @@ impl Prepared {
         self.wrap.copies(span, timeline, samples)
     }
 
-    /// Adds a part: these intervals of a track with keys at these times, the `index`th of its set,
-    /// with these spans. What is held before and after the keys are constants, used only where the
-    /// intervals reach the first or the last key.
+    /// Adds a part: these intervals of a track with keys at these times, the track `index` of its set, with these
+    /// spans. The values held before and after the keys are constants; they are used only if the intervals reach the
+    /// first or the last key.
     pub(crate) fn push_part(
         &mut self,
         index: usize,
@@ -212,7 +211,7 @@ impl Prepared {
         self.constants.len() as u32 - 1
     }
 
-    /// Adds a span with a segment of its own.
+    /// Adds a span with a new segment.
     #[inline]
     pub(crate) fn push_segment(
         &mut self,
@@ -226,7 +225,7 @@ impl Prepared {
         slot
     }
 
-    /// Where the next span with a segment of its own goes.
+    /// The slot of the next span with a new segment.
     pub(crate) fn next_slot(&self) -> CurveSlot {
         CurveSlot {
             span: self.spans.len(),
@@ -234,8 +233,7 @@ impl Prepared {
         }
     }
 
-    /// Adds spans that start at these times and with these keys, each with a segment of its own,
-    /// which is zero.
+    /// Adds spans with these starts and keys, each with a new segment of zeros.
     pub(crate) fn push_segments(&mut self, starts: &[f64], keys: &[u32]) {
         let segments = &mut self.segments.polynomials;
         let indices = segments.len()..segments.len() + starts.len();
@@ -252,7 +250,7 @@ impl Prepared {
         self.spans.keys.push(key);
     }
 
-    /// Replaces the spans of curves that were cut by those of their parts.
+    /// Replaces the spans of divided curves by those of their parts.
     pub(crate) fn replace_cut_spans(&mut self, cutter: &Cutter) {
         let mut cut = &cutter.subcurves[..];
         if cut.is_empty() {

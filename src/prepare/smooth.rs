@@ -1,5 +1,5 @@
-//! Prepares smooth curves: collects intervals of as many tracks as it takes to fill a block,
-//! computes their curves by the method's functions, and has them fitted.
+//! Preparation of smooth curves: fills a block with intervals of several tracks, computes their curves by the
+//! method's functions, and passes them on to be fitted.
 
 use std::ops::Range;
 
@@ -41,7 +41,7 @@ pub(crate) struct SmoothPreparation {
     intervals: Intervals,
     stretches: Vec<TrackStretch>,
     fitting: Fitting,
-    /// Prepares curves straight from keys in f32, if method and options allow it.
+    /// Prepares curves directly from keys in f32, if method and options allow it.
     fast: Option<Box<FastPreparation>>,
     /// Curves that are traversed at constant speed, until their whole track is there.
     waiting: Vec<PendingInterval>,
@@ -66,7 +66,7 @@ impl SmoothPreparation {
         }
     }
 
-    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    /// Adds some intervals of the track `index` of a set, as a separate part.
     pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,
@@ -162,8 +162,8 @@ impl SmoothPreparation {
         self.fitting.finish(prepared);
     }
 
-    /// Adds an interval of a track as context. Where the track ends it is the one on the `other`
-    /// side of a loop's seam, or an empty lane.
+    /// Adds an interval of a track as context. At an end of the track it is the interval at the `other` end of a
+    /// loop, or an empty lane.
     fn push_context(
         &mut self,
         track: Track,
@@ -212,7 +212,7 @@ impl SmoothPreparation {
         }
     }
 
-    /// Computes the curves of the intervals that wait, and has them fitted.
+    /// Computes the curves of the collected intervals, and passes them on to be fitted.
     fn flush(&mut self, prepared: &mut Prepared) {
         let is_exact = self.find_curves();
         let stretches = std::mem::take(&mut self.stretches);
@@ -255,7 +255,7 @@ impl SmoothPreparation {
         IntervalCurve::of_interval(&self.intervals, lane, shape, quantity)
     }
 
-    /// Lets the curves of a stretch wait until all of its track is there.
+    /// Collects the curves of a stretch until its whole track is complete.
     fn wait(&mut self, stretch: &TrackStretch) {
         for (i, lane) in stretch.lanes().enumerate() {
             let moves = !self.is_still(stretch, lane);
@@ -323,8 +323,8 @@ impl SmoothPreparation {
         spans.end = end;
     }
 
-    /// The axes of the angular velocities that are asked for, where curves are arcs: they are the same all along
-    /// an arc, and nothing is fitted.
+    /// The axes of requested angular velocities, if curves are arcs: the velocity is constant along an arc, so
+    /// nothing is fitted.
     fn axes_of_arc_velocities(&self) -> Option<Axes> {
         match (
             self.interpolation.method.curves,
@@ -366,8 +366,8 @@ impl SmoothPreparation {
         self.is_frozen() && stretch.track_intervals > 1 && at_end()
     }
 
-    /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in
-    /// its first and last interval stands still outside them too.
+    /// Whether tracks are extrapolated on a side with this wrap mode. A track that is constant in its first and last
+    /// interval is constant outside them too.
     fn extrapolates(&self, outside: WrapMode) -> bool {
         outside == WrapMode::Extrapolate && !self.is_frozen()
     }
@@ -377,10 +377,10 @@ impl SmoothPreparation {
         uses_ends && self.interpolation.ends == Ends::Frozen
     }
 
-    /// Adds what lies at a track's ends, where a stretch reaches them, and outside: the curves that
-    /// extrapolate the track at the angular velocity of its ends, where the wrap mode asks for it,
-    /// and the constants that are held there if the curve does not pass through its keys: its end
-    /// values for rotations, 0 for velocities and accelerations.
+    /// Adds the values at a track's ends, if a stretch reaches them, and outside: the curves that extrapolate the
+    /// track with the angular velocity of its ends, if the wrap mode requests it; and, if the curve does not pass
+    /// through its keys, the constants that are held there: its end values for rotations, 0 for velocities and
+    /// accelerations.
     fn add_ends(&self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let Interpolation { before, after, .. } = self.interpolation;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
@@ -423,8 +423,8 @@ impl SmoothPreparation {
     }
 }
 
-/// The curve that continues from `t` at the constant angular velocity that this one has there;
-/// its parameter is in seconds.
+/// The curve that continues from `t` with the constant angular velocity of this curve there; its parameter is in
+/// seconds.
 fn extended_from(curve: &IntervalCurve, t: f64) -> IntervalCurve {
     let rotation = curve.moving(Dual::parameter(t));
     let velocity = Quantity::Velocity(Axes::Body);

@@ -1,5 +1,5 @@
-//! Prepares translations and scales: a segment is a cubic in each component about the middle of its
-//! interval. It is a polynomial already, so nothing is fitted.
+//! Preparation of translations and scales: a segment is a cubic in each component about the middle of its interval.
+//! It is a polynomial already, so nothing is fitted.
 
 use std::borrow::Cow;
 
@@ -22,14 +22,14 @@ use crate::time::spans::SpanSource;
 use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::set::vectors::VectorTrack;
 
-/// Keys beside a sample on either side that its curve may depend on, and one for the rounding of times.
+/// The number of keys on each side of a sample on which its curve may depend, and one for the rounding of times.
 const BESIDE: usize = 3;
 
-/// With fewer keys for each sample, thinning a track takes no less time than preparing all of it.
+/// With fewer keys for each sample, thinning a track takes as long as preparing it.
 const KEYS_OF_A_SAMPLE: usize = 8;
 
-/// The track with the keys that the curves at some times depend on, and those at its ends: what it is between
-/// others is of no use. All of it where there are many samples, and where every key counts.
+/// The track with only the keys on which the curves at some times depend, and those at its ends. The whole track if
+/// there are many samples, or if every key has an influence.
 pub(crate) fn thinned<'t>(
     track: &'t VectorTrack,
     method: VectorMethod,

@@ -1,20 +1,20 @@
-//! Curves that depend on neighbouring keys: keys are put in where the curve is too far away, and those
-//! that can be missed are taken out again.
+//! Reduction for curves that depend on neighbouring keys: keys are inserted where the curve is too far from samples,
+//! and unnecessary keys are removed again.
 
 use std::ops::Range;
 
 use crate::reduce::ReductionTask;
 use crate::reduce::value::Value;
 
-/// A curve changes as far as this many keys from one that is put in or taken out.
+/// The number of keys on each side of an inserted or removed key up to which the curve changes.
 const REACH: usize = 2;
 
-/// The worst sample of each of some intervals between keys, and how far it is from the curve, as a part
-/// of the tolerance. The keys are all that the curve of these intervals depends on.
+/// The worst sample of each of some intervals between keys, and its distance from the curve as a fraction of the
+/// tolerance. The keys are all keys on which the curve of these intervals depends.
 pub(crate) type Worst<'a> = dyn Fn(&[usize], Range<usize>) -> Vec<(usize, f64)> + 'a;
 
-/// The indices of the keys of a curve that is near to all samples: the fewest of those that are found from
-/// the two ends, from all samples, and from the keys of `cubics`, whose intervals are cubics too.
+/// The indices of the keys of a curve that is near to all samples. Three starts are tried: only the two ends, all
+/// samples, and the keys of `cubics`, whose intervals are cubics too; the result with the fewest keys is returned.
 pub(crate) fn inserted(
     samples: usize,
     cubics: Vec<usize>,
@@ -27,8 +27,8 @@ pub(crate) fn inserted(
     thinned.min_by_key(Vec::len).unwrap_or_default()
 }
 
-/// Puts keys in until the curve is near: every interval whose curve is too far from a sample gets the
-/// worst one. It ends: at last every sample is a key.
+/// Inserts keys until the curve is near: every interval with a sample that is not near gets its worst sample as a
+/// key. This ends at the latest when every sample is a key.
 fn filled(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     loop {
         let worst = worst_of_each(&indices, 0..indices.len() - 1);
@@ -43,8 +43,8 @@ fn filled(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     }
 }
 
-/// Takes keys out while the curve stays near: of two neighbours one in each round, so that those that
-/// stay are spread evenly.
+/// Removes keys while the curve stays near. Each round removes at most one of two neighbours, so that the remaining
+/// keys are spread evenly.
 fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     loop {
         let before = indices.len();
@@ -62,7 +62,7 @@ fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     }
 }
 
-/// Whether the curve stays near all samples without a key.
+/// Whether the curve stays near to all samples without this key.
 fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
     // One key more on each side than the curve that changes: its tangents depend on those.
     let first = key.saturating_sub(REACH + 1);

@@ -1,5 +1,5 @@
-//! Curves whose intervals depend on their two keys alone: arcs and lines, and cubics with tangents of
-//! their own.
+//! Reduction for curves whose intervals depend only on their two keys: arcs and lines, and cubics with tangents for
+//! each interval.
 
 use glam::DVec4;
 
@@ -7,10 +7,9 @@ use crate::reduce::ReductionTask;
 use crate::reduce::value::Value;
 use crate::reference::segment::hermite;
 
-/// The indices of the keys of intervals that are as long as possible: the farthest sample from each key
-/// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down
-/// between the two, so that each sample is looked at about `log n` times. A neighbour is always
-/// reached: there is no sample in between.
+/// The indices of the keys of intervals that are as long as possible: from each key to the last sample that `fits`
+/// accepts. The length is doubled until `fits` fails, then found by bisection, so each sample is checked about `log
+/// n` times. A neighbouring sample always fits, because there are no samples between.
 pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let last = samples - 1;
     let mut indices = vec![0];
@@ -40,7 +39,7 @@ pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Ve
 }
 
 impl<T: Value> ReductionTask<'_, T> {
-    /// Whether all samples within an interval are near.
+    /// Whether all samples within an interval are near to the curve.
     pub(crate) fn fits(&self, from: usize, to: usize, is_cubic: bool) -> bool {
         let error = self.interval(from, to, is_cubic, self.tolerance);
         error.is_some()
@@ -72,7 +71,7 @@ impl<T: Value> ReductionTask<'_, T> {
         found
     }
 
-    /// The largest distance of the samples within an interval; `None` where it is over `limit`.
+    /// The largest distance of a sample within an interval; `None` if it exceeds `limit`.
     fn interval(&self, from: usize, to: usize, is_cubic: bool, limit: f64) -> Option<f64> {
         let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from], samples[to]);
@@ -116,8 +115,8 @@ impl<T: Value> ReductionTask<'_, T> {
         Some(error)
     }
 
-    /// Two estimates of the value half way between a sample and the next one: on the straight line, and on
-    /// the cubic through the four samples around (the parabola through three, at an end).
+    /// Two estimates of the value at the middle between a sample and the next one: on the straight line, and on the
+    /// cubic through the four nearest samples (at an end, the parabola through three).
     fn middle(&self, i: usize) -> [T; 2] {
         let samples = self.samples;
         let straight = samples[i].towards(samples[i + 1], 0.5);
@@ -133,11 +132,11 @@ impl<T: Value> ReductionTask<'_, T> {
         [straight, T::nearest(smooth)]
     }
 
-    /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their
-    /// numbers. The values half way between them count a little: with few samples those alone tell too
-    /// little.
+    /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their components. The
+    /// values at the middles between samples have small weights; without them, few samples would not determine the
+    /// tangents.
     fn tangents(&self, from: usize, to: usize) -> [DVec4; 2] {
-        /// As parts of the weight of a sample.
+        /// The weight relative to a sample's.
         const STRAIGHT: f64 = 1e-6;
         const MIDDLE: f64 = 1e-2;
         let (times, samples) = (self.times, self.samples);

@@ -1,14 +1,13 @@
-//! The opposite of evaluating: few keys whose curve stays near dense samples.
+//! Key reduction, the inverse of evaluation: few keys whose curve is near to dense samples.
 //!
-//! Keys are samples, so that they keep their values. [`ReducedCurve::Linear`] and
-//! [`ReducedCurve::GltfCubic`] have intervals that do not depend on each other: from each key the
-//! farthest sample is taken that an interval reaches within the tolerance. The curves of
-//! [`ReducedCurve::BesselOverhauser`] depend on neighbouring keys: keys are put in where the curve is
-//! farthest away, until it is near everywhere, and then each that can be missed is taken out.
+//! Keys are samples, with their values. [`ReducedCurve::Linear`] and [`ReducedCurve::GltfCubic`] have intervals that
+//! are independent of each other: each interval reaches from one key to the last sample for which it is within the
+//! tolerance. The curves of [`ReducedCurve::BesselOverhauser`] depend on neighbouring keys: keys are inserted where
+//! the curve is farthest from samples until it is near everywhere, and then unnecessary keys are removed.
 //!
-//! All is computed in f64. Every sample is looked at, and none is farther from the curve than the
-//! tolerance; cubics are looked at half way between samples too, so that they do not stray there; what an
-//! evaluation in f32 adds (about 3e-7 rad) is the caller's to leave room for.
+//! All computations are in f64. Every sample is checked, and none is farther from the curve than the tolerance.
+//! Cubics are also checked at the middles between samples. An evaluation in f32 adds about 3e-7 rad; the tolerance
+//! does not include this.
 
 mod inserted;
 mod intervals;
@@ -23,17 +22,17 @@ use crate::reduce::inserted::inserted;
 use crate::reduce::intervals::longest;
 use crate::reduce::value::Value;
 
-/// The curve that joins the keys that stay.
+/// The curve through the remaining keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum ReducedCurve {
-    /// The shorter arc ([`slerp`](crate::method::slerp::SLERP)), and straight lines.
+    /// Shorter arcs ([`slerp`](crate::method::slerp::SLERP)) for rotations, and straight lines for vectors.
     #[default]
     Linear,
     /// [`bessel-overhauser`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER), with
     /// [parabolic ends](crate::Ends::Parabolic).
     BesselOverhauser,
-    /// Hermite cubics whose tangents are found by least squares
+    /// Hermite cubics whose tangents are fitted by least squares
     /// ([`gltf-cubic`](crate::method::gltf_cubic::GLTF_CUBIC)).
     GltfCubic,
 }
@@ -45,19 +44,18 @@ names! {
     GltfCubic => "cubic",
 }
 
-/// The keys that stay.
+/// The remaining keys of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct ReducedKeys<T> {
-    /// Which samples are keys, increasing. A channel that stands still has one, every other the first
-    /// and the last sample at least.
+    /// The indices of the samples that are keys, increasing. A constant channel has one; every other channel has at
+    /// least the first and the last sample.
     pub indices: Vec<usize>,
-    /// Values of the keys: those of the samples; rotations with the sign that continues the one before.
+    /// The values of the keys: those of the samples. A rotation has the sign that is nearer to the previous one.
     pub keys: Vec<T>,
-    /// For [`ReducedCurve::GltfCubic`] the tangents with which the curve arrives at each key and leaves
-    /// it, per second; else nothing.
+    /// For [`ReducedCurve::GltfCubic`] the incoming and outgoing tangent of each key, per second; otherwise empty.
     pub tangents: Vec<[T; 2]>,
-    /// The largest distance of a sample from the curve: radians, or the samples' unit.
+    /// The largest distance of a sample from the curve, in radians or in the samples' unit.
     pub error: f64,
 }
 
@@ -65,7 +63,7 @@ pub struct ReducedKeys<T> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReduceError {
-    /// Every sample has a time.
+    /// The numbers of samples and of times differ.
     #[error("there are {samples} samples and {times} times; give a time for each sample")]
     Lengths {
         /// The number of samples.
@@ -73,21 +71,21 @@ pub enum ReduceError {
         /// The number of times.
         times: usize,
     },
-    /// Times are finite and increase.
+    /// A time is not finite, or not after the previous one.
     #[error("time {index} is {time} s; times must be finite and increase")]
     Time {
-        /// Its index, from 0.
+        /// The time's index, from 0.
         index: usize,
-        /// Seconds.
+        /// The time, seconds.
         time: f64,
     },
-    /// A sample is not finite, or a rotation of norm 0.
+    /// A sample is not finite, or is a rotation with norm 0.
     #[error("sample {index} is not finite")]
     Sample {
-        /// Its index, from 0.
+        /// The sample's index, from 0.
         index: usize,
     },
-    /// A tolerance is finite and at least 0.
+    /// A tolerance is negative or not finite.
     #[error("the tolerance is {tolerance}; give a finite number of 0 or more")]
     Tolerance {
         /// The tolerance.
@@ -95,7 +93,7 @@ pub enum ReduceError {
     },
 }
 
-/// The keys of a channel of rotations: every sample is within `tolerance` radians of their curve. Times
+/// Reduces a channel of rotations: every sample is within `tolerance` radians of the curve through the keys. Times
 /// are seconds.
 ///
 /// ```
@@ -109,7 +107,8 @@ pub enum ReduceError {
 /// ```
 ///
 /// # Errors
-/// A [`ReduceError`] that names the sample.
+/// When the numbers of times and samples differ, the times are not finite and increasing, a sample is not finite or
+/// has norm 0, or the tolerance is negative or not finite.
 pub fn reduce_rotations(
     times: &[f64],
     samples: &[DQuat],
@@ -122,10 +121,10 @@ pub fn reduce_rotations(
     Ok(found.rotations.pop().unwrap_or_default())
 }
 
-/// As [`reduce_rotations`], for translations or scales; the tolerance is a distance.
+/// Reduces a channel of translations or scales; as [`reduce_rotations`], but the tolerance is a distance.
 ///
 /// # Errors
-/// As there.
+/// As [`reduce_rotations`].
 pub fn reduce_vectors(
     times: &[f64],
     samples: &[DVec3],
@@ -137,11 +136,11 @@ pub fn reduce_vectors(
     Ok(found.vectors.pop().unwrap_or_default())
 }
 
-/// Keys of several channels at the same times: every sample of each is within its tolerance. For files
-/// in which all tracks have keys at the same times.
+/// Reduces several channels to keys at the same times: every sample of each channel is within the channel's
+/// tolerance. For files in which all tracks have the same key times.
 ///
 /// # Errors
-/// As of [`reduce_rotations`].
+/// As [`reduce_rotations`].
 pub fn reduce_together(
     times: &[f64],
     rotations: &[(Vec<DQuat>, f64)],
@@ -161,7 +160,7 @@ pub fn reduce_together(
     Ok(reduced(times.len(), &rotation_tasks, &vector_tasks, curve))
 }
 
-/// The keys of channels with so many samples each.
+/// The keys of channels with `samples` samples each.
 fn reduced(
     samples: usize,
     rotation_tasks: &[ReductionTask<'_, DQuat>],
@@ -218,17 +217,17 @@ fn reduced(
     }
 }
 
-/// The keys of several channels, all at the same samples.
+/// The keys of several channels at the same samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct ReducedTogether {
-    /// Of each channel of rotations.
+    /// The keys of each channel of rotations.
     pub rotations: Vec<ReducedKeys<DQuat>>,
-    /// Of each channel of vectors.
+    /// The keys of each channel of vectors.
     pub vectors: Vec<ReducedKeys<DVec3>>,
 }
 
-/// Unit quaternions, each with the sign that continues the one before it.
+/// Unit quaternions, each with the sign that is nearer to the previous one.
 fn continued(samples: &[DQuat]) -> Vec<DQuat> {
     let mut continuous: Vec<DQuat> = samples.to_vec();
     for i in 0..continuous.len() {
@@ -239,7 +238,7 @@ fn continued(samples: &[DQuat]) -> Vec<DQuat> {
     continuous
 }
 
-/// Samples that have been checked, and how near to them the curve has to be.
+/// Samples that have been checked, and the tolerance.
 pub(crate) struct ReductionTask<'a, T> {
     pub(crate) times: &'a [f64],
     pub(crate) samples: &'a [T],
@@ -273,7 +272,7 @@ impl<'a, T: Value> ReductionTask<'a, T> {
         })
     }
 
-    /// How far the samples are from the first one, if that is near to all.
+    /// The largest distance of a sample from the first one, if it is within the tolerance.
     fn constant_error(&self) -> Option<f64> {
         let first = *self.samples.first()?;
         let apart = self.samples.iter().map(|sample| sample.apart(first));

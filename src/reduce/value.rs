@@ -10,15 +10,15 @@ use crate::reference::vector::VectorCurve;
 
 /// A sample of a channel.
 pub(crate) trait Value: Copy + Default + PartialEq {
-    /// How far two are apart: the angle of the rotation between them, or their distance.
+    /// The distance of two values: the angle between rotations, or the distance of vectors.
     fn apart(self, other: Self) -> f64;
 
-    /// The interpolated value at a part of the distance to another.
+    /// The interpolated value at a fraction of the distance to another value.
     fn towards(self, other: Self, part: f64) -> Self;
 
     fn numbers(self) -> DVec4;
 
-    /// The value of these numbers, which need not be of a unit quaternion.
+    /// The value with these numbers; a rotation's need not be a unit quaternion.
     fn of_numbers(numbers: DVec4) -> Self;
 
     /// The value nearest to these numbers.

@@ -62,8 +62,7 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
     }
 }
 
-/// The step beyond an end, as long as the interval at that end, on the parabola through the three
-/// keys there.
+/// The step outside an end, on the parabola through the three keys there; it is as long as the interval at the end.
 fn parabola(track: &ReferenceTrack, end: usize, next: usize) -> DVec3 {
     let rate = |i: usize| logarithm(track.difference(i)) / track.step(i);
     let (h, next_h) = (track.step(end), track.step(next));
@@ -71,8 +70,7 @@ fn parabola(track: &ReferenceTrack, end: usize, next: usize) -> DVec3 {
     (rate(end) - second_difference * 2.0 * h) * h
 }
 
-/// Second derivatives of the basis functions at an end, from their slopes, which are
-/// parabolas.
+/// Second derivatives of the basis functions at an end, from their slopes, which are parabolas.
 fn bends(basis: Basis, t: f64) -> [f64; 3] {
     let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| basis.derivatives(t));
     std::array::from_fn(|j| {

@@ -1,6 +1,5 @@
-//! The spline with continuous angular acceleration: between keys a cubic in the
-//! rotation vector, its velocities at the keys found by Newton's iteration on accelerations that are
-//! taken of the curve itself.
+//! The spline with continuous angular acceleration. Between keys, the rotation vector is a cubic; the velocities at
+//! the keys are found by Newton's iteration on accelerations of the curve itself.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -20,7 +19,7 @@ pub(crate) const C2: Definition = Definition::new("c2", |track, ends| {
     })
 });
 
-/// Copies of a closed track are joined until there are so many keys on either side of it.
+/// The number of keys that the copies of a closed track must have on each side.
 const KEYS_AROUND: usize = 48;
 
 /// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
@@ -60,28 +59,28 @@ fn velocities(track: &ReferenceTrack, ends: Ends) -> Vec<DVec3> {
     solved[last * copies..=last * (copies + 1)].to_vec()
 }
 
-/// For every key three equations: the angular acceleration is the same on both sides of it. They are
-/// linear in the velocities of the neighbouring keys, and quadratic in the key's velocity.
+/// Three equations for every key: the angular acceleration is the same on both sides of it. They are linear in the
+/// velocities of the neighbouring keys, and quadratic in the key's velocity.
 ///
-/// The quadratic part, the bend, counts where it is not too strong ([`System::strength`]). The solution
-/// is the one that grows out of the linear equations' as the bends are brought in, which Newton's iteration
-/// follows in steps so small that it contracts to half with each iteration.
+/// The quadratic part, the bend, is used if it is not too strong ([`System::strength`]). The bends are increased from
+/// zero, where the equations are linear, to their full size, and Newton's iteration follows the solution in parts so
+/// small that each iteration halves its step.
 struct System<'a> {
     intervals: &'a [C2Interval],
-    /// The velocities at the keys where they are not free.
+    /// The velocities at the keys where they are fixed.
     set: Vec<Option<DVec3>>,
-    /// How the equations depend on the neighbours' velocities.
+    /// The derivatives of the equations by the neighbours' velocities.
     beside: Vec<[DMat3; 2]>,
 }
 
-/// The strongest bends that count at first; half as strong ones do where no solution is found, and so on.
+/// The strength up to which bends are used first; half as strong if no solution is found, and so on.
 const STRONGEST: f64 = 1024.0;
 const WEAKEST: f64 = 0.5;
-/// The longest step, radians, beside which equations are solved.
+/// The longest step, radians, next to which equations are solved.
 const LONGEST: f64 = 3.5;
-/// The smallest part by which bends are brought in.
+/// The smallest part by which the bends are increased.
 const LEAST_PART: f64 = 1.0 / 1024.0;
-/// Newton's steps for a part, and for all.
+/// The maximum numbers of Newton steps for one part, and in total.
 const STEPS_FOR_PART: usize = 32;
 const ALL_STEPS: usize = 1024;
 
@@ -128,8 +127,9 @@ impl<'a> System<'a> {
         system
     }
 
-    /// By how much the acceleration is larger before a key than behind it, as a change of its velocity;
-    /// for the velocities at the key before it, at it and behind it, and the part of the bend that counts.
+    /// The acceleration before a key minus the acceleration after it, as a change of its velocity. The arguments are
+    /// the velocities at the previous key, at this key and at the next key, and the fraction of the bend that is
+    /// used.
     fn excess(&self, key: usize, [before, velocity, behind]: [DVec3; 3], part: f64) -> DVec3 {
         if let Some(set) = self.set[key] {
             return velocity - set;
@@ -149,14 +149,14 @@ impl<'a> System<'a> {
         excess / stiffness
     }
 
-    /// The three velocities that the equations of a key have.
+    /// The three velocities in the equations of a key.
     fn around(velocities: &[DVec3], key: usize) -> [DVec3; 3] {
         let at = |key: usize| velocities.get(key).copied().unwrap_or_default();
         [at(key.wrapping_sub(1)), at(key), at(key + 1)]
     }
 
-    /// How strong the bend at a key is beside the rest of its equations: the angle of the interval before it,
-    /// times the rate of the rotation vector at its end in radians per interval, times the weight of the
+    /// The strength of the bend at a key relative to the rest of its equations: the angle of the interval before it,
+    /// times the rate of the rotation vector at the interval's end in radians per interval, times the weight of the
     /// interval.
     fn strength(&self, key: usize, velocities: &[DVec3]) -> f64 {
         if key == 0 || self.set[key].is_some() {
@@ -201,8 +201,8 @@ impl<'a> System<'a> {
         linear
     }
 
-    /// All bends at once, else a quarter of them, then twice as much more where that succeeds and half as much
-    /// where it fails.
+    /// Tries all bends at once, then a quarter of them; afterwards the part is doubled after a success and halved
+    /// after a failure.
     fn with_bends(
         &self,
         linear: &[DVec3],
@@ -225,7 +225,7 @@ impl<'a> System<'a> {
         None
     }
 
-    /// Newton's iteration, if each step is at most half as long as the one before it.
+    /// Newton's iteration; `None` if a step is more than half as long as the previous one.
     fn newton(
         &self,
         from: &[DVec3],
@@ -290,8 +290,8 @@ impl<'a> System<'a> {
             .then_some(next)
     }
 
-    /// How the equations depend on the key's velocity: of a quadratic function central differences
-    /// are the derivative.
+    /// The derivative of the equations by the key's velocity, by central differences, which are exact for quadratic
+    /// functions.
     fn slope_at(&self, key: usize, around: [DVec3; 3], bend: f64, size: f64) -> DMat3 {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
             let at = |sign: f64| {
@@ -304,8 +304,8 @@ impl<'a> System<'a> {
     }
 }
 
-/// A matrix with five diagonals below the main one and five above it, and room for what exchanging rows
-/// fills.
+/// A matrix with five diagonals below the main one and five above it, and room for the elements that exchanging rows
+/// creates.
 struct Band {
     rows: Vec<[f64; 16]>,
 }
@@ -325,7 +325,7 @@ impl Band {
         self.rows[row][column + 5 - row] = value;
     }
 
-    /// Gauss' elimination with exchange of rows; none where the matrix is singular.
+    /// Gaussian elimination with exchange of rows; `None` if the matrix is singular.
     fn solve(mut self, mut sides: Vec<f64>) -> Option<Vec<f64>> {
         let size = sides.len();
         for pivot in 0..size {
@@ -373,7 +373,7 @@ impl Band {
 struct C2Interval {
     /// Half of the rotation vector from its first key to its last.
     whole: DVec3,
-    /// From the angular velocity at the last key to that vector's rate of change.
+    /// The matrix from the angular velocity at the last key to that vector's rate of change.
     to_rate: DMat3,
     duration: f64,
 }
@@ -399,21 +399,21 @@ impl C2Interval {
         }
     }
 
-    /// Half of the derivative of the rotation vector at the interval's start and end, for the velocities there.
+    /// Half of the derivatives of the rotation vector at the interval's start and end, for the velocities there.
     fn slopes(&self, from: DVec3, to: DVec3) -> [DVec3; 2] {
         let half = self.duration / 2.0;
         [from * half, self.to_rate * (to * half)]
     }
 
-    /// The angular acceleration at the interval's start, where the rotation vector is 0 and its velocity
-    /// has no bend.
+    /// The angular acceleration at the interval's start, where the rotation vector is 0 and the velocity has no
+    /// quadratic term.
     fn acceleration_at_start(&self, from: DVec3, to: DVec3) -> DVec3 {
         let [start, end] = self.slopes(from, to);
         let second = 6.0 * self.whole - 4.0 * start - 2.0 * end;
         acceleration(DVec3::ZERO, DVec3::ZERO, second) / (self.duration * self.duration)
     }
 
-    /// The angular acceleration at the interval's end, with that part of the term quadratic in the
+    /// The angular acceleration at the interval's end, with the fraction `part` of the term that is quadratic in the
     /// velocity there.
     fn acceleration_at_end(&self, from: DVec3, to: DVec3, part: f64) -> DVec3 {
         let [start, end] = self.slopes(from, to);
@@ -429,7 +429,7 @@ struct RotationVectorCubic {
     powers: [DVec3; 3],
 }
 
-/// Twice `vec(e⁻¹ e'')` for the exponential `e` of half a rotation vector with these derivatives.
+/// Twice `vec(e⁻¹ e'')`, where `e` is the exponential of half a rotation vector with these derivatives.
 fn acceleration(v: DVec3, v1: DVec3, v2: DVec3) -> DVec3 {
     // e = [C; S v], with C and S functions of z = v·v.
     let (s, k, slope) = waves(v.dot(v));
@@ -441,7 +441,7 @@ fn acceleration(v: DVec3, v1: DVec3, v2: DVec3) -> DVec3 {
     2.0 * vector(multiply(invert(exponential(v)), second))
 }
 
-/// With `z = x²`: `S = sin(x)/x`, `k = (cos(x) - S)/z`, and the derivative of `k` by `z`.
+/// `S = sin(x)/x`, `k = (cos(x) - S)/z` and the derivative of `k` by `z`, with `z = x²`.
 fn waves(z: f64) -> (f64, f64, f64) {
     let x = z.sqrt();
     if x < 0.1 {
@@ -455,8 +455,7 @@ fn waves(z: f64) -> (f64, f64, f64) {
     (s, k, -(s + 3.0 * k) / (2.0 * z))
 }
 
-/// From the rate of change of half a rotation vector to half of the angular velocity in
-/// the body frame: a column for each axis.
+/// The matrix from the rate of change of half a rotation vector to half of the angular velocity in the body frame.
 fn rates(v: DVec3) -> DMat3 {
     let (s, k, _) = waves(v.dot(v));
     let column = |axis: DVec3| {

@@ -1,5 +1,4 @@
-//! The rotation, the angular velocity and the angular acceleration of one track at any
-//! time.
+//! The rotation, the angular velocity and the angular acceleration of one track at any time.
 
 use std::fmt;
 
@@ -12,7 +11,8 @@ use crate::reference::track::ReferenceTrack;
 use crate::tracks::set as tracks;
 use crate::tracks::set::key_data::Tcb;
 
-/// A method by the book: how the curve of a track follows from its keys. Every method has one, under its name.
+/// The textbook definition of a method: how the curve of a track is computed from its keys. There is one for every
+/// method.
 #[derive(Clone, Copy)]
 pub struct Definition {
     /// The name of the method.
@@ -28,7 +28,7 @@ impl fmt::Debug for Definition {
 }
 
 impl Definition {
-    /// The definition of the method of that name.
+    /// The definition of the method with this name.
     pub(crate) const fn new(
         method: &'static str,
         segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>,
@@ -37,18 +37,17 @@ impl Definition {
     }
 }
 
-/// One track's curve.
+/// The curve of one track.
 pub struct ReferenceCurve {
     track: ReferenceTrack,
     segments: Vec<Segment>,
-    /// Its arc lengths, if it is run through at constant speed.
+    /// The arc lengths of the curve, if it has constant speed.
     lengths: Option<CurveLengths>,
 }
 
 impl ReferenceCurve {
-    /// The curve through (or near) `keys` at `times` (seconds), which carry nothing
-    /// beside their rotations. Keys are taken as unit quaternions: normalised in f64. A
-    /// track that [`Ends::Loop`] closes must repeat its first key at its end.
+    /// Makes the curve through (or near) `keys` at `times` (seconds), for keys without additional data. Keys are
+    /// normalised in f64. With [`Ends::Loop`], the last key must equal the first.
     #[must_use]
     pub fn new(
         definition: Definition,
@@ -60,8 +59,8 @@ impl ReferenceCurve {
         Self::build(definition, ends, ReferenceTrack::new(signs, times, keys))
     }
 
-    /// The curve of a track with all the data of its keys. `tcb` applies to every key if the track
-    /// has no parameters for each key.
+    /// The curve of a track with all data of its keys. `tcb` applies to every key if the track has no values for each
+    /// key.
     pub(crate) fn of_track(
         definition: Definition,
         signs: KeySigns,
@@ -79,7 +78,7 @@ impl ReferenceCurve {
         Self::build(definition, ends, reference_track)
     }
 
-    /// The same curve, run through at one angular speed; a curve of held keys stays as it is.
+    /// The same curve with constant angular speed; a step curve does not change.
     pub(crate) fn at_constant_speed(mut self) -> Self {
         let lengths = CurveLengths::new(&self.segments);
         self.lengths = (lengths.total() > 0.0).then_some(lengths);
@@ -94,8 +93,7 @@ impl ReferenceCurve {
         }
     }
 
-    /// The rotation at a time in seconds; before the first key and after the last
-    /// the end values.
+    /// The rotation at a time, seconds. Before the first key and after the last it is the value there.
     #[must_use]
     pub fn rotation(&self, time: f64) -> DQuat {
         let last = self.track.last();
@@ -112,8 +110,8 @@ impl ReferenceCurve {
         self.segments[i].rotation(t)
     }
 
-    /// The angular velocity in the body frame, radians per second; zero outside the
-    /// keys. At a key it is that of the later segment.
+    /// The angular velocity in the body frame, radians per second; zero outside the keys. At a key it is that of the
+    /// later segment.
     #[must_use]
     pub fn velocity(&self, time: f64) -> DVec3 {
         let Some((i, t)) = self.inside(time) else {
@@ -131,8 +129,8 @@ impl ReferenceCurve {
         }
     }
 
-    /// The angular acceleration in the body frame, radians per second squared; zero
-    /// outside the keys. At a key it is that of the later segment.
+    /// The angular acceleration in the body frame, radians per second squared; zero outside the keys. At a key it is
+    /// that of the later segment.
     #[must_use]
     pub fn acceleration(&self, time: f64) -> DVec3 {
         let Some((i, t)) = self.inside(time) else {
@@ -152,14 +150,13 @@ impl ReferenceCurve {
         (bend - direction * bend.dot(direction)) * rate * rate
     }
 
-    /// The angular velocity at parameter `t` of segment `i`; both sides of a key
-    /// can be asked for.
+    /// The angular velocity at parameter `t` (0 to 1) of segment `i`; at a key, both sides can be evaluated.
     #[must_use]
     pub fn segment_velocity(&self, i: usize, t: f64) -> DVec3 {
         self.segments[i].velocity(t) / self.track.step(i)
     }
 
-    /// As [`ReferenceCurve::segment_velocity`], the angular acceleration.
+    /// The angular acceleration at parameter `t` of segment `i`, as [`ReferenceCurve::segment_velocity`].
     #[must_use]
     pub fn segment_acceleration(&self, i: usize, t: f64) -> DVec3 {
         let step = self.track.step(i);

@@ -1,8 +1,8 @@
-//! Arc lengths of a curve, by which it is run through at constant speed.
+//! Arc lengths of a curve, for constant speed.
 
 use crate::reference::segment::Segment;
 
-/// Panels of each segment; each is integrated by Gauss quadrature with three points.
+/// The number of panels of each segment; each is integrated by Gauss quadrature with three points.
 const PANELS: usize = 256;
 
 /// Lengths of curves, radians.
@@ -28,8 +28,7 @@ impl CurveLengths {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// The segment and its parameter at which the curve has covered a part, 0 to 1, of its
-    /// length.
+    /// The segment and its parameter at which the curve has covered a fraction, 0 to 1, of its length.
     pub(crate) fn locate(&self, segments: &[Segment], part: f64) -> (usize, f64) {
         let target = part * self.total();
         let panels = self.lengths.len() - 1;
@@ -57,7 +56,7 @@ pub(crate) fn gauss(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
     half * (5.0 * f(middle - half * node) + 8.0 * f(middle) + 5.0 * f(middle + half * node)) / 9.0
 }
 
-/// The end of the part of an interval in which `is_before` is true.
+/// The end of the subinterval in which `is_before` is true.
 pub(crate) fn bisected(mut low: f64, mut high: f64, is_before: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..60 {
         let middle = (low + high) / 2.0;

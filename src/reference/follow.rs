@@ -10,8 +10,8 @@ use crate::reference::quaternion::exponential;
 use crate::reference::segment::hermite;
 use crate::reference::vector::VectorCurve;
 
-/// Steps of an interval: the error of Runge and Kutta's method of fourth order is below 1e-11 where
-/// the direction turns by a few radians.
+/// The number of steps of an interval: the error of the Runge-Kutta method of fourth order is below 1e-11 if the
+/// direction rotates by a few radians.
 const STEPS: usize = 512;
 
 /// The direction in which a body on a path faces.
@@ -19,70 +19,69 @@ const STEPS: usize = 512;
 pub enum FollowerDirection {
     /// Along the path.
     Tangent,
-    /// To the point this far ahead along the path.
+    /// To the point at this distance ahead along the path.
     Ahead(f64),
     /// To a point.
     At(DVec3),
 }
 
-/// How the body is turned about its direction.
+/// The rotation of the body about its direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FollowerFrame {
-    /// It never turns about its direction.
+    /// The body does not rotate about its direction.
     Minimal,
-    /// Its y axis is as near to the upward direction as it can be.
+    /// Its y axis is as near to the upward direction as possible.
     Fixed,
-    /// Its y axis is opposite to the path's principal normal, or along it: whichever is nearer to
-    /// that of the moment before.
+    /// Its y axis is along the path's principal normal or opposite to it: opposite at the start, then continuous.
     Frenet,
 }
 
-/// When a body is where.
+/// The speed of a body on its path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FollowerSpeed {
-    /// As the keys say.
+    /// According to the key times.
     Keys,
-    /// At one speed.
+    /// Constant.
     Constant,
-    /// The speed grows from 0 over the first part of the time and falls to 0 over the last.
+    /// The speed increases from 0 over the first fraction of the time and decreases to 0 over the last fraction.
     Eased(f64, f64),
 }
 
-/// A body that follows a curve whose direction nowhere jumps within an interval.
+/// A body that follows a curve whose direction does not jump within an interval.
 #[derive(Debug, Clone)]
 pub struct Follower {
-    /// Its path.
+    /// The path.
     pub curve: VectorCurve,
     /// The direction in which it faces.
     pub heading: FollowerDirection,
-    /// Its roll about this direction.
+    /// The rotation about this direction.
     pub frame: FollowerFrame,
     /// The upward direction at the start.
     pub up: DVec3,
     /// Upward directions at keys; may be empty.
     pub ups: Vec<Option<DVec3>>,
-    /// Whether the path is closed, and the angle by which its frame is off after one round is spread over it.
+    /// Whether the path is closed, and the roll that its frame has gained after one round is removed evenly over it.
     pub spread: bool,
-    /// When it is where.
+    /// The speed on the path.
     pub travel: FollowerSpeed,
 }
 
-/// A follower with all that takes a walk along its path.
+/// A follower with precomputed data along its path.
 pub struct FollowerWalk<'a> {
     follower: &'a Follower,
     /// Position, velocity and second derivative on each interval.
     curves: Vec<Box<dyn Fn(f64) -> [DVec3; 3] + 'a>>,
-    /// The y axis of the frame that does not turn, and the length, at every step of every interval.
+    /// The y axis of the frame without roll, at every step of every interval.
     ups: Vec<DVec3>,
     lengths: Vec<f64>,
     /// Rolls to add, by length: (length, angle, slope).
     rolls: Vec<[f64; 3]>,
-    /// By how much the frame was off after one round, or at the last given up, radians.
+    /// The roll of the frame, radians: after one round, or relative to the last upward direction of a key.
     pub left_over: f64,
 }
 
 impl Follower {
-    /// Walks along the path.
+    /// Precomputes the data along the path.
     #[must_use]
     pub fn walk(&self) -> FollowerWalk<'_> {
         let intervals = self.curve.keys.len() - 1;
@@ -161,7 +160,8 @@ impl FollowerWalk<'_> {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// Position and rotation at a time: the rotation takes z forward and y up.
+    /// Position and rotation at a time, seconds. The rotation maps z to the forward direction and y to the upward
+    /// direction.
     #[must_use]
     pub fn pose(&self, time: f64) -> (DVec3, DQuat) {
         let (i, t) = self.locate(time);
@@ -197,7 +197,7 @@ impl FollowerWalk<'_> {
         self.locate_length(part * self.length())
     }
 
-    /// The interval and its parameter where a length is reached, by bisection.
+    /// The interval and its parameter at a length, by bisection.
     fn locate_length(&self, length: f64) -> (usize, f64) {
         let after = self.lengths.partition_point(|&end| end <= length);
         let step = (after - 1).min(self.lengths.len() - 2);
@@ -232,7 +232,7 @@ impl FollowerWalk<'_> {
         )
     }
 
-    /// The point and the tangent at a length; beyond an open path's end straight on.
+    /// The point and the tangent at a length. After the end of an open path, the path continues straight.
     fn at_length(&self, length: f64) -> (DVec3, DVec3) {
         let whole = self.length();
         let length = if self.follower.spread {
@@ -246,7 +246,7 @@ impl FollowerWalk<'_> {
         (point + tangent * (length - whole).max(0.0), tangent)
     }
 
-    /// Carries an axis across the direction along it: `y' = -(y·w') w`, by Runge and Kutta's method.
+    /// Transports an axis orthogonal to the direction along the path: `y' = -(y·w') w`, by the Runge-Kutta method.
     fn carried(&self, i: usize, from: f64, to: f64, up: DVec3) -> DVec3 {
         let h = to - from;
         let slope = |t: f64, up: DVec3| {
@@ -263,7 +263,7 @@ impl FollowerWalk<'_> {
         )
     }
 
-    /// Adds the roll that takes `up` to the requested direction, nearest to the roll before.
+    /// Adds the roll that rotates `up` to the requested direction, nearest to the previous roll.
     fn add_roll(
         &self,
         keys: &mut Vec<(f64, f64)>,
@@ -295,7 +295,7 @@ impl FollowerWalk<'_> {
         p * from + q * to + h * (m * out + n * incoming)
     }
 
-    /// `w × u` with `u = P' × P'' / |…|`, with the sign that continues that of the start.
+    /// `w × u` with `u = P' × P'' / |…|`, with the sign that continues the one at the start.
     fn frenet(&self, i: usize, t: f64) -> DVec3 {
         let raw = |i: usize, t: f64| {
             let [_, velocity, bend] = self.curves[i](t);
@@ -319,13 +319,14 @@ impl FollowerWalk<'_> {
     }
 }
 
-/// The step of an interval with a parameter, and where it starts.
+/// The step of an interval that contains a parameter, and the parameter at its start.
 fn step_at(t: f64) -> (usize, f64) {
     let step = ((t * STEPS as f64) as usize).min(STEPS - 1);
     (step, step as f64 / STEPS as f64)
 }
 
-/// Smoothstep speed up over the part `a` of the time, constant, and down over the part `b`.
+/// The fraction of the length at the fraction `x` of the time: the speed increases as smoothstep over the fraction
+/// `a` of the time, is constant, and decreases over the fraction `b`.
 #[must_use]
 pub fn eased(a: f64, b: f64, x: f64) -> f64 {
     let top = 2.0 / (2.0 - a - b);
@@ -342,7 +343,7 @@ pub fn eased(a: f64, b: f64, x: f64) -> f64 {
     }
 }
 
-/// The part of `up` across a direction, of unit length.
+/// The component of `up` orthogonal to a direction, normalised.
 fn across(up: DVec3, direction: DVec3) -> DVec3 {
     let part = up - direction * direction.dot(up);
     if part.length() > 1e-6 * up.length() {

@@ -1,5 +1,5 @@
-//! Cubic methods that say where the handles of a key are: the incoming and the outgoing one, with
-//! control rotations `q_i exp(-in)` and `q_i exp(out)`.
+//! Cubic methods that are defined by handles: each key has an incoming and an outgoing handle, with control rotations
+//! `q_i exp(-in)` and `q_i exp(out)`.
 
 use glam::{DQuat, DVec3};
 
@@ -25,25 +25,26 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     SHOEMAKE_1985,
 ];
 
-/// How one method finds the handles of its curves.
+/// The rule by which a method computes the handles of its curves.
 #[derive(Clone, Copy)]
 pub(crate) struct HandleRule {
-    /// The incoming and the outgoing handle of the key between two intervals.
+    /// The incoming and the outgoing handle of a key between two intervals.
     inner: fn(&Sides) -> (DVec3, DVec3),
-    /// The handle of an end of the track whose interval turns by `whole`, where `other` is the
-    /// handle at the other end of the interval.
+    /// The handle at an end of the track with the parabolic end condition. The interval there rotates by `whole`, and
+    /// `other` is the handle at its other end.
     parabolic: fn(whole: DVec3, other: DVec3) -> DVec3,
-    /// The same for ends without angular acceleration, where `rest` is the rotation of the interval
-    /// without the other handle.
+    /// The handle at an end without angular acceleration; `rest` is the rotation of the interval without the other
+    /// handle.
     natural: fn(rest: DVec3, other: DVec3) -> DVec3,
-    /// The same for an end whose velocity would rotate by `rate` in the interval, which rotates by `whole`.
+    /// The handle at an end with a specified velocity, which would rotate by `rate` in the interval that rotates by
+    /// `whole`.
     by_rate: fn(rate: DVec3, whole: DVec3) -> DVec3,
     /// The curve of an interval with an outgoing and an incoming handle.
     segment: fn(&ReferenceTrack, usize, DVec3, DVec3) -> Segment,
 }
 
 impl HandleRule {
-    /// Those of Bézier curves.
+    /// The rules of methods with Bézier curves.
     const fn bezier(inner: fn(&Sides) -> (DVec3, DVec3)) -> Self {
         Self {
             inner,
@@ -56,7 +57,7 @@ impl HandleRule {
         }
     }
 
-    /// Those of cumulative cubics.
+    /// The rules of methods with cumulative cubics.
     const fn cumulative(inner: fn(&Sides) -> (DVec3, DVec3)) -> Self {
         Self {
             segment: cumulative,
@@ -72,7 +73,7 @@ impl HandleRule {
         })
     }
 
-    /// The handles of an interval: outgoing from its first key, incoming to its second.
+    /// The handles of an interval: outgoing at its first key, incoming at its second.
     fn of_interval(&self, track: &ReferenceTrack, ends: Ends, i: usize) -> [DVec3; 2] {
         let last = track.last() - 1;
         let closed = ends == Ends::Loop;
@@ -106,7 +107,7 @@ impl HandleRule {
     }
 }
 
-/// A key between two intervals: the rotations of these, their logarithms and their times.
+/// A key between two intervals: the rotations of the intervals, their logarithms and their durations.
 pub(crate) struct Sides {
     key: DQuat,
     tcb: Tcb,
@@ -137,8 +138,8 @@ impl Sides {
     }
 }
 
-/// A definition whose curves follow from these [`HandleRule`]: a macro, because a function pointer cannot
-/// capture them.
+/// A definition whose curves follow from a [`HandleRule`]. This is a macro, because a function pointer cannot capture
+/// the rule.
 macro_rules! by_handles {
     ($method:literal, $handles:expr) => {
         Definition::new($method, |track, ends| $handles.segments(track, ends))
@@ -214,7 +215,7 @@ pub(crate) const SQUAD: Definition = by_handles!(
     }
 );
 
-/// Bézier curves, their control rotations the bisectors.
+/// Bézier curves whose control rotations are the bisectors.
 pub(crate) const SHOEMAKE: Definition = by_handles!(
     "shoemake",
     HandleRule {
@@ -232,7 +233,7 @@ pub(crate) const SHOEMAKE: Definition = by_handles!(
     }
 );
 
-/// Bézier curves, their control rotations half way to the bisectors.
+/// Bézier curves whose control rotations are half-way to the bisectors.
 pub(crate) const SHOEMAKE_2: Definition = by_handles!(
     "shoemake-2",
     HandleRule {
@@ -241,14 +242,13 @@ pub(crate) const SHOEMAKE_2: Definition = by_handles!(
     }
 );
 
-/// Bézier curves, their control rotations a third of the way to the bisectors.
+/// Bézier curves whose control rotations are at a third of the arcs to the bisectors.
 pub(crate) const SHOEMAKE_1985: Definition = by_handles!(
     "shoemake-1985",
     HandleRule::bezier(|sides| { shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0)) })
 );
 
-/// Handles whose outgoing control rotation `control_of` finds between the key and the bisector of its
-/// neighbours.
+/// Handles whose outgoing control rotation `control_of` computes from the key and the bisector of its neighbours.
 fn shoemake(sides: &Sides, control_of: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3, DVec3) {
     let q = sides.key;
     let (p, next) = (multiply(q, invert(sides.before)), multiply(q, sides.after));
@@ -275,7 +275,7 @@ fn controls(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> [D
     ]
 }
 
-/// `2 (p·q) q - p`: as far beyond `q` as `p` is before it (Shoemake 1985).
+/// `2 (p·q) q - p`, such that `q` is half-way from `p` to it (Shoemake 1985).
 fn double(p: DQuat, q: DQuat) -> DQuat {
     q * (2.0 * inner(p, q)) - p
 }
@@ -290,7 +290,7 @@ fn bisect(p: DQuat, q: DQuat, or: DQuat) -> DQuat {
     }
 }
 
-/// The logarithm of `q` nearest to `target` among all of its branches.
+/// The logarithm of `q`, of all its branches, that is nearest to `target`.
 fn nearest_branch(q: DQuat, target: DVec3) -> DVec3 {
     let principal = logarithm_or(q, target);
     let axis = match principal.length() {

@@ -1,28 +1,25 @@
-//! The textbook in f64, against which the engine's results are measured.
+//! Textbook formulas in f64, with which the engine's results are compared.
 //!
-//! **Why it is so.** An oracle must not share a mistake with the code that it checks. So nothing here
-//! uses the engine, but for the keys as they come in (`tracks`) and the options of curves
-//! (`curve::options`): no vector lanes, no fitted polynomials, no code of `math`. Formulas stand as the
-//! papers have them, one rotation at a time, with `libm`'s sine and cosine. Slow, and accurate to about
-//! 1e-15.
+//! **Independence.** The reference must not share a mistake with the code that it checks. Therefore it uses no code
+//! of the engine except for the input keys (`tracks`) and the options of curves (`curve::options`): no vector lanes,
+//! no fitted polynomials, no code of `math`. Formulas are written as in the papers, one rotation at a time, with
+//! `libm`'s sine and cosine. The reference is slow, and accurate to about 1e-15.
 //!
-//! **The way of the data.**
+//! **Structure.**
 //!
-//! 1. `ReferenceTrack`: a track's keys in f64, their signs aligned.
-//! 2. [`Definition`]: how a method's curves follow from a track, one a method, found by the method's
-//!    name. Most are a `HandleRule`: two control rotations a key. Those that need only two keys are in
-//!    `two_keys`, those with other equations in `b_spline` and `c2`.
-//! 3. `Segment`: the curve between two keys, as a formula: one of the few that several methods share, or
-//!    any function of four quaternions, which stands beside its definition. Its velocity is the formula's
-//!    where that is simple, else a difference of high order; its acceleration always is a difference.
-//! 4. [`ReferenceCurve`]: one track's segments, evaluated at any time, at constant speed by
-//!    `CurveLengths`.
+//! 1. `ReferenceTrack`: a track's keys in f64, with aligned signs.
+//! 2. [`Definition`]: how a method computes the curves of a track. There is one for each method, which is found by
+//!    the method's name. Many are a `HandleRule`: two control rotations for each key. Methods that need only two keys
+//!    are in `two_keys`, methods with other equations in `b_spline` and `c2`.
+//! 3. `Segment`: the curve between two keys as a formula: one of a few that several methods share, or any function of
+//!    four quaternions, which is next to its definition. Its velocity is the formula's if that is simple, otherwise a
+//!    difference of high order; its acceleration is always a difference.
+//! 4. [`ReferenceCurve`]: one track's segments, evaluated at any time; at constant speed by `CurveLengths`.
 //!
-//! [`VectorCurve`] does the same for translations and scales in one file, and [`Follower`] moves a body
-//! along such a curve; its frame is integrated by Runge and Kutta's method.
+//! [`VectorCurve`] has the curves of translations and scales. [`Follower`] moves a body along such a curve; its frame
+//! is integrated by the Runge-Kutta method.
 //!
-//! Callers are `verify`, `tumble plot`, the reduction of keys, which tries curves
-//! as they are defined, and the tests.
+//! The reference is used by `verify`, by `tumble plot`, by the reduction of keys, and by tests.
 
 pub(crate) mod b_spline;
 pub(crate) mod c2;
@@ -53,7 +50,7 @@ const DEFINITIONS: &[&[Definition]] = &[
     &[b_spline::B_SPLINE, c2::C2],
 ];
 
-/// The definition of the method of that name.
+/// The definition of the method with this name.
 pub(crate) const fn definition(method: &str) -> Option<Definition> {
     let mut i = 0;
     while i < DEFINITIONS.len() {
@@ -70,7 +67,7 @@ pub(crate) const fn definition(method: &str) -> Option<Definition> {
     None
 }
 
-/// Whether two names are the same; `==` is not there yet when constants are computed.
+/// Whether two names are the same; `==` cannot be used in constants.
 const fn is_same(a: &[u8], b: &[u8]) -> bool {
     let mut i = 0;
     while i < a.len() && i < b.len() && a[i] == b[i] {

@@ -1,4 +1,4 @@
-//! Quaternion algebra as in the books: `q = [w; v]`, Hamilton's product.
+//! Quaternion algebra as in textbooks: `q = [w; v]`, Hamilton's product.
 
 use glam::{DQuat, DVec3};
 
@@ -43,8 +43,8 @@ pub(crate) fn exponential(a: DVec3) -> DQuat {
     }
 }
 
-/// `log q = v/|v| atan2(|v|, w)`: half of the rotation vector, length 0 to pi. At
-/// -1 it has no direction, and takes that of `or`.
+/// `log q = v/|v| atan2(|v|, w)`: half of the rotation vector, with a length from 0 to pi. At -1 the direction is
+/// undefined, and that of `or` is used.
 pub(crate) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
     let v = vector(q);
     let sine = v.length();
@@ -57,7 +57,7 @@ pub(crate) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
     }
 }
 
-/// As [`logarithm_or`], without a direction at -1.
+/// As [`logarithm_or`], with an undefined direction at -1.
 pub(crate) fn logarithm(q: DQuat) -> DVec3 {
     logarithm_or(q, DVec3::ZERO)
 }
@@ -67,8 +67,8 @@ pub(crate) fn power(q: DQuat, s: f64) -> DQuat {
     exponential(logarithm(q) * s)
 }
 
-/// Slerp, geometric: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`, `cos θ = a·b`
-/// (Shoemake 1985). The arc that the signs give; no shortest-path flip.
+/// Slerp, geometric formula: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b`, `cos θ = a·b` (Shoemake 1985). The signs define
+/// the arc; no sign is changed.
 #[must_use]
 pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     let chord = |q: DQuat| inner(q, q).sqrt();
@@ -106,22 +106,20 @@ pub fn slerp_from_end_left(a: DQuat, b: DQuat, t: f64) -> DQuat {
     multiply(power(multiply(a, invert(b)), 1.0 - t), b)
 }
 
-/// Spherical quadrangle: `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))` (Shoemake
-/// 1987); no shortest-path flip.
+/// Spherical quadrangle: `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))` (Shoemake 1987). No sign is changed.
 #[must_use]
 pub fn squad([q0, s0, s1, q1]: [DQuat; 4], t: f64) -> DQuat {
     slerp(slerp(q0, q1, t), slerp(s0, s1, t), 2.0 * t * (1.0 - t))
 }
 
-/// Normalised linear interpolation; no shortest-path flip.
+/// Normalised linear interpolation. No sign is changed.
 #[must_use]
 pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     normalise(a * (1.0 - t) + b * t)
 }
 
-/// The angle in radians (0 to pi) of the rotation between two rotations, accurate
-/// also when it is tiny. Neither needs to be exactly unit; `q` and `-q` are the
-/// same.
+/// The angle in radians (0 to pi) between two rotations, accurate for very small angles too. The norms may differ
+/// from 1; `q` and `-q` are the same rotation.
 #[must_use]
 pub fn angle_between(a: DQuat, b: DQuat) -> f64 {
     let (a, b) = (normalise(a), normalise(b));

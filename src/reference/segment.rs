@@ -1,4 +1,4 @@
-//! The curve between two keys, as the papers write it.
+//! The curve between two keys, as in the papers.
 
 use glam::{DQuat, DVec3};
 
@@ -8,7 +8,7 @@ use crate::reference::quaternion::{
 };
 use crate::reference::track::ReferenceTrack;
 
-/// A curve over `t` from 0 to 1.
+/// A curve for `t` from 0 to 1.
 #[derive(Clone, Copy)]
 pub(crate) enum Segment {
     Constant(DQuat),
@@ -19,7 +19,7 @@ pub(crate) enum Segment {
         w: [DVec3; 3],
         basis: Basis,
     },
-    /// Any formula of up to four quaternions, as of the two keys and two control rotations. Its velocity is a
+    /// Any formula of up to four quaternions, for example the two keys and two control rotations. Its velocity is a
     /// difference.
     Between(fn([DQuat; 4], f64) -> DQuat, [DQuat; 4]),
     /// `base exp(a t + b t² + c t³)`.
@@ -33,8 +33,7 @@ pub(crate) enum Segment {
 #[derive(Clone, Copy)]
 pub(crate) enum Basis {
     Bernstein,
-    /// Cubic B-spline with these knots; the interval lies between the third and the
-    /// fourth.
+    /// Cubic B-spline with these knots; the interval is between the third and the fourth.
     Knots([f64; 6]),
 }
 
@@ -71,8 +70,8 @@ impl Basis {
     }
 }
 
-/// The `degree + 1` basis functions that are not zero between `knots[2]` and `knots[3]`, by the
-/// recursion of Cox and de Boor. For a degree below 3 they are the last of the four numbers.
+/// The `degree + 1` basis functions that are not zero between `knots[2]` and `knots[3]`, by the recursion of Cox and
+/// de Boor. For a degree below 3 they are the last of the four numbers.
 fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
     let mut n = [0.0, 0.0, 0.0, 1.0];
     for k in 1..=degree {
@@ -92,8 +91,8 @@ fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
     n
 }
 
-/// The six knots about interval `i`. Beyond the ends they go on in steps of the outermost interval
-/// or, for a loop, across the seam.
+/// The six knots around interval `i`. Outside the ends they continue with the length of the outermost interval or,
+/// for a loop, with the intervals at the other end.
 pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
     let count = times.len() as isize - 1;
     let step = |j: isize| {
@@ -111,8 +110,7 @@ pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
     knots
 }
 
-/// The weights of the two values and the two tangents of a cubic at a parameter, in the order value,
-/// tangent, value, tangent.
+/// The weights of the values and tangents of a cubic at a parameter, in the order value, tangent, value, tangent.
 pub(crate) fn hermite(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [

@@ -6,7 +6,7 @@ use crate::curve::options::KeySigns;
 use crate::reference::quaternion::{inner, invert, multiply, normalise};
 use crate::tracks::set::key_data::Tcb;
 
-/// The sign of a dot product of smaller magnitude may be due to the rounding of f32 keys.
+/// The largest magnitude of a dot product whose sign may be due to the rounding of f32 keys.
 const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
 
 /// One track in f64.
@@ -50,8 +50,8 @@ impl ReferenceTrack {
         self.times[i + 1] - self.times[i]
     }
 
-    /// The difference and the time step of the interval before key `i` or, if not `before`, after
-    /// it; at its ends a closed track continues across the seam.
+    /// The difference and the time step of the interval before key `i` or, if not `before`, after it. At the ends of
+    /// a closed track it is the interval at the other end.
     pub(crate) fn side(&self, i: usize, before: bool) -> (DQuat, f64) {
         let interval = match (i, before) {
             (0, true) => self.last() - 1,

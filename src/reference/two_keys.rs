@@ -1,4 +1,4 @@
-//! Curves that follow from two keys alone, with their tangents and velocities.
+//! Curves that depend only on two keys, with their tangents and velocities.
 
 use glam::DQuat;
 
@@ -11,7 +11,7 @@ use crate::reference::track::ReferenceTrack;
 /// The definitions of this file.
 pub(super) const DEFINITIONS: &[Definition] = &[STEP, NLERP, SLERP, HERMITE, GLTF_CUBIC];
 
-/// Steps: the key before.
+/// Steps: the previous key.
 pub(crate) const STEP: Definition = Definition::new("step", |track, _| {
     each(track, |i| Segment::Constant(track.keys[i]))
 });
@@ -60,8 +60,8 @@ pub(crate) const GLTF_CUBIC: Definition = Definition::new("gltf-cubic", |track, 
     })
 });
 
-/// Hermite's cubic in each component, of keys and tangents `p0 m0 m1 p1`, normalised (glTF 2.0, appendix
-/// C.5); the tangents are multiplied by the interval's length.
+/// Hermite's cubic in each component, from keys and tangents `p0 m0 m1 p1`, normalised (glTF 2.0, appendix C.5). The
+/// tangents are multiplied by the interval's length.
 fn cubic([p0, m0, m1, p1]: [DQuat; 4], t: f64) -> DQuat {
     let [from, out, to, incoming] = hermite(t);
     normalise(p0 * from + m0 * out + p1 * to + m1 * incoming)
@@ -72,7 +72,7 @@ pub(crate) fn each(track: &ReferenceTrack, curve: impl Fn(usize) -> Segment) -> 
     (0..track.last()).map(curve).collect()
 }
 
-/// The curves of all intervals, where [`Ends::Frozen`] makes the first and the last constant.
+/// The curves of all intervals; with [`Ends::Frozen`] the first and the last are constant.
 pub(crate) fn with_frozen_ends(
     track: &ReferenceTrack,
     ends: Ends,
@@ -87,7 +87,7 @@ pub(crate) fn with_frozen_ends(
     })
 }
 
-/// As [`with_frozen_ends`]; two keys that are alone are joined by an arc.
+/// As [`with_frozen_ends`]; a track of only two keys is an arc.
 pub(crate) fn smooth(
     track: &ReferenceTrack,
     ends: Ends,

@@ -1,28 +1,27 @@
-//! Curves of vectors between keys: Hermite cubics and B-splines, as in the books.
+//! Curves of vectors between keys: Hermite cubics and B-splines, as in textbooks.
 
 use glam::DVec3;
 
 use crate::curve::options::Ends;
 use crate::reference::segment::{hermite, knots};
 
-/// Keys of a vector in f64, and which textbook curve joins them.
+/// Keys of a vector in f64, and the method of the textbook curve through them.
 #[derive(Debug, Clone)]
 pub struct VectorCurve {
     /// `step`, `linear`, `catmull-rom`, `bessel-overhauser`, `gltf-cubic`, `c2` or `b-spline`.
     pub method: &'static str,
     /// The curve at the ends; clamped ends are at rest.
     pub ends: Ends,
-    /// Seconds.
+    /// The key times, seconds.
     pub times: Vec<f64>,
     /// A vector for each time.
     pub keys: Vec<DVec3>,
-    /// Tangents with which the curve arrives at each key and leaves it, units per second; 0 for a
-    /// key that has none.
+    /// The incoming and outgoing tangent of each key, units per second; 0 for a key that has none.
     pub tangents: Vec<[DVec3; 2]>,
 }
 
 impl VectorCurve {
-    /// The vector at a time; before the first key and after the last the end values.
+    /// The vector at a time, seconds. Before the first key and after the last it is the value there.
     #[must_use]
     pub fn value(&self, time: f64) -> DVec3 {
         let last = self.keys.len() - 1;
@@ -43,25 +42,24 @@ impl VectorCurve {
         self.interval(i)((time - self.times[i]) / self.step(i))[0]
     }
 
-    /// Seconds from key `i` to the next.
+    /// The time from key `i` to the next, seconds.
     fn step(&self, i: usize) -> f64 {
         self.times[i + 1] - self.times[i]
     }
 
-    /// From key `i` to the next.
+    /// The difference from key `i` to the next.
     fn rise(&self, i: usize) -> DVec3 {
         self.keys[i + 1] - self.keys[i]
     }
 
-    /// Whether an interval is held at its first key.
+    /// Whether an interval has the constant value of its first key.
     fn is_frozen(&self, i: usize) -> bool {
         let last = self.keys.len() - 1;
         let has_ends = !matches!(self.method, "step" | "linear" | "gltf-cubic");
         has_ends && self.ends == Ends::Frozen && last > 1 && (i == 0 || i + 1 == last)
     }
 
-    /// The curve of interval `i`: its value and its first and second derivative at a parameter from
-    /// 0 to 1, per unit of the parameter.
+    /// The curve of interval `i`: its value and its first and second derivative by a parameter from 0 to 1.
     pub(crate) fn interval(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
         let last = self.keys.len() - 1;
         let (p0, p1, h) = (self.keys[i], self.keys[i + 1], self.step(i));
@@ -97,8 +95,8 @@ impl VectorCurve {
         })
     }
 
-    /// The slopes at all keys, per second, such that the second derivative is continuous: a full
-    /// system of equations, solved by Gauss' elimination with pivots.
+    /// The slopes at all keys, per second, with which the second derivative is continuous: a full system of
+    /// equations, solved by Gaussian elimination with pivoting.
     fn c2_slopes(&self) -> Vec<DVec3> {
         let keys = self.keys.len();
         let last = keys - 1;
@@ -152,9 +150,8 @@ impl VectorCurve {
         rows.iter().enumerate().map(solved).collect()
     }
 
-    /// Interval `i` of the cubic B-spline whose control points are the keys, by the recursion of
-    /// Cox and de Boor, with one more control point beyond each end. It is not called for frozen
-    /// ends, nor for two keys.
+    /// Interval `i` of the cubic B-spline whose control points are the keys, by the recursion of Cox and de Boor,
+    /// with one more control point outside each end. It is not called for frozen ends, or for two keys.
     fn b_spline(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
         let count = self.keys.len() - 1;
         // The knots from three before the interval to two after its end, in its parameter.

@@ -1,5 +1,5 @@
-//! What the shaders and Rust share, as the compiler of the shaders wrote it into `shaders/compiled`:
-//! constants, the structs that buffers hold, and the kernels by name, as SPIR-V.
+//! Constants, buffer structs and kernels (as SPIR-V, by name) that the shaders share with Rust, as the shader
+//! compiler wrote them into `shaders/compiled`.
 
 // The compiler of the shaders (`shader-compiler/`) has its own copy of the pass, and uses more of it.
 #[allow(dead_code, unreachable_pub)]
@@ -16,10 +16,10 @@ mod generated {
 
 pub(crate) use generated::*;
 
-/// Coefficients of a [`PolynomialSegment`]: those of 1, s, … s¹⁰.
+/// The number of coefficients of a [`PolynomialSegment`]: those of 1, s, … s¹⁰.
 pub(crate) const POWERS: usize = 11;
 
-/// What a kernel evaluates. Many methods share one form.
+/// The form of the curve that a kernel evaluates. Many methods share one form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
     /// A great circle at constant angular velocity.
@@ -28,34 +28,34 @@ pub enum Form {
     Polynomial,
 }
 
-/// Bytes that lie where words may lie.
+/// Bytes with the alignment of words.
 #[repr(C, align(4))]
 struct Aligned<Bytes: ?Sized>(Bytes);
 
-/// The SPIR-V of all kernels, one behind the other, words with the least significant byte first.
+/// The SPIR-V of all kernels, one after another, as little-endian words.
 static SPIRV: &Aligned<[u8]> = &Aligned(*include_bytes!("../../shaders/compiled/kernels.spv"));
 
-/// A kernel as it was compiled: names, with how many words of [`SPIRV`] are theirs.
+/// A compiled kernel: the name of each variant, and its number of words in [`SPIRV`].
 pub(crate) struct KernelCode {
     pub(crate) kernel: Kernel,
     /// The code that reads storage buffers.
     storage: (&'static str, usize),
-    /// The code that reads texel buffers: all bindings but the last.
+    /// The variant that reads texel buffers, for all bindings but the last.
     texels: Option<(&'static str, usize)>,
-    /// How many buffers it binds.
+    /// The number of buffers that it binds.
     pub(crate) bindings: u32,
-    /// What it evaluates, how its work is listed and what it stores, if it evaluates segments.
+    /// For kernels that evaluate segments: the form, the kind of work list, and the stored encoding.
     pub(crate) segments: Option<(Form, List, Store)>,
 }
 
 impl Kernel {
-    /// As it was compiled.
+    /// The compiled kernel.
     pub(crate) fn compiled(self) -> &'static KernelCode {
         &KERNELS[self as usize]
     }
 
-    /// Its name, its code, and whether that reads texel buffers: it does if asked to and if the
-    /// kernel has such code.
+    /// The name, the code, and whether the code reads texel buffers: it does if this is requested and the kernel has
+    /// such a variant.
     pub(crate) fn code(self, reads_texels: bool) -> (&'static str, &'static [u32], bool) {
         let variants = self.compiled();
         let (name, reads_texels) = match variants.texels {
@@ -70,8 +70,8 @@ impl Kernel {
     }
 }
 
-/// Every kernel that a Vulkan device may be given: its name and its SPIR-V, words with the
-/// least significant byte first, before the float controls that depend on the device.
+/// Every kernel that may run on a Vulkan device: its name and its SPIR-V, as little-endian words, without the float
+/// controls that are added for the device.
 pub fn kernels() -> impl Iterator<Item = (&'static str, &'static [u8])> {
     let all = KERNELS.iter();
     let all = all.flat_map(|kernel| [Some(kernel.storage), kernel.texels]);

@@ -1,10 +1,10 @@
-//! Modules of SPIR-V as words: reads their instructions, adds the float controls that a device
-//! reports, and undoes the exactness pass of the shaders' compiler.
+//! SPIR-V modules as words: parsing of instructions, adding of the float controls that a device reports, and removal
+//! of the decorations that the shader compiler's exactness pass added.
 
 const MAGIC: u32 = 0x0723_0203;
 pub(crate) const HEADER_WORDS: usize = 5;
 
-/// The opcodes of the instructions that are looked at.
+/// The opcodes of the instructions that are examined.
 pub(crate) mod op {
     pub(crate) const EXTENSION: u16 = 10;
     pub(crate) const ENTRY_POINT: u16 = 15;
@@ -19,21 +19,21 @@ pub(crate) const NO_CONTRACTION: u32 = 42;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpirvError {
-    /// Too short, or not starting with the magic number.
+    /// The module is too short, or does not start with the magic number.
     #[error("not a SPIR-V module")]
     NotSpirv,
-    /// An instruction runs past the end of the module, or has no length.
+    /// An instruction extends past the end of the module, or has no length.
     #[error("instruction at word {word} is cut short")]
     Truncated {
         /// Offset of the instruction in words.
         word: usize,
     },
-    /// The module lacks what additions need: types, a memory model or an entry point.
+    /// The module lacks the parts next to which modes are added: types, a memory model or an entry point.
     #[error("the module has no memory model or entry point, or not the types that it uses")]
     Incomplete,
 }
 
-/// One instruction: where it starts, its opcode and its words.
+/// One instruction: its offset, its opcode and its words.
 pub(crate) struct Instruction<'a> {
     pub(crate) start: usize,
     pub(crate) opcode: u16,
@@ -46,7 +46,7 @@ impl Instruction<'_> {
         word.ok_or(SpirvError::Truncated { word: self.start })
     }
 
-    /// The id that it says must not be contracted, if it is such a decoration.
+    /// The id that the instruction decorates as `NoContraction`, if it is such a decoration.
     pub(crate) fn decorated(&self) -> Option<u32> {
         match (self.opcode, self.words) {
             (op::DECORATE, &[_, id, NO_CONTRACTION]) => Some(id),
@@ -90,10 +90,10 @@ pub struct FloatControls {
     pub round_to_nearest_even: bool,
 }
 
-/// Adds the execution modes that the device offers to every entry point.
+/// Adds the execution modes that the device supports to every entry point.
 ///
 /// # Errors
-/// A [`SpirvError`] for words that are no complete module.
+/// When the words are not a complete module.
 pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>, SpirvError> {
     // (capability, execution mode), SPIR-V 1.4; by extension before that.
     let modes: Vec<(u32, u32)> = [
@@ -162,11 +162,11 @@ fn string_words(text: &str) -> Vec<u32> {
         .collect()
 }
 
-/// The module without its `NoContraction` decorations: what a driver gets to see
-/// when the pass is left out. Tests use it to prove that the pass matters.
+/// The module without its `NoContraction` decorations: what a driver would compile without the exactness pass. Tests
+/// use it to show that the pass has an effect.
 ///
 /// # Errors
-/// A [`SpirvError`] for words that are no module.
+/// When the words are not a module.
 pub fn without_decorations(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let code = instructions(module)?;
     let kept = code.iter().filter(|i| i.decorated().is_none());

@@ -1,9 +1,8 @@
-//! Rotations of a block, component by component: loops over them that have no branches are compiled for the
-//! vector width.
+//! Rotations of a block, component by component; loops over them without branches are compiled for the vector width.
 
 use crate::simd::lanes::Lanes;
 
-/// Rotations that are worked on together, so that several vectors of each component are in flight.
+/// The number of rotations that are processed together, so that several vectors of each component are in flight.
 pub(crate) const BLOCK: usize = 64;
 
 /// A row for each of `x y z w`.
@@ -22,7 +21,7 @@ pub(crate) fn put(components: &mut Components, lane: usize, value: [f32; 4]) {
     }
 }
 
-/// Takes apart the first rotations, at most a block. The others of the block stay.
+/// Separates the components of the first rotations, at most a block. The rest of the block does not change.
 #[inline(always)]
 pub(crate) fn take_apart<L: Lanes>(rotations: &[[f32; 4]], components: &mut Components) {
     let whole = rotations.len().min(BLOCK) / L::COUNT * L::COUNT;
@@ -37,7 +36,7 @@ pub(crate) fn take_apart<L: Lanes>(rotations: &[[f32; 4]], components: &mut Comp
     }
 }
 
-/// Puts together the first rotations of a block, as many as there is room for.
+/// Joins the components of the first rotations of a block, up to the length of `rotations`.
 #[inline(always)]
 pub(crate) fn put_together<L: Lanes>(components: &Components, rotations: &mut [[f32; 4]]) {
     let [x, y, z, w] = components;

@@ -1,11 +1,9 @@
-//! The widest vector instructions that this processor has, chosen at run time: one
-//! binary runs everywhere. Every choice gives the same bits; only addition,
-//! subtraction and multiplication are used, never a fused one.
+//! Vector widths of the CPU, chosen at run time, so that one binary runs on every processor of a target. Every width
+//! gives the same bits: only addition, subtraction and multiplication are used, never fused multiply-add.
 //!
-//! Work is compiled once for each width. In a build without optimisation the wide vectors would
-//! take two thirds of the build time and bring no speed, so it has the baseline alone (the build
-//! script sets `wide_vectors` in the others). Most work has it alone in unit tests too: that all
-//! widths give the same bits is tested from outside, of results and of what keys become.
+//! Work is compiled once for each width. A build without optimisation has only the baseline, because the wide vectors
+//! would take two thirds of the build time and would not be faster (the build script sets `wide_vectors` in other
+//! builds). Unit tests compile most work only for the baseline too; integration tests compare the widths.
 
 use std::fmt;
 use std::str::FromStr;
@@ -21,14 +19,14 @@ use crate::simd::lanes::Lanes;
 #[cfg(wide_vectors)]
 use crate::simd::sixteen::Sixteen;
 
-/// Vector instructions that the twins can be compiled for.
+/// Vector instructions of the CPU engine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum VectorWidth {
-    /// What the target always has: SSE2 on x86-64, NEON on `AArch64`.
+    /// The instructions that every processor of the target has: SSE2 on x86-64, NEON on `AArch64`.
     Baseline,
-    /// AVX2, eight lanes.
+    /// AVX2, eight lanes of f32.
     Avx2,
-    /// AVX-512, sixteen lanes.
+    /// AVX-512, sixteen lanes of f32.
     Avx512,
 }
 
@@ -36,7 +34,7 @@ impl VectorWidth {
     /// Every width, narrowest first.
     pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
-    /// The name by which programs call it.
+    /// The name that programs use.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -46,7 +44,7 @@ impl VectorWidth {
         }
     }
 
-    /// Every width that this processor can run, narrowest first.
+    /// Every width of this processor, narrowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         Self::ALL
@@ -55,8 +53,8 @@ impl VectorWidth {
             .collect()
     }
 
-    /// The width that is used unless a caller chooses one: the widest that the processor has, or a
-    /// narrower one that the environment variable `TUMBLE_VECTOR_WIDTH` names.
+    /// The default width: the widest of this processor, or a narrower one that the environment variable
+    /// `TUMBLE_VECTOR_WIDTH` names.
     pub fn widest() -> Self {
         static WIDEST: OnceLock<VectorWidth> = OnceLock::new();
         *WIDEST.get_or_init(|| {
@@ -65,7 +63,7 @@ impl VectorWidth {
         })
     }
 
-    /// The width that the environment variable names, if it is set.
+    /// The width that the environment variable `TUMBLE_VECTOR_WIDTH` names, if it is set.
     pub(crate) fn limit() -> Result<Option<Self>, UnknownNameError> {
         match std::env::var("TUMBLE_VECTOR_WIDTH") {
             Ok(name) if !name.is_empty() => name.parse().map(Some),
@@ -73,7 +71,7 @@ impl VectorWidth {
         }
     }
 
-    /// This width, or the next narrower one that the processor has.
+    /// This width, or the next narrower one of this processor.
     #[inline]
     pub(crate) fn narrowed(self) -> Self {
         static WIDEST_THERE_IS: OnceLock<VectorWidth> = OnceLock::new();
@@ -81,7 +79,7 @@ impl VectorWidth {
         self.min(*WIDEST_THERE_IS.get_or_init(widest))
     }
 
-    /// A processor that has a width has the narrower ones too.
+    /// Whether this processor has the width; then it has the narrower ones too.
     fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,
@@ -119,24 +117,22 @@ impl FromStr for VectorWidth {
     }
 }
 
-/// Work over lanes: `run` is compiled for each vector width. Implementations are
-/// `#[inline(always)]`. Plain loops in them have no branches, calls or intrinsics, so that the
-/// compiler vectorises them.
+/// Work over lanes: `run` is compiled for each vector width. Implementations are `#[inline(always)]`. Plain loops in
+/// them have no branches, calls or intrinsics, so that the compiler vectorises them.
 pub(crate) trait InLanes {
-    /// Whether unit tests compile it for wide vectors too.
+    /// Whether unit tests compile the work for wide vectors too.
     const WIDE_IN_TESTS: bool = false;
 
-    /// `L` is the type of vectors, for work that is written in them.
+    /// Does the work; `L` is the vector type.
     fn run<L: Lanes>(&mut self);
 }
 
-/// Does work over lanes with vectors of the width [`VectorWidth::widest`].
+/// Does work over lanes with the width [`VectorWidth::widest`].
 pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
     in_lanes_of(VectorWidth::widest(), work);
 }
 
-/// Does work over lanes with vectors of a width, or of the next narrower one that the processor
-/// has.
+/// Does work over lanes with this width, or with the next narrower one of this processor.
 pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     struct InPlace;
 
@@ -152,20 +148,19 @@ pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     in_lanes_into(width, &InPlace, &(), work);
 }
 
-/// As [`InLanes`], with input and output as arguments of their own. Behind the one `&mut self` of
-/// [`InLanes`] the compiler cannot know that they do not overlap, which costs a fifth of the time
-/// of a row.
+/// As [`InLanes`], with input and output as separate arguments. If both are behind the `&mut self` of [`InLanes`],
+/// the compiler does not know that they do not overlap, and a row takes a fifth longer.
 pub(crate) trait InLanesInto<I: ?Sized, O: ?Sized> {
     /// As in [`InLanes`].
     const WIDE_IN_TESTS: bool = false;
-    /// What `run` returns beside the output.
+    /// The result of `run` in addition to the output.
     type Outcome;
 
-    /// `L` is the type of vectors, for work that is written in them.
+    /// Does the work; `L` is the vector type.
     fn run<L: Lanes>(&self, input: &I, output: &mut O) -> Self::Outcome;
 }
 
-/// As [`in_lanes_of`], from an input into an output.
+/// As [`in_lanes_of`], with input and output as separate arguments.
 pub(crate) fn in_lanes_into<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     width: VectorWidth,
     work: &W,
@@ -215,9 +210,9 @@ fn avx2<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     work.run::<Eight>(input, output)
 }
 
-/// The narrowest vectors with which streaming stores, past the caches, write long results faster on
-/// this processor, if any do. With ordinary stores Intel's cores wait for each cache line that they
-/// overwrite, and AMD's Zen 5 often does; Zen 3 is as fast either way.
+/// The narrowest width with which non-temporal stores write long results faster on this processor, if there is one.
+/// With ordinary stores, Intel's cores wait for each cache line that they overwrite, and AMD's Zen 5 often does; on
+/// Zen 3 both take the same time.
 pub(crate) fn streaming_stores_from() -> Option<VectorWidth> {
     static FROM: OnceLock<Option<VectorWidth>> = OnceLock::new();
     *FROM.get_or_init(detect_streaming_stores)
@@ -246,7 +241,7 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     None
 }
 
-/// Orders this thread's streaming stores: others see them before anything it stores from here on.
+/// Orders this thread's non-temporal stores before its later stores, as other threads see them.
 pub(crate) fn fence() {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: SSE is part of x86-64.
@@ -255,7 +250,7 @@ pub(crate) fn fence() {
     }
 }
 
-/// Stores one rotation everywhere.
+/// Fills memory with one rotation.
 struct FillPastCaches([f32; 4]);
 
 impl InLanesInto<(), [CacheLine]> for FillPastCaches {
@@ -273,8 +268,8 @@ impl InLanesInto<(), [CacheLine]> for FillPastCaches {
 }
 
 impl VectorWidth {
-    /// Fills `output` with one rotation by streaming stores, on some processors the fastest way to
-    /// write more than the caches hold: a limit with which the speed of evaluation is compared.
+    /// Fills `output` with one rotation by non-temporal stores. On some processors this is the fastest method to
+    /// write more than the caches can contain; the speed of evaluation is compared with it.
     pub fn fill_past_caches(self, output: &mut [Quat], value: Quat) {
         let rotations: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);

@@ -16,8 +16,7 @@ macro_rules! avx2 {
     };
 }
 
-/// The methods of [`Lanes`] that differ in nothing but the width of their instructions, which the
-/// macro `$run` calls.
+/// The methods of [`Lanes`] that differ only in the width of their instructions, which the macro `$run` calls.
 macro_rules! alike_at_any_width {
     ($run:ident, $block:ty, $permute:ident, $to_doubles:ident, $to_floats:ident, $low:ident,
      $high:ident, $low_pair:ident, $high_pair:ident, $larger:ident, $stream:ident) => {

@@ -10,8 +10,7 @@ use crate::math::quaternion::Arithmetic;
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::{Doubles, Four, pair};
 
-/// The number of one sample, or a vector with the numbers of several samples. An operation rounds
-/// alike for either.
+/// The number of one sample, or a vector with the numbers of several samples. Operations round both in the same way.
 pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The same for every sample.
     fn all(value: f32) -> Self;
@@ -28,7 +27,7 @@ pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// -1 where a number is less than 0, else 1.
     fn sign(self) -> Self;
 
-    /// The number whose bits are `seed` less the bits of this one, shifted to the right: the first guess of a
+    /// The number whose bits are `seed` minus the bits of this one shifted to the right: the initial guess of a
     /// reciprocal or of a root.
     fn guess(self, seed: u32, shift: u32) -> Self;
 }
@@ -69,8 +68,8 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
 /// The number of lanes in the widest vector.
 pub(crate) const MAX_LANES: usize = 16;
 
-/// A vector with the numbers of several consecutive samples. Each width has an order of lanes of
-/// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
+/// A vector with the numbers of several consecutive samples. Each width has a different order of lanes;
+/// [`Lanes::load`] and [`Lanes::store`] convert it.
 pub(crate) trait Lanes: Number + Pod {
     /// Number of samples.
     const COUNT: usize = size_of::<Self>() / size_of::<f32>();
@@ -105,7 +104,7 @@ pub(crate) trait Lanes: Number + Pod {
         bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
     }
 
-    /// Stores the numbers in this vector's order of lanes, which takes no instruction to convert.
+    /// Stores the numbers in this vector's order of lanes, without an instruction to convert it.
     #[inline(always)]
     fn store_unordered(self, numbers: &mut [f32]) {
         numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
@@ -143,7 +142,7 @@ pub(crate) trait Lanes: Number + Pod {
     /// Loads a quarter of [`Lanes::COUNT`] numbers and repeats each four times.
     fn fourfold_of(samples: &[f32]) -> Self;
 
-    /// Stores a vector of rotations, `x y z w x y z w …`, to a quarter of [`Lanes::COUNT`] places.
+    /// Stores a vector of rotations, `x y z w x y z w …`, to a quarter of [`Lanes::COUNT`] elements.
     #[inline(always)]
     fn store_side_by_side(self, rotations: &mut [[f32; 4]]) {
         rotations.copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
@@ -182,10 +181,10 @@ pub(crate) trait Lanes: Number + Pod {
         bytemuck::cast(*block)
     }
 
-    /// This vector of whole rotations, the first `count` of them replaced by those of a block.
+    /// This vector of whole rotations, with the first `count` of them replaced by those of a block.
     fn behind(self, block: &Self::Block, count: usize) -> Self;
 
-    /// A streaming store, past the caches, if the target has one. Other threads see it after a
+    /// A streaming (non-temporal) store, if the target has one. Other threads see it after a
     /// [`fence`](super::dispatch::fence).
     fn store_past_caches(self, block: &mut Self::Block);
 

@@ -1,5 +1,5 @@
-//! Vectors of f32 and f64 numbers: four lanes on any target, eight of AVX2 and sixteen of AVX-512,
-//! chosen at run time. Unsafe code is allowed here, for the processor's own vector instructions.
+//! Vectors of f32 and f64 numbers: four lanes on any target, eight of AVX2 and sixteen of AVX-512, selected at run
+//! time. Unsafe code is allowed here, for the processor's vector instructions.
 #![allow(unsafe_code)]
 
 pub(crate) mod cache_line;

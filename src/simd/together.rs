@@ -1,16 +1,17 @@
-//! Several vectors that are worked on together. A long chain of operations waits for each of its results; here
-//! those of the other vectors follow each in the program, so that a processor need not look far ahead for them.
+//! Several vectors that are processed together. In a long chain of operations each waits for the previous result.
+//! Here the same operation of the other vectors follows, so that a processor need not look far ahead for independent
+//! operations.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use crate::simd::lanes::{Lanes, Number};
 
-/// Vectors side by side: every operation is one of each.
+/// Vectors side by side; each operation is applied to all of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Together<L, const VECTORS: usize>(pub(crate) [L; VECTORS]);
 
-/// Does something for each vector, up to eight. Written out: a loop for each operation would make these functions by far
-/// those that take longest to compile.
+/// Repeats an expression for each vector, up to eight. It is written out, because with a loop for each operation
+/// these functions would take much longer to compile than all others.
 macro_rules! for_each_vector {
     ($v:ident: $body:expr) => {
         for_each_vector!(@0 1 2 3 4 5 6 7; $v: $body)
@@ -24,7 +25,7 @@ macro_rules! for_each_vector {
     };
 }
 
-/// Functions of which each vector is given to the one of the same name. Written out, without closures: their
+/// Functions that call the function of the same name for each vector. They are written out without closures, whose
 /// bodies would not be compiled for the vector width.
 macro_rules! of_each {
     ($($of:ident $name:ident($($other:ident),*; $($value:ident: $type:ty),*);)+) => {

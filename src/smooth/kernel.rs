@@ -1,56 +1,56 @@
-//! Kernels: symmetric weights of unit sum over neighbouring samples.
+//! Smoothing kernels: symmetric weights of neighbouring samples, whose sum is 1.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::names::names;
 
-/// How samples are smoothed.
+/// Options for smoothing samples ([`Engine::smooth`](crate::engine::Engine::smooth)).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smoothing {
     /// The weights.
     pub kernel: SmoothingKernel,
-    /// The values assumed beyond the first and the last sample.
+    /// The assumed values before the first and after the last sample.
     pub ends: SmoothingEnds,
-    /// How often.
+    /// The number of times that the kernel is applied.
     pub passes: u32,
 }
 
-/// The weights of a sample and its neighbours: a function about the sample, integrated over the cell
-/// of each neighbour, from half a sample before it to half a sample after it.
+/// The weights of a sample and its neighbours. Each weight is the integral of a function over the neighbour's cell,
+/// from half a sample before the neighbour to half a sample after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SmoothingKernel {
     /// ¼, ½, ¼.
     Linear,
-    /// (-1, 4, 6, 4, -1)/12: cubics stay. The second sample from an end is smoothed by the cubic
-    /// through four. With fewer than four samples it is [`SmoothingKernel::Linear`].
+    /// (-1, 4, 6, 4, -1)/12: cubics stay unchanged. The second sample from each end is smoothed by the cubic through
+    /// four samples. With fewer than four samples this kernel is [`SmoothingKernel::Linear`].
     Cubic,
-    /// Even weights as far as this many samples to either side.
+    /// Equal weights up to this many samples on each side.
     Box(f64),
-    /// Weights that fall to 0 this many samples to either side.
+    /// Weights that decrease linearly to 0 at this many samples on each side.
     Tent(f64),
-    /// Gauss' bell with this standard deviation in samples, cut at four of them.
+    /// A Gaussian with this standard deviation in samples, cut off at four standard deviations.
     Gaussian(f64),
-    /// The polynomial of this order through as many samples to either side, by least squares
-    /// (Savitzky and Golay 1964).
+    /// The polynomial of this order that is fitted by least squares to the samples within the radius (Savitzky and
+    /// Golay 1964).
     SavitzkyGolay {
-        /// Samples to either side.
+        /// The number of samples on each side.
         radius: usize,
         /// The order of the polynomial, at most twice the radius.
         order: usize,
     },
 }
 
-/// The values assumed beyond the first and the last sample.
+/// The assumed values before the first and after the last sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SmoothingEnds {
-    /// The steps mirrored, so that both end samples stay.
+    /// The steps are mirrored, so that the first and the last sample stay unchanged.
     #[default]
     Keep,
-    /// As [`SmoothingEnds::Keep`], but the end samples go where the parabola through the next three
-    /// is; for [`SmoothingKernel::Cubic`].
+    /// As [`SmoothingEnds::Keep`], but each end sample is replaced by the value of the parabola through the next
+    /// three samples. Only for [`SmoothingKernel::Cubic`].
     Parabolic,
-    /// The samples go round: the last repeats the first.
+    /// The samples are periodic: the last repeats the first.
     Loop,
 }
 
@@ -61,25 +61,25 @@ names! {
     Loop => "loop",
 }
 
-/// Why samples cannot be smoothed as asked.
+/// Why samples cannot be smoothed as requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SmoothingError {
-    /// The width must be positive, and not too large.
+    /// A width is not positive, or too large.
     #[error("a kernel cannot be {width} samples wide; give a width above 0 and up to 250000")]
     Width {
-        /// The value.
+        /// The width.
         width: f64,
     },
-    /// The polynomial would pass through all samples, or has no unique one.
+    /// The polynomial's order is more than twice the radius, or too high for f64.
     #[error("a polynomial of order {order} through {radius} samples to either side has no unique least-squares fit; give an order of at most {}", 2 * radius)]
     Order {
-        /// Samples to either side.
+        /// The number of samples on each side.
         radius: usize,
         /// The order.
         order: usize,
     },
-    /// Samples at this rate contain no such frequency.
+    /// The frequency of a low-pass filter is not between 0 and half the sample rate.
     #[error(
         "a low-pass at {hz} Hz has no effect on samples at {rate} Hz, which contain no frequencies above {} Hz; give a lower frequency above 0",
         0.5 * rate
@@ -87,19 +87,19 @@ pub enum SmoothingError {
     Frequency {
         /// The frequency, Hz.
         hz: f64,
-        /// Samples a second.
+        /// The number of samples per second.
         rate: f64,
     },
-    /// Too many passes.
+    /// There are too many passes.
     #[error("{passes} passes are too many; give at most {MAX_PASSES}, or a wider kernel")]
     Passes {
-        /// The value.
+        /// The number of passes.
         passes: u32,
     },
-    /// Only the cubic kernel has other ends than these.
+    /// [`SmoothingEnds::Parabolic`] is requested for a kernel other than the cubic one.
     #[error("parabolic ends apply only to the cubic kernel; choose other ends")]
     Ends,
-    /// No kernel has that name.
+    /// No kernel has this name.
     #[error(
         "unknown kernel `{name}`: choose linear, cubic, box:S, tent:S, gaussian:S or savitzky-golay:RADIUS:ORDER"
     )]
@@ -112,14 +112,14 @@ pub enum SmoothingError {
 /// The largest radius of a kernel, samples.
 const MAX_RADIUS: usize = 1_000_000;
 
-/// The largest number of passes: more would take very long.
+/// The maximum number of passes; more would take very long.
 const MAX_PASSES: u32 = 10_000;
 
-/// The highest order of Savitzky and Golay's polynomials for which f64 is exact enough.
+/// The maximum order of Savitzky and Golay's polynomials for which f64 is accurate enough.
 const MAX_ORDER: usize = 20;
 
 impl Smoothing {
-    /// Once, with ends that stay.
+    /// Smoothing in one pass, with unchanged ends.
     #[must_use]
     pub fn new(kernel: SmoothingKernel) -> Self {
         Self {
@@ -129,10 +129,10 @@ impl Smoothing {
         }
     }
 
-    /// Refuses options without a meaning.
+    /// Refuses invalid options.
     ///
     /// # Errors
-    /// The first of them that is found.
+    /// The first error that is found.
     pub fn check(&self) -> Result<(), SmoothingError> {
         self.step_weights(usize::MAX).map(drop)
     }
@@ -166,11 +166,11 @@ impl Smoothing {
 }
 
 impl SmoothingKernel {
-    /// The bell that halves the power of motion at a frequency in samples at some rate, both in Hz: its
-    /// spectrum, exp(-(2π f σ)²/2), is 1/√2 there and ¼ at twice the frequency.
+    /// The Gaussian that halves the power of motion at the frequency `hz`, for samples at the rate `rate`, both in
+    /// Hz. Its spectrum, exp(-(2π f σ)²/2), is 1/√2 at this frequency and ¼ at twice the frequency.
     ///
     /// # Errors
-    /// When the frequency is not between 0 and half the rate, or the bell is too wide.
+    /// When the frequency is not between 0 and half the rate, or the Gaussian is too wide.
     pub fn low_pass(hz: f64, rate: f64) -> Result<Self, SmoothingError> {
         if !(hz > 0.0 && hz < 0.5 * rate && rate.is_finite()) {
             return Err(SmoothingError::Frequency { hz, rate });
@@ -204,7 +204,7 @@ impl SmoothingKernel {
         Ok(weights)
     }
 
-    /// The integral of the kernel's function from one position to another.
+    /// The integral of the kernel's function between two positions.
     fn mass(self, from: f64, to: f64) -> f64 {
         let up_to = |x: f64| match self {
             Self::Tent(half) => {
@@ -222,8 +222,8 @@ impl SmoothingKernel {
     }
 }
 
-/// The weights with which the polynomial's value at the middle follows from the samples: by
-/// polynomials that are orthogonal over the samples (Gram), built by their recurrence.
+/// The weights of the samples for the fitted polynomial's value at the middle, from polynomials that are orthogonal
+/// over the samples (Gram), by their recurrence.
 fn savitzky_golay(radius: usize, order: usize) -> Result<Vec<f64>, SmoothingError> {
     if order > 2 * radius || order > MAX_ORDER {
         return Err(SmoothingError::Order { radius, order });

@@ -38,7 +38,7 @@ pub(crate) struct SmoothingPass<'a> {
 }
 
 impl SmoothingPass<'_> {
-    /// The step of a track's samples for an index before the start, within it, or beyond the end.
+    /// The step of a track's samples for an index before the start, within the samples, or after the end.
     #[inline(always)]
     pub(crate) fn step_at(&self, index: isize, samples: usize) -> usize {
         let count = samples as isize - 1;
@@ -53,7 +53,7 @@ impl SmoothingPass<'_> {
         mirrored.min(2 * count - 1 - mirrored) as usize
     }
 
-    /// Sets the samples next to the ends of a row, where the cubic kernel has other weights.
+    /// Sets the samples next to the ends of a row, for which the cubic kernel has other weights.
     pub(crate) fn set_ends(&self, row: SampleRow<'_>, mut set: impl FnMut(usize, [f32; 4])) {
         let last = row.count - 1;
         let is_cubic = self.smoothing.kernel == SmoothingKernel::Cubic && last >= 3;
@@ -89,8 +89,8 @@ impl SmoothingPass<'_> {
         }
     }
 
-    /// A smoothed rotation whose step is too long for the kernels' polynomials, in f64. `step` gives the
-    /// steps about it by index: 0 is the one after it, -1 the one before.
+    /// A smoothed rotation whose step is too long for the kernels' polynomials, in f64. `step` returns the
+    /// neighbouring steps by index: 0 is the step after the sample, -1 the one before.
     pub(crate) fn smoothed_in_f64(
         &self,
         value: [f32; 4],
@@ -137,8 +137,8 @@ impl SampleRow<'_> {
     }
 }
 
-/// [`pose_steps::pose`] of rotations, taken apart: each of its long chains of operations is a loop of
-/// its own, in which a processor works on several vectors at once.
+/// [`pose_steps::pose`] of rotations by components: each of its long chains of operations is a separate loop, in
+/// which a processor works on several vectors at once.
 #[inline(always)]
 fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
     let [mut squares, mut sines, mut ratios] = [[0.0; BLOCK]; 3];
@@ -166,8 +166,8 @@ pub(crate) struct SmoothingBlock<'a> {
     pub(crate) row: SampleRow<'a>,
     /// The first of the samples.
     pub(crate) first: usize,
-    /// The steps about the samples, from the first that reaches the first of them: a list for each
-    /// component, which is made once for many blocks.
+    /// The steps around the samples, from the first that affects the first sample: a list for each component, which
+    /// is made once for many blocks.
     pub(crate) steps: &'a mut [Vec<f32>; 4],
     /// As [`SampleRow`]: every `stride`th from `output_start` on is a smoothed sample.
     pub(crate) output: &'a mut [[f32; 4]],
@@ -270,8 +270,7 @@ impl SmoothingBlock<'_> {
         }
     }
 
-    /// Smooths vectors that lie side by side: their components are smoothed alike, and need not be
-    /// taken apart.
+    /// Smooths vectors by whole rows of components, which have the same weights and need not be separated.
     #[inline(always)]
     fn smooth_side_by_side(&mut self) {
         const EACH: usize = 4 * BLOCK;

@@ -1,4 +1,4 @@
-//! A value that one caller at a time works with, without a lock that stays locked meanwhile.
+//! A value that one caller at a time uses, without a lock during the use.
 
 use std::mem::take;
 use std::ops::{Deref, DerefMut};
@@ -7,8 +7,8 @@ use std::thread;
 
 use crate::threads::{self, lock};
 
-/// A value that callers take out, one after another, and put back. Whoever waits for it sleeps, and
-/// takes up no other work (`threads`): so whoever has it can always go on.
+/// A value that callers take and put back, one after another. A caller that waits for it sleeps, and does no other
+/// work (`threads`); therefore the caller that has it can always continue.
 #[derive(Default)]
 pub(crate) struct Exclusive<T> {
     kept: Mutex<ExclusiveState<T>>,
@@ -17,14 +17,14 @@ pub(crate) struct Exclusive<T> {
 
 #[derive(Default)]
 struct ExclusiveState<T> {
-    /// The default while it is taken.
+    /// The default value while it is taken.
     value: T,
     is_lent: bool,
 }
 
 impl<T: Default> Exclusive<T> {
-    /// Waits until nobody else has it. The engine's own threads wait for nobody: whoever has it may
-    /// wait for work that the thread has begun. They get the default where it is taken.
+    /// Takes the value; waits until no other caller has it. The engine's threads do not wait, because the caller that
+    /// has the value may wait for work that such a thread has begun. They get a default value if it is taken.
     pub(crate) fn take(&self) -> ExclusiveGuard<'_, T> {
         let mut kept = lock(&self.kept);
         if kept.is_lent && threads::is_worker() {
@@ -41,17 +41,17 @@ impl<T: Default> Exclusive<T> {
         ExclusiveGuard { origin, value }
     }
 
-    /// The value, unless somebody has it; the default takes its place.
+    /// The value, unless a caller has it; a default value replaces it.
     pub(crate) fn idle(&self) -> Option<T> {
         let mut kept = lock(&self.kept);
         (!kept.is_lent).then(|| take(&mut kept.value))
     }
 }
 
-/// A value that was taken; it goes back when this is dropped. After a panic the default does: work may
-/// be half done.
+/// A value that was taken. When this is dropped, the value is put back; after a panic a default value instead,
+/// because work may be incomplete.
 pub(crate) struct ExclusiveGuard<'a, T: Default> {
-    /// `None` for one that is nobody else's.
+    /// `None` for a default value that is not put back.
     origin: Option<&'a Exclusive<T>>,
     value: T,
 }

@@ -1,9 +1,9 @@
-//! The engine's own threads. Nothing of the engine uses rayon's global pool: that one cannot be had in
-//! a forked process, and the program ends where the system refuses its threads.
+//! The engine's threads. The engine does not use rayon's global pool, because that pool does not work in a forked
+//! process, and ends the program if the system refuses threads.
 //!
-//! A thread that has work done waits for it asleep, whoever it is. A worker of a caller's own rayon pool
-//! would else, as rayon's workers do, take up other tasks of that pool while it waits, and one of these
-//! may need what the waiting call, or the caller around it, has locked.
+//! Every thread that waits for work of the engine sleeps. A worker of a caller's rayon pool would otherwise, as
+//! rayon's workers do, run other tasks of that pool while it waits, and such a task could need a lock that the
+//! waiting call or its caller has.
 
 pub(crate) mod exclusive;
 pub(crate) mod stop;
@@ -24,21 +24,21 @@ use rayon::prelude::*;
 )]
 #[non_exhaustive]
 pub struct OutOfThreadsError {
-    /// How many were asked for.
+    /// The requested number of threads.
     pub count: usize,
-    /// What the system said.
+    /// The system's message.
     pub reason: String,
 }
 
 impl OutOfThreadsError {
-    /// For one thread that could not be started.
+    /// The error for one thread that could not be started.
     pub(crate) fn of_one(error: &io::Error) -> Self {
         let (count, reason) = (1, error.to_string());
         Self { count, reason }
     }
 }
 
-/// Locks what a thread that panicked cannot have left half changed.
+/// Locks a mutex whose value is consistent even after a thread panicked.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -48,26 +48,26 @@ thread_local! {
     static IS_WORKER: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Bytes of a worker's stack. A worker that waits for parts of its work takes up that of other calls
-/// meanwhile, one on top of the other, as many as there are at a time.
+/// The size of a worker's stack, bytes. A worker that waits for parts of its work runs tasks of other calls on the
+/// same stack, as many as there are at a time.
 const STACK: usize = 4 << 20;
 
-/// What a thread is sure to begin with, in bytes, beside its stack.
+/// The memory that a new thread surely needs in addition to its stack, bytes.
 const BEGINNING: usize = 1 << 20;
 
-/// Whether this system has threads. WebAssembly has none as Rust compiles for it: there the calling
-/// thread does all work, and rayon's parallel loops run on it.
+/// Whether the target has threads. WebAssembly has none as Rust compiles for it: the calling thread does all work,
+/// and rayon's parallel loops run on it.
 pub(crate) const HAS_THREADS: bool = !cfg!(target_family = "wasm");
 
-/// Threads that share work: the process's, or an engine's own. They are started when there is work for
-/// them for the first time; a forked process, in which they are not, starts its own.
+/// Threads that share work: those of the process, or those of one engine. They are started when they first have work;
+/// a forked process, in which they do not exist, starts its threads again.
 pub(crate) struct Threads {
-    /// How many; `None`: as the environment says.
+    /// The number of threads; `None`: the environment decides.
     count: Option<usize>,
-    /// Those of the process that was first, which are found without a lock: a process may be forked
-    /// while other threads of it work.
+    /// The threads of the first process. They are found without a lock, because a process may be forked while its
+    /// other threads work.
     first: OnceLock<Pool>,
-    /// Those of a process that was forked from it.
+    /// The threads of a process that was forked from the first one.
     forked: Mutex<Option<Pool>>,
 }
 
@@ -79,14 +79,13 @@ struct Pool {
 
 static SHARED: Threads = Threads::new(None);
 
-/// Runs `work` with the engine's threads: rayon inside it uses them. The calling thread waits, asleep.
+/// Runs `work` on the engine's threads, so that rayon inside it uses them. The calling thread sleeps until the end.
 ///
-/// There is one such pool in a process. It has as many threads as the environment's
-/// `RAYON_NUM_THREADS` says, else one for each core. A forked process gets its own.
+/// There is one such pool in a process. It has as many threads as the environment variable `RAYON_NUM_THREADS` says,
+/// or one for each core. A forked process has a separate pool.
 ///
-/// As everywhere in rayon, one of these threads that waits takes up other tasks meanwhile: tasks that
-/// share a lock must not hold it across a call of the engine in here. In threads and pools of their own
-/// they may.
+/// While one of these threads waits, it runs other tasks, as in all of rayon. Therefore tasks on these threads must
+/// not keep a shared lock while they call the engine. Threads and pools of the application may.
 ///
 /// ```
 /// let threads = tumble::on_threads(rayon::current_num_threads)?;
@@ -95,15 +94,15 @@ static SHARED: Threads = Threads::new(None);
 /// ```
 ///
 /// # Errors
-/// When the system refuses the threads.
+/// When the system refuses to start the threads.
 pub fn on_threads<R: Send>(work: impl FnOnce() -> R + Send) -> Result<R, OutOfThreadsError> {
     SHARED.run(work)
 }
 
-/// Bytes that one thread copies at once.
+/// The number of bytes that one thread copies at once.
 const COPY_TASK: usize = 1 << 20;
 
-/// Copies bytes, on all threads where they are many and threads can be had.
+/// Copies bytes, on all threads if there are many bytes and threads can be started.
 pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
     let copied = (to.len() > COPY_TASK).then(|| {
         on_threads(|| {
@@ -116,12 +115,12 @@ pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
     }
 }
 
-/// Whether this is one of the engine's own threads. They must wait for nobody that may need them.
+/// Whether this is one of the engine's threads. These must not wait for a thread that may need them.
 pub(crate) fn is_worker() -> bool {
     IS_WORKER.get()
 }
 
-/// How many threads share the work that is given to [`on_threads`] here; none is started for it.
+/// The number of threads that share work of [`on_threads`] on this thread; starts none.
 pub(crate) fn count() -> usize {
     SHARED.count()
 }
@@ -135,7 +134,7 @@ impl Threads {
         }
     }
 
-    /// Starts them, if they are not there yet.
+    /// Starts the threads, if they do not exist yet.
     pub(crate) fn start(&self) -> Result<(), OutOfThreadsError> {
         match HAS_THREADS {
             true => self.pool().map(|_| ()),
@@ -143,7 +142,7 @@ impl Threads {
         }
     }
 
-    /// How many share work that is given to [`Threads::run`] here.
+    /// The number of threads that share work of [`Threads::run`] on this thread.
     pub(crate) fn count(&self) -> usize {
         match IS_WORKER.get() {
             _ if !HAS_THREADS => 1,
@@ -152,7 +151,7 @@ impl Threads {
         }
     }
 
-    /// Runs `work` with these threads, or with those that run this already.
+    /// Runs `work` on these threads, or on the engine's threads that run this call already.
     pub(crate) fn run<R: Send>(
         &self,
         work: impl FnOnce() -> R + Send,
@@ -211,8 +210,8 @@ impl Drop for Threads {
     }
 }
 
-/// Ends the threads of this process. Those of the process that it was forked from are not there, and
-/// what belongs to them may be in the middle of a change.
+/// Ends the threads of this process. The threads of the process that it was forked from do not exist in it, and their
+/// data may be inconsistent.
 fn abandon(pool: Option<Pool>) {
     match pool {
         Some(pool) if pool.process != process_id() => std::mem::forget(pool),
@@ -220,7 +219,7 @@ fn abandon(pool: Option<Pool>) {
     }
 }
 
-/// Of this process; systems without processes panic when asked.
+/// The id of this process. (On systems without processes, the standard library's function panics.)
 fn process_id() -> u32 {
     if HAS_THREADS { process::id() } else { 0 }
 }
@@ -239,8 +238,8 @@ fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreadsError> {
         })
 }
 
-/// Starts one thread and waits until it has begun. Rust ends the process where a thread that has its stack
-/// lacks the little memory that it begins with: there is room for both, or it is not asked for.
+/// Starts one thread and waits until it has begun. Rust ends the process if a thread that has a stack lacks the
+/// little memory that it needs next. Therefore the thread is started only if there is memory for both.
 fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
     let mut room = Vec::<u8>::new();
     if room.try_reserve_exact(STACK + BEGINNING).is_err() {
@@ -261,7 +260,7 @@ fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
     Ok(())
 }
 
-/// As many as `RAYON_NUM_THREADS` says, else one for each core that this process may use.
+/// The number that `RAYON_NUM_THREADS` says, or one for each core that this process may use.
 fn default_count() -> usize {
     static COUNT: OnceLock<usize> = OnceLock::new();
     *COUNT.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! Work that somebody no longer wants: a flag that its tasks look at.
+//! Stopping of work: a flag that tasks check.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct StoppedError;
 
 thread_local! {
-    /// That of the work that this thread does.
+    /// The stop of the work that this thread does.
     static CURRENT: RefCell<Option<Stop>> = const { RefCell::new(None) };
 }
 
-/// Ends work of the engine before its end, from another thread.
+/// A flag with which another thread stops work of the engine.
 ///
 /// ```
 /// # use glam::Quat;
@@ -32,22 +32,21 @@ thread_local! {
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// One that has stopped nothing.
+    /// A new flag, which is not set.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// That of the work which this thread does, inside [`Stop::during`]; elsewhere one that has stopped
-    /// nothing.
+    /// The flag of the work inside [`Stop::during`] that this thread does. Elsewhere a new flag.
     #[must_use]
     pub fn of_this_work() -> Self {
         current().unwrap_or_default()
     }
 
-    /// Asks the work inside [`Stop::during`] to end: within some hundredths of a second its evaluations
-    /// return [`Error::Stopped`](crate::Error::Stopped), and so does each that it begins later. What an
-    /// evaluation has written of its result by then is of no use.
+    /// Stops the work inside [`Stop::during`]: within some hundredths of a second its evaluations return
+    /// [`Error::Stopped`](crate::Error::Stopped), and so does each evaluation that it starts later. A partly written
+    /// result must not be used.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -58,20 +57,20 @@ impl Stop {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Does work on this thread that may be stopped.
+    /// Does work on this thread that this flag can stop.
     pub fn during<R>(&self, work: impl FnOnce() -> R) -> R {
         during(Some(self.clone()), work)
     }
 }
 
-/// That of the work that this thread does, for the tasks that it is cut into.
+/// The flag of the work that this thread does, for its tasks on other threads.
 pub(crate) fn current() -> Option<Stop> {
     CURRENT.with_borrow(Clone::clone)
 }
 
-/// Does a task with the stop of the work that it is a part of.
+/// Does a task with the flag of the work that it is a part of.
 pub(crate) fn during<R>(stop: Option<Stop>, task: impl FnOnce() -> R) -> R {
-    /// Puts back, also when the task panics, what was there before.
+    /// Restores the previous flag, also after a panic.
     struct Before(Option<Stop>);
     impl Drop for Before {
         fn drop(&mut self) {
@@ -82,18 +81,18 @@ pub(crate) fn during<R>(stop: Option<Stop>, task: impl FnOnce() -> R) -> R {
     task()
 }
 
-/// Whether the work of this thread is to end. Of a task on the engine's threads only inside of [`during`]:
-/// the thread may have taken it up while it waits for other work.
+/// Whether the work of this thread was stopped. For tasks on the engine's threads this is valid only inside
+/// [`during`], because a thread that waits for other work may have started the task.
 pub(crate) fn is_stopped() -> bool {
     CURRENT.with_borrow(|stop| stop.as_ref().is_some_and(Stop::is_stopped))
 }
 
-/// Refuses to go on where the work of this thread is to end; as [`is_stopped`].
+/// Returns an error if the work of this thread was stopped; see [`is_stopped`].
 pub(crate) fn check() -> Result<(), StoppedError> {
     CURRENT.with_borrow(|stop| check_of(stop.as_ref()))
 }
 
-/// Refuses to go on with a task of work that has this stop.
+/// Returns an error if the work with this flag was stopped.
 pub(crate) fn check_of(stop: Option<&Stop>) -> Result<(), StoppedError> {
     match stop {
         Some(stop) if stop.is_stopped() => Err(StoppedError),

@@ -1,9 +1,9 @@
-//! Why requested samples are refused.
+//! Errors of sample times.
 
-/// More samples of one track than this are refused.
+/// The maximum number of samples of one track; more are refused.
 pub const MAX_FRAMES: u64 = 1 << 40;
 
-/// Why samples were refused.
+/// Why sample times were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleTimesError {
@@ -12,18 +12,18 @@ pub enum SampleTimesError {
         "`{text}` is not a frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
     )]
     Rate {
-        /// The text that was refused.
+        /// The refused text.
         text: String,
     },
     /// The range ends before it starts.
     #[error("the range ends at {end} s, before it starts at {start} s")]
     ReversedRange {
-        /// Start, seconds.
+        /// The start, seconds.
         start: f64,
-        /// End, seconds.
+        /// The end, seconds.
         end: f64,
     },
-    /// A range was given beside explicit times.
+    /// A range was set for explicit times.
     #[error(
         "explicit times have no range; give a rate with a start and an end, or only the times within the range"
     )]
@@ -31,40 +31,40 @@ pub enum SampleTimesError {
     /// A time is NaN or infinite.
     #[error("time {index} is {time}; times are finite numbers of seconds")]
     TimeNotFinite {
-        /// Its index in the list, from 0.
+        /// The time's index in the list, from 0.
         index: usize,
-        /// The offending time.
+        /// The refused time.
         time: f64,
     },
-    /// Times given for each track must divide evenly among the tracks.
+    /// The number of times for each track ([`SampleTimes::at_each`](crate::time::frames::SampleTimes::at_each)) is
+    /// not a multiple of the number of tracks.
     #[error("{times} times do not divide among {tracks} tracks; give every track the same number")]
     Uneven {
-        /// Number of times given.
+        /// The number of times.
         times: usize,
-        /// Number of tracks in the set.
+        /// The number of tracks of the set.
         tracks: usize,
     },
-    /// More samples than [`MAX_FRAMES`] or than memory can address.
+    /// There are more samples than [`MAX_FRAMES`], or than memory can address.
     #[error(
         "tracks × frames = {tracks} × {frames:.0}, which is {bytes:.0} bytes; at most {MAX_FRAMES} frames can be asked for"
     )]
     TooMany {
-        /// Number of tracks.
+        /// The number of tracks.
         tracks: usize,
-        /// Samples of each track.
+        /// The number of samples of each track.
         frames: f64,
-        /// Bytes of the result.
+        /// The size of the result, bytes.
         bytes: f64,
     },
-    /// Two neighbouring keys lie so far apart that frames between them cannot be
-    /// counted in 32 bits.
+    /// Two neighbouring keys are so far apart that 32 bits cannot count the frames between them.
     #[error("track {track}: {frames:.3e} frames between key {key} and the next; the limit is 2^32")]
     GapTooLong {
         /// The track's index in the set.
         track: usize,
-        /// The key before the gap.
+        /// The index of the key before the gap.
         key: usize,
-        /// Frames in the gap.
+        /// The number of frames in the gap.
         frames: f64,
     },
 }

@@ -1,5 +1,5 @@
-//! From seconds to frames, in f64: where spans start and end among the frames, and how the
-//! parameter of a sample follows from its frame number.
+//! Conversion from seconds to frames, in f64: the starts and ends of spans in frames, and the parameter of a sample
+//! from its frame number.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
 use crate::time::moment::Moment;
 
-/// How the parameter of a frame within a span follows from the frame's number.
+/// The parameter of a frame within a span as a function of the frame's number.
 pub(crate) struct InFrames {
     /// The whole frame nearest to the span's middle.
     pub(crate) whole: f64,
@@ -16,8 +16,8 @@ pub(crate) struct InFrames {
     pub(crate) offset: f32,
 }
 
-/// The constants of a span between two frame coordinates, over which the parameter grows by
-/// `extent`: 1, or -1 for a span that runs backwards.
+/// The constants of a span between two frame coordinates, over which the parameter increases by `extent`: 1, or -1
+/// for a span that runs backwards.
 #[inline(always)]
 pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
     let middle = (from + to) * 0.5;
@@ -30,20 +30,21 @@ pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
     }
 }
 
-/// Rounds a scale to a finite f32. Only a segment far shorter than a frame exceeds f32; it holds at
-/// most the frame at distance 0, for which an infinite scale would give NaN.
+/// Rounds a scale to a finite f32. Only a segment much shorter than a frame exceeds f32; it contains at most the
+/// frame at distance 0, for which an infinite scale would give NaN.
 #[inline(always)]
 pub(crate) fn finite_scale(scale: f64) -> f32 {
     let largest = f64::from(f32::MAX);
     round_f32(if scale < largest { scale } else { largest })
 }
 
-/// Two moments this close, in seconds, are one: 2^-33, so that a joint that turns 50 times a second is
-/// at most 4e-8 rad off.
+/// Two times that are at most this far apart, in seconds, count as the same: 2^-33, so that the error of a joint with
+/// 50 rotations per second is at most 4e-8 rad.
 pub(crate) const RESOLUTION: f64 = 1.0 / (1u64 << 33) as f64;
 
-/// When frame 0 is, and the magnitude of a time up to which all times are taken to be rounded alike: that
-/// of frame 0, and at least [`CLIP`]. It does not depend on the set: a track has the same bits alone and beside others.
+/// The time of frame 0, and the magnitude of a time up to which all times are assumed to have the same rounding: the
+/// larger of frame 0's and [`CLIP`]. It does not depend on the set: a track has the same bits alone and together with
+/// others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameStart {
     pub(crate) seconds: f64,
@@ -57,14 +58,13 @@ impl FrameStart {
     }
 }
 
-/// Times of a clip up to this long, in seconds, were often summed up, and have the rounding of its end.
+/// Times of a clip up to this length, in seconds, are often sums, and have the rounding of the clip's end.
 const CLIP: f64 = 64.0;
 
-/// By how much the rounding of times of this magnitude may have moved a key, in seconds: times are often
-/// sums or products, so a few steps
-/// of f64. From two days on that would be longer than [`RESOLUTION`], and there a curve is evaluated where
-/// its frame lies. Only where keys are `held` until the next one, and the rounding decides which of two is shown,
-/// is a key moved by up to a step of its f64.
+/// The distance by which the rounding of times of this magnitude may have moved a key, in seconds: times are often
+/// sums or products, so it is a few steps of f64. From two days on this would be more than [`RESOLUTION`]; there a
+/// curve is evaluated at the time of its frame. Only if keys are `held` until the next one, so that rounding decides
+/// between two keys, is a key moved by up to a step of its f64.
 #[inline(always)]
 pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
     let rounded_steps = 4.0 * f64::EPSILON * magnitude;
@@ -77,28 +77,28 @@ pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
     }
 }
 
-/// Converts the key times of a track, or of one of its copies, to frame coordinates, in f64 and by an
-/// exact frame rate.
+/// Converts the key times of a track, or of one of its copies, to frame coordinates, in f64 and with an exact frame
+/// rate.
 ///
-/// It is the same for all parts of a track: they agree where they meet.
+/// The clock is the same for all parts of a track, so that they agree where they meet.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct FrameClock {
     rate: FrameRate,
-    /// When frame 0 is.
+    /// The time of frame 0.
     start: f64,
-    /// The track's time from which frames are counted, and its frame coordinate.
+    /// The time of the track from which frames are counted, and its frame coordinate.
     origin: f64,
     at_origin: f64,
     /// -1 in a copy that runs backwards.
     sign: f64,
     /// Whether keys are held until the next one.
     steps: bool,
-    /// The magnitude of a time up to which all are rounded alike.
+    /// The magnitude of a time up to which all times are rounded in the same way.
     latest: f64,
     per_second: f64,
 }
 
-/// Where one span ends and the next starts.
+/// The end of one span and the start of the next.
 #[derive(Clone, Copy)]
 pub(crate) struct Boundary {
     /// Its frame coordinate.
@@ -123,7 +123,7 @@ impl FrameClock {
         }
     }
 
-    /// The same in a copy of the track.
+    /// The clock for a copy of the track.
     #[inline]
     pub(crate) fn in_copy(self, copy: &TrackCopy) -> Self {
         match copy.position {
@@ -145,15 +145,15 @@ impl FrameClock {
         }
     }
 
-    /// Whether frames run against the track's own time: intervals are met from the last to the
-    /// first, and the parameter falls.
+    /// Whether frames run against the track's time: intervals are processed from the last to the first, and the
+    /// parameter decreases.
     #[inline]
     pub(crate) fn is_reversed(self) -> bool {
         self.sign < 0.0
     }
 
-    /// A time that is within its rounding of a whole frame counts as that frame, so that a sample
-    /// on a key returns the key even at hour 24.
+    /// Converts a time to a boundary. A time that is within its rounding of a whole frame counts as that frame, so
+    /// that a sample at a key is the key even at hour 24.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.origin) * self.sign + self.at_origin;
@@ -199,19 +199,19 @@ pub(crate) struct TrackCopy {
     pub(crate) position: CopyPosition,
 }
 
-/// Where a copy lies.
+/// The position of a copy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CopyPosition {
     /// It is the track itself.
     Track,
-    /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
+    /// The track's first key, at `first` seconds, is at the frame coordinate `at_first` in it.
     Frames {
         first: f64,
         at_first: f64,
         backwards: bool,
     },
-    /// The track's time at the copy's only sample: copies that are too short, or too far out, to be laid
-    /// out in frames.
+    /// The track's time at the copy's only sample, for copies that are too short or too distant to be computed in
+    /// frames.
     At(Moment),
 }
 

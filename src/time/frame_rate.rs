@@ -21,10 +21,10 @@ pub struct FrameRate {
 }
 
 impl FrameRate {
-    /// `frames` in `seconds` seconds, reduced.
+    /// The rate of `frames` frames in `seconds` seconds. The ratio is reduced.
     ///
     /// # Errors
-    /// When either is zero or exceeds 2^53 (no longer exact in f64).
+    /// When one of the numbers is zero, or exceeds 2^53 after reduction (then it is not exact in f64).
     pub fn new(frames: u64, seconds: u64) -> Result<Self, SampleTimesError> {
         let exact = 1..=1u64 << f64::MANTISSA_DIGITS;
         let divisor = gcd(frames, seconds).max(1);
@@ -40,8 +40,8 @@ impl FrameRate {
         Ok(rate)
     }
 
-    /// A whole number of frames per second. 0 is refused later, when frames are resolved against a
-    /// set.
+    /// A whole number of frames per second. 0 is refused later, in
+    /// [`SampleTimes::resolve`](crate::SampleTimes::resolve).
     pub(crate) fn whole(frames: u32) -> Self {
         Self {
             frames: u64::from(frames),
@@ -53,13 +53,13 @@ impl FrameRate {
         self.frames == 0
     }
 
-    /// Frames per second, rounded to f64.
+    /// The number of frames per second, rounded to f64.
     #[must_use]
     pub fn per_second(self) -> f64 {
         self.frames as f64 / self.seconds as f64
     }
 
-    /// How many frames fit into `seconds`, not rounded to a whole number.
+    /// The number of frames in `seconds`, not rounded to a whole number.
     #[inline(always)]
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
         let frames = seconds * self.frames as f64;
@@ -71,7 +71,7 @@ impl FrameRate {
         }
     }
 
-    /// The time of a frame after frame 0: whole seconds, and what is left of one.
+    /// The time of a frame after frame 0: whole seconds, and a fraction of a second.
     #[inline]
     pub(crate) fn seconds_of(self, frame: u64) -> (f64, f64) {
         let (frames, product) = (
@@ -82,13 +82,13 @@ impl FrameRate {
         ((product / frames) as f64, rest / self.frames as f64)
     }
 
-    /// Frames and seconds, both exact in f64.
+    /// The numbers of frames and of seconds, both exact in f64.
     #[inline]
     pub(crate) fn ratio(self) -> (f64, f64) {
         (self.frames as f64, self.seconds as f64)
     }
 
-    /// The time of frame `frame`, seconds after frame 0.
+    /// The time of frame `frame`, in seconds after frame 0.
     #[must_use]
     pub fn time_of(self, frame: u64) -> f64 {
         // The product is exact for every count of frames that can be asked for at
@@ -113,7 +113,7 @@ impl fmt::Display for FrameRate {
 impl FromStr for FrameRate {
     type Err = SampleTimesError;
 
-    /// `25`, `12.5`, `1e-3` or `30000/1001`; decimals are taken exactly.
+    /// Parses `25`, `12.5`, `1e-3` or `30000/1001`. Decimals are exact.
     fn from_str(text: &str) -> Result<Self, SampleTimesError> {
         let refuse = || SampleTimesError::Rate {
             text: text.to_owned(),
@@ -129,7 +129,7 @@ impl FromStr for FrameRate {
     }
 }
 
-/// A decimal such as `12.5e1` as the ratio of its digits to a power of ten.
+/// The exact ratio of a decimal such as `12.5e1`: its digits over a power of ten.
 fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

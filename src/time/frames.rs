@@ -1,9 +1,8 @@
-//! Time: which samples an evaluation asks for.
+//! Sample times: the times at which a request evaluates tracks.
 //!
-//! Everything in seconds is f64 and stays on the host. What reaches a kernel is a
-//! whole number of frames from the middle of a segment (or, for explicit times,
-//! one f32 distance from that middle), so a frame 24 hours into a set is as exact
-//! as the first.
+//! All times in seconds are f64 and stay on the host. A kernel gets a whole number of frames from the middle of a
+//! segment (or, for explicit times, an f32 distance from that middle). Therefore a frame 24 hours into a set is as
+//! exact as the first.
 
 use std::sync::Arc;
 
@@ -13,13 +12,14 @@ use crate::time::frame_clock::FrameStart;
 use crate::time::frame_rate::FrameRate;
 use crate::time::moment::Moment;
 
-/// A key this close (in frames) after the last frame still has a frame: key times
-/// are rarely whole multiples of the frame time to the last bit.
+/// A key that is at most this many frames after the last frame still has a frame, because key times are rarely exact
+/// multiples of the frame time.
 const LAST_FRAME_TOLERANCE: f64 = 1e-6;
 
-/// Which samples of every track to evaluate: frames at a rate, or explicit times.
+/// The times of the samples of every track: frames at a rate, or explicit times.
 ///
-/// Before its first key and after its last a track holds its end values.
+/// Before its first key and after its last, a track has its end values, unless a
+/// [`WrapMode`](crate::time::wrap::WrapMode) says otherwise.
 ///
 /// ```
 /// use tumble::SampleTimes;
@@ -39,20 +39,20 @@ enum SampleRequest {
     },
     Shared(Arc<Vec<f64>>),
     PerTrack(Arc<Vec<f64>>),
-    /// Explicit times, and a range beside them.
+    /// Explicit times with a range, which are refused.
     TimesInRange,
 }
 
 impl SampleTimes {
-    /// Whole frames per second, from the set's first key to its last. A rate of 0 is
-    /// refused when the frames are resolved against a set.
+    /// Frames at a whole number of frames per second, from the set's first key to its last. A rate of 0 is refused in
+    /// [`SampleTimes::resolve`].
     #[must_use]
     pub fn fps(frames_per_second: u32) -> Self {
         Self::rate(FrameRate::whole(frames_per_second))
     }
 
-    /// Frames at an exact rate, from the set's first key to its last: frame `k` at
-    /// `start + k / rate`, for every `k` with a time not past the end.
+    /// Frames at an exact rate, from the set's first key to its last: frame `k` is at `start + k / rate`, for every
+    /// `k` whose time is not after the end.
     #[must_use]
     pub fn rate(rate: FrameRate) -> Self {
         Self(SampleRequest::Rate {
@@ -62,8 +62,8 @@ impl SampleTimes {
         })
     }
 
-    /// The same rate from `start` to `end`, seconds. Explicit times have no range: they are refused
-    /// ([`SampleTimesError::TimesInRange`]) when they are resolved against a set.
+    /// The same rate from `from` to `to`, seconds. Explicit times cannot have a range; [`SampleTimes::resolve`]
+    /// refuses it ([`SampleTimesError::TimesInRange`]).
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
         match &mut self.0 {
@@ -73,9 +73,8 @@ impl SampleTimes {
         self
     }
 
-    /// The same frames for sets whose keys span another time: a start or an end that
-    /// [`SampleTimes::between`] did not give is taken from here, instead of from the set's first and last
-    /// key. Explicit times depend on no keys and stay.
+    /// Sets the start and the end of frames, unless [`SampleTimes::between`] has set them. They replace the times of
+    /// the set's first and last key. Explicit times do not change.
     #[must_use]
     pub fn spanning(mut self, (first, last): (f64, f64)) -> Self {
         if let SampleRequest::Rate { start, end, .. } = &mut self.0 {
@@ -85,24 +84,24 @@ impl SampleTimes {
         self
     }
 
-    /// Explicit times, seconds, the same for every track, in any order.
+    /// Explicit times, seconds, in any order, the same for every track.
     #[must_use]
     #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
         Self(SampleRequest::Shared(Arc::new(times)))
     }
 
-    /// Explicit times, seconds, for each track its own: first those of the first track, then those
-    /// of the second, and so on, the same number for each.
+    /// Explicit times for each track, seconds: first all times of the first track, then those of the second, and so
+    /// on. Each track has the same number of times.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self(SampleRequest::PerTrack(Arc::new(times)))
     }
 
-    /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
+    /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span`, seconds.
     ///
     /// # Errors
-    /// A [`SampleTimesError`] when the request does not fit the set.
+    /// When the sample times do not fit the set.
     pub fn resolve(
         &self,
         tracks: usize,
@@ -171,31 +170,30 @@ fn check_size(tracks: usize, frames: f64) -> Result<(), SampleTimesError> {
     Ok(())
 }
 
-/// The samples of one evaluation: [`SampleTimes`] resolved against a set.
+/// The sample times of one evaluation: [`SampleTimes`] resolved for a set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
     pub(crate) ticks: Ticks,
     count: usize,
 }
 
-/// Which time belongs to a sample's index.
+/// The time of a sample as a function of its index.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Ticks {
-    /// Frame `k` lies at `start + k / rate`.
+    /// Frame `k` is at `start + k / rate`.
     Frames { rate: FrameRate, start: FrameStart },
-    /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
-    /// one list for all tracks.
+    /// Sample `k` of track `t` is at `times[t × stride + k]`; with a stride of 0 all tracks have the same times.
     Times { times: Arc<Vec<f64>>, stride: usize },
 }
 
 impl Timeline {
-    /// Samples of each track.
+    /// Number of samples of each track.
     #[must_use]
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there is nothing to evaluate.
+    /// Whether there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
@@ -209,7 +207,7 @@ impl Timeline {
         }
     }
 
-    /// The same samples for a set that has only some of the tracks.
+    /// The same sample times for a set that has only some of the tracks.
     pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
         let mut timeline = self.clone();
         if let Ticks::Times { times, stride: 1.. } = &mut timeline.ticks {
@@ -219,8 +217,8 @@ impl Timeline {
         timeline
     }
 
-    /// The same for some samples of some tracks, and which of its samples is the first of these: explicit times
-    /// are only theirs, frames are counted from the same start.
+    /// The times for some samples of some tracks, and the index of the first of these samples in it. Explicit times
+    /// are only those of the part; frames have the same start as before.
     pub(crate) fn part(
         &self,
         tracks: &std::ops::Range<usize>,
@@ -245,7 +243,7 @@ impl Timeline {
         (part, 0)
     }
 
-    /// A list of explicit times for every track, each time replaced by `map(track, time)`.
+    /// Explicit times for every track: each time is replaced by `map(track, time)`.
     pub(crate) fn map_times(
         &self,
         tracks: usize,
@@ -266,8 +264,8 @@ impl Timeline {
         })
     }
 
-    /// The time of a sample in seconds; `None` from [`Timeline::len`] on, and for a track that has
-    /// no times of its own where every track has.
+    /// The time of a sample, seconds. `None` if the sample is out of range, or if times are listed for each track and
+    /// the track is out of range.
     #[must_use]
     pub fn time(&self, track: usize, sample: usize) -> Option<f64> {
         let has_times = match &self.ticks {
@@ -277,8 +275,8 @@ impl Timeline {
         (has_times && sample < self.count).then(|| self.time_at(track, sample))
     }
 
-    /// The times of all samples of a track, seconds; none for a track that has no times of its own
-    /// where every track has.
+    /// The times of all samples of a track, seconds. Empty if times are listed for each track and the track is out of
+    /// range.
     #[must_use]
     pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {
         let count = self.time(track, 0).map_or(0, |_| self.count);

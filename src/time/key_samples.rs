@@ -1,5 +1,5 @@
-//! Finds where frames lie among the keys of a track, for rotations that are computed from keys
-//! without segments. The result is kept for the following tracks that share their times.
+//! The positions of frames among the keys of a track, for rotations that are computed from keys without segments. The
+//! result is kept for the following tracks with the same times.
 
 use std::ops::Range;
 
@@ -11,7 +11,8 @@ use crate::time::frame_clock::FrameClock;
 use crate::time::runs::{IntervalBlock, IntervalBlocks};
 use crate::tracks::track_keys::TrackKeys;
 
-/// The key and the parameter of every frame of a window, and what they were found for.
+/// The key and the parameter of every frame of a window, and the times, clock and window for which they were
+/// computed.
 pub(crate) struct FramePlan<'a> {
     times: &'a [f64],
     clock: Option<FrameClock>,
@@ -31,8 +32,8 @@ impl<'a> FramePlan<'a> {
         }
     }
 
-    /// The samples of a window; their keys count from the first of `of`. They are computed only if
-    /// times, clock or window are not those of the last call.
+    /// The samples of a window; their keys are counted from the first of `of`. They are computed only if times, clock
+    /// or window differ from the last call's.
     pub(crate) fn samples(
         &mut self,
         of: TrackKeys<'a>,
@@ -88,7 +89,7 @@ impl<'a> FramePlan<'a> {
     }
 }
 
-/// A sample that is a key itself.
+/// A sample at a key.
 #[inline(always)]
 fn held(key: usize) -> KeySample {
     KeySample {

@@ -1,20 +1,19 @@
-//! From seconds to frames: frame rates, requested samples, wrap modes, and which span of a track or
-//! which interval between keys each sample falls into. Results do not depend on the window of
-//! samples that is asked for.
+//! Conversion from seconds to frames: frame rates, sample times, wrap modes, and the span of a track or the interval
+//! between keys that contains each sample. Results do not depend on the requested window of samples.
 //!
-//! # Why so
+//! # Principle
 //!
-//! Seconds are f64 and stay on the host. A kernel gets a whole number of frames from the frame nearest to a
-//! segment's middle, with a scale and an offset in f32: a frame at hour 24 is as exact as the first. The
-//! parameter of a sample is a function of its number, never the sum of steps, so that no window, chunk or
-//! vector width shows. A key time within its rounding of a whole frame counts as that frame
-//! ([`frame_clock::FrameClock::boundary`]), and the sample there is the key, bit for bit.
+//! Seconds are f64 and stay on the host. A kernel gets a whole number of frames from the frame nearest to a segment's
+//! middle, with a scale and an offset in f32; so a frame at hour 24 is as exact as the first. The parameter of a
+//! sample is a function of its number, not a sum of steps, so that windows, chunks and vector widths have no effect.
+//! A key time within its rounding of a whole frame counts as that frame ([`frame_clock::FrameClock::boundary`]), and
+//! the sample there is the key, bit for bit.
 //!
 //! # Types
 //!
 //! | type | what it is |
 //! |---|---|
-//! | [`frames::SampleTimes`] | which samples are asked for: a rate and a range, or explicit times |
+//! | [`frames::SampleTimes`] | the requested samples: a rate and a range, or explicit times |
 //! | [`frames::Timeline`] | the same for a set: how many samples, and the time of each |
 //! | [`frame_rate::FrameRate`] | frames per second, as an exact ratio |
 //! | [`frame_clock::FrameClock`] | from key times to frame coordinates, for a track or one of its copies |
@@ -35,9 +34,9 @@
 //!
 //! # Memory
 //!
-//! Key times are read once, in order. Of 32 intervals a block keeps these rows, about 1.5 KB, which vectors
-//! fill without a branch; the bits of `occupied` then lead to the intervals that have samples, as
-//! a branch for each would often be mispredicted where keys are denser than samples.
+//! Key times are read once, in order. For 32 intervals a block has these rows, about 1.5 KB, which vectors fill
+//! without a branch. The bits of `occupied` then lead to the intervals with samples, because a branch for each
+//! interval would often be mispredicted if keys are denser than samples.
 //!
 //! ```text
 //! interval   0     1     2     …  31    32

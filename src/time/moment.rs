@@ -1,10 +1,9 @@
-//! A time as the sum of two numbers. One f64 has steps of 0.24 µs at 1.7e9 s, within which a fast joint
-//! turns visibly: a frame that far out, or its place in a copy of a track, is between two of them.
+//! A time as the sum of two numbers. One f64 has steps of 0.24 µs at 1.7e9 s, within which a fast joint rotates
+//! visibly: such a frame, or its position in a copy of a track, is between two of these steps.
 
 use crate::time::frame_rate::FrameRate;
 
-/// A time in seconds, or a length of time: `high + low`, of which `low` is at most half a step of
-/// `high`.
+/// A time or a duration in seconds: `high + low`, where `low` is at most half a step of `high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
     pub(crate) high: f64,
@@ -12,7 +11,7 @@ pub(crate) struct Moment {
 }
 
 impl Moment {
-    /// A time that one f64 has exactly.
+    /// A time that one f64 represents exactly.
     #[inline]
     pub(crate) fn new(seconds: f64) -> Self {
         Self {
@@ -82,7 +81,7 @@ impl Moment {
         Self::sum(time.high, time.low + rest)
     }
 
-    /// Seconds from a time until this one.
+    /// The seconds from another time to this one.
     #[inline(always)]
     pub(crate) fn since(self, time: f64) -> f64 {
         let high = Self::between(time, self.high);
@@ -99,7 +98,7 @@ impl Moment {
         self.high < 0.0 || (self.high == 0.0 && self.low < 0.0)
     }
 
-    /// How many frames a length of time has.
+    /// The number of frames in a duration.
     fn in_frames(self, rate: FrameRate) -> f64 {
         let (frames, seconds) = rate.ratio();
         let count = self.times(frames);
@@ -109,27 +108,27 @@ impl Moment {
     }
 }
 
-/// A time from one key of a track to another, which is repeated: the period of its copies.
+/// The time from the first key of a track to the last, which is repeated: the period of its copies.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Period {
     first: f64,
     length: Moment,
 }
 
-/// Copies with numbers below this are distinguished. Farther out, more than one lies between neighbouring
+/// The limit of copy numbers that are distinguished. At larger distances, more than one copy is between neighbouring
 /// f64 times.
 const COUNTED: f64 = (1u64 << 51) as f64;
 
-/// Where a time lies among the copies of a track.
+/// The position of a time among the copies of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct InCopy {
-    /// The number of the copy, 0 for the track itself; `None` beyond those that are counted.
+    /// The number of the copy, 0 for the track itself; `None` above the limit.
     pub(crate) number: Option<f64>,
-    /// Whether it lies before the track's first key.
+    /// Whether it is before the track's first key.
     pub(crate) is_before: bool,
-    /// Whether an odd number of copies lies between: it runs backwards if they mirror each other.
+    /// Whether the copy's number is odd: then it runs backwards if copies mirror each other.
     pub(crate) is_odd: bool,
-    /// Seconds from the start of the copy, from 0 to less than its length.
+    /// The seconds from the start of the copy, from 0 to less than its length.
     pub(crate) into: Moment,
 }
 
@@ -144,7 +143,7 @@ impl Period {
         self.length
     }
 
-    /// The copy in which a time lies. One that is less than `rounding` before a copy counts to that.
+    /// The copy that contains a time. A time that is less than `rounding` before a copy counts to that copy.
     pub(crate) fn find(&self, time: Moment, rounding: f64) -> InCopy {
         let length = self.length;
         let from_first = time.minus(Moment::new(self.first));
@@ -187,7 +186,7 @@ impl Period {
         }
     }
 
-    /// The frame coordinate at which the track's first key lies in a copy.
+    /// The frame coordinate of the track's first key in a copy.
     pub(crate) fn frame_of_first(
         &self,
         number: f64,

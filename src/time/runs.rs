@@ -1,8 +1,8 @@
-//! Runs: consecutive samples of a track with one source, the unit of work of every device. A run's
-//! numbers do not depend on where a window of work starts, so results are the same however work is
-//! cut. [`Spans`](crate::time::spans::Spans) cuts the samples of a track into them, by blocks of up to 32
-//! intervals, for which vector lanes find which samples lie in each. The intervals are the spans of a
-//! prepared track, or those between keys.
+//! Runs: consecutive samples of a track with one source, the unit of work of every device. The numbers of a run do
+//! not depend on the start of a window of work, so results are the same for any division of the work.
+//! [`Spans`](crate::time::spans::Spans) divides the samples of a track into runs, by blocks of up to 32 intervals,
+//! for which vector lanes find the samples in each. The intervals are the spans of a prepared track, or those between
+//! keys.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::{FrameClock, in_frames};
 
-/// Instead of an index: there is nothing.
+/// The index that means none.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Consecutive samples of one track with one source.
@@ -54,9 +54,9 @@ impl RunSource {
         (constant != NONE).then_some(Self::Constant(constant))
     }
 
-    /// What gives samples outside the keys: a constant, or a curve whose parameter is seconds from
-    /// the outermost key; `None` if another part has them. In the unit of the timeline that key lies
-    /// at `start`, and a second is `length` long.
+    /// The source of samples outside the keys: a constant, or a curve whose parameter is the seconds from the first
+    /// or last key; `None` if another part has them. In the unit of the timeline, that key is at `start`, and a
+    /// second is `length` long.
     #[inline]
     pub(crate) fn outside(constant: u32, index: u32, start: f64, length: f64) -> Option<Self> {
         let parameter = Parameter { start, length };
@@ -64,7 +64,7 @@ impl RunSource {
         Self::held(constant).or(curve)
     }
 
-    /// A segment at one parameter, whatever the sample.
+    /// A segment at one parameter, for every sample.
     pub(crate) fn at(index: u32, parameter: f32) -> Self {
         let (scale, offset) = (0.0, parameter);
         Self::Segment(
@@ -74,7 +74,7 @@ impl RunSource {
         )
     }
 
-    /// A curve in f64 at one parameter, whatever the sample.
+    /// A curve in f64 at one parameter, for every sample.
     pub(crate) fn exact_at(index: u32, t: f64) -> Self {
         let (start, length) = (t, f64::INFINITY);
         let parameter = Parameter { start, length };
@@ -82,8 +82,8 @@ impl RunSource {
     }
 }
 
-/// How a run's parameter follows from the distance to the segment's middle:
-/// `distance × scale + offset`.
+/// The parameter of a run's samples as a function of the distance from the segment's middle: `distance × scale +
+/// offset`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Affine {
     pub(crate) scale: f32,
@@ -93,11 +93,10 @@ pub(crate) struct Affine {
 /// A sample's distance from the middle of its segment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Distance {
-    /// Frames from the whole frame nearest to the middle, for the run's first sample; one more for
-    /// each sample after it. f32 holds all of them exactly, also those that fill the run's last
-    /// vector.
+    /// Frames from the whole frame nearest to the middle, for the run's first sample; one more for each sample after
+    /// it. All of them are exact in f32, including those that fill the run's last vector.
     Near { first: f32 },
-    /// The same where f32 may not have them exactly.
+    /// As `Near`, for numbers of frames that may be inexact in f32.
     Frames { first: i32 },
     /// Seconds from the middle, which is `half` a length after `start`, to a sample's explicit time.
     Seconds { start: f64, half: f64 },
@@ -116,9 +115,8 @@ impl Distance {
     }
 }
 
-/// Where the interval of a curve that is evaluated in f64 starts, and its length: in frames, or in
-/// seconds if samples have explicit times. If `length` is infinite, the curve is evaluated at the
-/// parameter `start` for all samples.
+/// The start of the interval of a curve that is evaluated in f64, and its length: in frames, or in seconds if samples
+/// have explicit times. If `length` is infinite, the curve is evaluated at the parameter `start` for all samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Parameter {
     pub(crate) start: f64,
@@ -136,8 +134,8 @@ impl Parameter {
     }
 }
 
-/// Takes runs. A trait rather than a closure: a closure's body is not compiled for
-/// the vector width of the function that it is inlined into.
+/// Receives runs. This is a trait rather than a closure, because a closure's body is not compiled for the vector
+/// width of the function into which it is inlined.
 pub(crate) trait Emit {
     fn run(&mut self, run: Run);
 }
@@ -148,7 +146,7 @@ impl Emit for Vec<Run> {
     }
 }
 
-/// Distances in frames must be below this: they are kept in 32 bits.
+/// The limit of distances in frames, which are stored in 32 bits.
 pub(crate) const COUNTABLE: f64 = (1u64 << 31) as f64;
 
 /// Intervals of a block.
@@ -158,9 +156,9 @@ const LEN: usize = 32;
 /// their samples follow.
 #[derive(Zeroable)]
 pub(crate) struct IntervalBlock {
-    /// Where each interval starts and, as the last entry, where the last one ends, in frames.
+    /// The start of each interval and, as the last entry, the end of the last one, in frames.
     pub(crate) frame: [f64; LEN + 1],
-    /// The first requested sample that is not before `frame`, or the end of the requested ones.
+    /// The first requested sample that is not before `frame`, or the end of the requested samples.
     pub(crate) first: [usize; LEN + 1],
     /// 1 if that sample lies exactly at `frame`, else 0.
     pub(crate) is_held: [u64; LEN],
@@ -170,15 +168,15 @@ pub(crate) struct IntervalBlock {
     pub(crate) distance: [f32; LEN],
     pub(crate) scale: [f32; LEN],
     pub(crate) offset: [f32; LEN],
-    /// Whether f32 holds the distances of all samples from `whole` exactly.
+    /// Whether the distances of all samples from `whole` are exact in f32.
     pub(crate) are_near: bool,
-    /// The intervals in which samples lie, by their indices in the block.
+    /// The indices in the block of the intervals with samples.
     pub(crate) occupied: Occupied,
 }
 
 impl IntervalBlock {
-    /// Where the `j`th interval starts and how long it is, for a curve evaluated in f64. The length
-    /// is negative if frames run backwards.
+    /// The start and the length of the `j`th interval, for a curve that is evaluated in f64. The length is negative
+    /// if frames run backwards.
     pub(crate) fn parameter(&self, j: usize, clock: FrameClock) -> Parameter {
         let (mut start, mut end) = (self.frame[j], self.frame[j + 1]);
         if clock.is_reversed() {
@@ -206,8 +204,8 @@ impl IntervalBlock {
     }
 }
 
-/// A bit for each interval in which samples lie; iterates over their indices in order. Where keys are
-/// denser than samples, a branch for each interval would often be mispredicted.
+/// A bit for each interval with samples; iterates over their indices in order. If keys are denser than samples, a
+/// branch for each interval would often be mispredicted.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Occupied(u64);
 
@@ -228,7 +226,7 @@ pub(crate) struct IntervalBlocks<'a> {
     starts: &'a [f64],
     /// Where the last interval ends.
     end: f64,
-    /// The samples asked for.
+    /// The requested samples.
     samples: Range<usize>,
     /// How many intervals are done.
     done: usize,
@@ -265,8 +263,8 @@ impl<'a> IntervalBlocks<'a> {
         }
     }
 
-    /// Fills a block with the next intervals, in the order in which frames meet them. Returns their
-    /// numbers in that order, or `None` if no interval with samples is left.
+    /// Fills a block with the next intervals, in the order of frames. Returns their numbers in that order, or `None`
+    /// if no interval with samples is left.
     pub(crate) fn fill(&mut self, block: &mut IntervalBlock) -> Option<Range<usize>> {
         let (from, count) = (self.done, self.starts.len());
         if from == count {
@@ -355,8 +353,8 @@ impl InLanes for FillBlock<'_> {
     }
 }
 
-/// f32 holds whole numbers exactly below 2^24. With distances below this limit, so are those of the
-/// samples that fill a run's last vector.
+/// Whole numbers below 2^24 are exact in f32. If distances are below this limit, so are those of the samples that
+/// fill a run's last vector.
 const NEAR_LIMIT: f64 = (1u64 << 23) as f64;
 
 /// Clamps a sample to the requested range.

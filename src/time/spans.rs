@@ -1,4 +1,4 @@
-//! Where in time the segments of prepared tracks lie, and the runs of samples that they give.
+//! The times of the segments of prepared tracks, and the runs of samples in them.
 
 use std::collections::TryReserveError;
 use std::ops::Range;
@@ -15,8 +15,8 @@ use crate::time::runs::{
 };
 use crate::time::times::interval_at;
 
-/// Spans of tracks' time, each from its start to the start of the next one. Each field has a list
-/// of its own, because many spans are met with the samples at once, in vector lanes.
+/// Spans of tracks' time, each from its start to the start of the next one. Each field is a separate list, because
+/// many spans are compared with the samples at once, in vector lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spans {
     /// Seconds.
@@ -28,7 +28,7 @@ pub(crate) struct Spans {
     pub(crate) steps: bool,
 }
 
-/// What gives the rotations of a span: indices in the lists of `Prepared`.
+/// The source of the rotations of a span: an index in one of the lists of `Prepared`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SpanSource {
     Segment(u32),
@@ -51,12 +51,11 @@ pub(crate) struct TrackPart {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// What its ends need besides these two constants, which is rare. Boxed, because a crowd has a
-    /// million parts.
+    /// Additional data for its ends, which are rarely needed. Boxed, because a crowd has a million parts.
     pub(crate) extension: Option<Box<TrackExtension>>,
 }
 
-/// What lies at a track's ends and outside its keys.
+/// Data for a track's ends and the time outside its keys.
 #[derive(Debug, Clone)]
 pub(crate) struct TrackExtension {
     /// The constant at exactly the last key; [`NONE`] if the one held after it serves there too.
@@ -65,7 +64,7 @@ pub(crate) struct TrackExtension {
     /// Their parameter is seconds from that key; [`NONE`] where constants are held.
     pub(crate) from_before: u32,
     pub(crate) from_after: u32,
-    /// When the whole track starts and ends, seconds.
+    /// The start and the end of the whole track, seconds.
     pub(crate) span: (f64, f64),
 }
 
@@ -81,8 +80,8 @@ impl TrackExtension {
 }
 
 impl TrackPart {
-    /// The constant at exactly the last key, and the curves that extrapolate before the first key
-    /// and after the last; [`NONE`] for what there is not.
+    /// The constant at exactly the last key, and the curves that extrapolate before the first key and after the last;
+    /// [`NONE`] if there is none.
     #[inline]
     pub(crate) fn at_ends(&self) -> [u32; 3] {
         (self.extension.as_ref()).map_or([NONE; 3], |extension| {
@@ -94,8 +93,8 @@ impl TrackPart {
         })
     }
 
-    /// Whether its track starts with it, and whether it ends with it; `begin` is when its first span
-    /// starts. Both for a track without [`TrackExtension`], which has one part or is not repeated.
+    /// Whether the part is at the start of its track, and whether it is at the end; `begin` is the start of its first
+    /// span. Both are true for a track without [`TrackExtension`], which has one part or is not repeated.
     pub(crate) fn is_at_ends(&self, begin: f64) -> [bool; 2] {
         let span = self.extension.as_ref().map(|extension| extension.span);
         span.map_or([true; 2], |(first, last)| {
@@ -103,8 +102,8 @@ impl TrackPart {
         })
     }
 
-    /// Its [`TrackExtension`], which is created if it has none. `times` are when the whole track starts and
-    /// ends, seconds.
+    /// Its [`TrackExtension`], which is created if it has none. `times` are the start and the end of the whole track,
+    /// seconds.
     pub(crate) fn extension_mut(&mut self, times: (f64, f64)) -> &mut TrackExtension {
         let new = || Box::new(TrackExtension::new(&[times.0, times.1]));
         self.extension.get_or_insert_with(new)
@@ -282,8 +281,8 @@ impl Spans {
         starts.first().copied().unwrap_or(part.end)
     }
 
-    /// The runs outside a part's keys, those of the requested samples that it has: before the first key,
-    /// at exactly the last one, and from there on.
+    /// The runs outside a part's keys, for those of the requested samples that it has: before the first key, at
+    /// exactly the last one, and after it.
     pub(crate) fn runs_outside(
         &self,
         part: &TrackPart,
@@ -305,8 +304,8 @@ impl Spans {
         ]
     }
 
-    /// The runs of a copy's samples that rounding put beyond its ends. Every sample of a copy is of its
-    /// track's keys, also where the values outside are not constants.
+    /// The runs of a copy's samples that are outside its ends because of rounding. Every sample of a copy belongs to
+    /// its track's keys, even if the values outside are not constants.
     fn runs_at_ends(
         &self,
         part: &TrackPart,
@@ -344,8 +343,8 @@ impl Spans {
         self.at_bound([at_end, part.after], part.spans.clone().last(), 0.5, 1.0)
     }
 
-    /// The first of two constants that is not [`NONE`], or else a span's value at this parameter; `t` is that of
-    /// a curve in f64.
+    /// The first of two constants that is not [`NONE`], or else a span's value at this parameter; `t` is the
+    /// parameter of a curve in f64.
     fn at_bound(
         &self,
         constants: [u32; 2],
@@ -364,7 +363,7 @@ impl Spans {
         }
     }
 
-    /// What gives a part's rotation at one of its track's times; `None` if another part has it.
+    /// The source of a part's rotation at one of its track's times; `None` if another part has it.
     fn source_within(&self, part: &TrackPart, time: Moment) -> Option<RunSource> {
         let (begin, starts) = (self.begin(part), &self.starts[part.spans.clone()]);
         let [is_first, is_last] = part.is_at_ends(begin);
@@ -469,7 +468,7 @@ impl Spans {
     }
 }
 
-/// The run of those requested samples that lie in a range, if anything gives them.
+/// The run of those requested samples that are in a range, if there is a source for them.
 fn run_among(
     samples: &Range<usize>,
     outside: Range<usize>,
@@ -481,8 +480,8 @@ fn run_among(
     source.map(|source| Run::new(first, last - first, source))
 }
 
-/// The source of a sample outside a part's keys, `None` if another part has it, and the times that
-/// have the same source. Not inlined, so that the usual path stays small.
+/// The source of a sample outside a part's keys (`None` if another part has it), and the times with the same source.
+/// Not inlined, so that the usual path stays small.
 #[inline(never)]
 fn outside(part: &TrackPart, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
     let [at_end, from_before, from_after] = part.at_ends();

@@ -1,10 +1,11 @@
-//! The whole second that times count from, for clocks of whole numbers.
+//! The whole second from which the times of a set count, for clocks of whole numbers.
 
-/// A whole second from which the times of a set count, so that f64 has them exactly.
+/// A whole second from which the times of a set count, so that they are exact in f64.
 ///
-/// An f64 of seconds since 1970 has steps of 0.24 µs. Everything in a set is relative: keys, frames and explicit
-/// times may count from any moment, if only it is the same. Stamps in nanoseconds become seconds behind the
-/// whole second of the first one, which are exact to 1e-16 s for the first second, to 1e-12 s for the first hour.
+/// The seconds since 1970 as an f64 are multiples of 0.24 µs. All times of a set are relative: keys, frames and
+/// explicit times may count from any moment, if it is the same for all. Time stamps in nanoseconds become seconds
+/// after the whole second of the first stamp; these are exact to 1e-16 s in the first second, and to 1e-12 s in the
+/// first hour.
 ///
 /// ```
 /// use glam::Quat;
@@ -23,14 +24,14 @@ pub struct TimeBase(i64);
 const NANOSECONDS: i64 = 1_000_000_000;
 
 impl TimeBase {
-    /// Times count from this second.
+    /// A base at this second.
     #[must_use]
     pub const fn new(second: i64) -> Self {
         Self(second)
     }
 
-    /// The whole second at or before the first of some stamps, nanoseconds in any order, and the seconds
-    /// from there until each. Without stamps it is 0.
+    /// The base for time stamps in nanoseconds, in any order, and each stamp in seconds after the base. The base is
+    /// the whole second at or before the first stamp, or 0 if there are no stamps.
     #[must_use]
     pub fn of_nanoseconds(stamps: &[i64]) -> (Self, Vec<f64>) {
         let first = stamps.iter().min().copied().unwrap_or(0);
@@ -39,13 +40,13 @@ impl TimeBase {
         (base, times.collect())
     }
 
-    /// The second that times count from.
+    /// The second from which times count.
     #[must_use]
     pub const fn second(self) -> i64 {
         self.0
     }
 
-    /// Seconds from the base until a stamp in nanoseconds, correctly rounded.
+    /// The seconds from the base to a time stamp in nanoseconds, correctly rounded.
     #[must_use]
     pub fn seconds(self, nanoseconds: i64) -> f64 {
         let behind = i128::from(nanoseconds) - i128::from(self.0) * i128::from(NANOSECONDS);
@@ -57,8 +58,7 @@ impl TimeBase {
         (behind.div_euclid(unit)) as f64 + behind.rem_euclid(unit) as f64 / NANOSECONDS as f64
     }
 
-    /// The stamp in nanoseconds nearest to a number of seconds behind the base; `None` beyond what 64 bits
-    /// hold.
+    /// The time stamp in nanoseconds nearest to `seconds` after the base; `None` if it does not fit 64 bits.
     #[must_use]
     pub fn nanoseconds(self, seconds: f64) -> Option<i64> {
         let whole = seconds.floor();

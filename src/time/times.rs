@@ -1,11 +1,11 @@
-//! Finds the interval between keys, or the span of a prepared track, in which an explicit time lies.
-//! Explicit times come in any order.
+//! Search for the interval between keys, or the span of a prepared track, that contains an explicit time. Explicit
+//! times may be in any order.
 
 use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
 
-/// The key before a time and the time's parameter after it; `near` is the key to look at first.
+/// The key before a time and the time's parameter after it; the search starts at the key `near`.
 #[inline(always)]
 pub(crate) fn key_sample(times: &[f64], time: f64, near: usize) -> KeySample {
     let key = key_before(times, time, near);
@@ -24,8 +24,8 @@ fn parameter(start: f64, end: f64, time: f64) -> f32 {
     round_f32(from_middle) * finite_scale(1.0 / seconds) + 0.0
 }
 
-/// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is
-/// set if the rotation is that key itself. `near` is the key to look at first.
+/// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is set if the rotation
+/// is that key itself. The search starts at the key `near`.
 #[inline(always)]
 pub(crate) fn key_before(times: &[f64], time: f64, near: usize) -> u32 {
     let last = times.len() - 1;
@@ -38,8 +38,8 @@ pub(crate) fn key_before(times: &[f64], time: f64, near: usize) -> u32 {
     key as u32 | if time == times[key] { IS_KEY } else { 0 }
 }
 
-/// The interval in which a time lies, from the starts of all intervals; the first one for earlier
-/// times. `near` is the interval to look at first.
+/// The interval that contains a time, from the starts of all intervals; the first one for earlier times. The search
+/// starts at the interval `near`.
 #[inline(always)]
 pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     let contains = |i: usize| {

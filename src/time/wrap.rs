@@ -1,5 +1,5 @@
-//! What a track does outside its keys: it holds its end value, goes on at the velocity of its end,
-//! or repeats in copies of the time between its first key and its last, forwards or backwards.
+//! Motion outside a track's keys: the end value is held, the rotation continues with the velocity of the end, or the
+//! time between the first key and the last is repeated, forwards or backwards.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::moment::{InCopy, Moment, Period};
 
-/// What happens before a track's first key, or after its last.
+/// The motion of a track before its first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[doc(alias = "pre-infinity")]
 #[doc(alias = "post-infinity")]
@@ -21,9 +21,9 @@ pub enum WrapMode {
     /// The end value is held.
     #[default]
     Hold,
-    /// The track repeats. A sample on the seam is the first key's.
+    /// The track repeats. A sample at the time of the last key has the first key's value.
     Loop,
-    /// The track runs backwards, then forwards again, and so on.
+    /// The track is played backwards, then forwards again, and so on.
     Mirror,
     /// The rotation continues at the angular velocity at that end.
     Extrapolate,
@@ -43,7 +43,7 @@ impl WrapMode {
     }
 }
 
-/// A copy of fewer frames is not laid out in frames.
+/// The minimum length of a copy whose samples are computed in frames.
 const MIN_FRAMES: f64 = 2.0;
 
 /// The wrap modes on both sides of a track.
@@ -63,9 +63,8 @@ impl Wrap {
         self.before.repeats() || self.after.repeats()
     }
 
-    /// The samples of a track, cut where its copies meet. `span` is the times of its first and
-    /// last key, seconds; `None` if it has no copies. The copy of a sample does not depend on which
-    /// other samples are requested.
+    /// The samples of a track, divided where its copies meet. `span` is the times of its first and last key, seconds;
+    /// `None` if it has no copies. The copy of a sample does not depend on the other samples of the request.
     #[inline]
     pub(crate) fn copies(
         self,
@@ -85,8 +84,8 @@ impl Wrap {
         }
     }
 
-    /// The copy in which a time lies, and whether that runs backwards; `None` in the track itself, also
-    /// where end values are held or extrapolated.
+    /// The copy that contains a time, and whether it runs backwards; `None` for the track itself, and where end
+    /// values are held or extrapolated.
     fn copy_at(self, period: &Period, time: Moment, rounding: f64) -> Option<(InCopy, bool)> {
         let found = period.find(time, rounding);
         let mode = if found.is_before {
@@ -177,8 +176,8 @@ impl Wrap {
         copies
     }
 
-    /// The time between the keys, from `first` to `last`, that is repeated at `time`; `time` itself
-    /// if it lies in no other copy.
+    /// The time between the keys, from `first` to `last`, whose value is repeated at `time`; `time` itself if it is
+    /// in no other copy.
     pub(crate) fn folded(self, span: (f64, f64), time: f64) -> f64 {
         let in_track = || {
             let period = Period::new(span)?;
@@ -189,7 +188,8 @@ impl Wrap {
     }
 }
 
-/// The first number from `from` on, up to `end`, that is not in a stretch which has those before it.
+/// The first number of `from..end` for which `is_in` is false, or `end`. `is_in` must be true for all numbers before
+/// it.
 fn first_outside(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize {
     let (mut from, mut end) = (from, end);
     while from < end {

@@ -1,32 +1,31 @@
-//! Why a set refuses keys, and the limits that its messages name.
+//! Errors of sets, and the limits in their messages.
 
-/// A key whose norm differs from 1 by more than this is refused by
-/// [`TrackSet::push`](crate::tracks::set::TrackSet::push): it is more likely a mistake than a
-/// rotation.
+/// The maximum difference of a key's norm from 1. [`TrackSet::push`](crate::tracks::set::TrackSet::push) refuses
+/// other keys, because they are probably not rotations.
 pub const NORM_TOLERANCE: f64 = 0.1;
 
-/// The largest magnitude of a time, in seconds: the limit of `.dat` files. Products of intervals
-/// stay far from overflowing in f64.
+/// The largest magnitude of a time, seconds: the limit of `.dat` files. With it, products of intervals do not
+/// overflow in f64.
 pub(crate) const LATEST: f64 = f32::MAX as f64;
 
-/// Why keys were refused. Indices count from 0.
+/// Why a set refused keys or other data. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
-    /// A track must have at least one key.
+    /// The track has no keys.
     #[error("track {track} has no keys; give it at least one")]
     Empty {
         /// The track's index in the set.
         track: usize,
     },
-    /// Each key needs one time.
+    /// The numbers of keys and of times differ.
     #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
     LengthMismatch {
         /// The track's index in the set.
         track: usize,
-        /// Number of keys given.
+        /// The number of keys.
         keys: usize,
-        /// Number of times given.
+        /// The number of times.
         times: usize,
     },
     /// A time is NaN or infinite.
@@ -36,20 +35,20 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The offending time, seconds.
+        /// The refused time, seconds.
         time: f64,
     },
-    /// A time is so far away that arithmetic would overflow.
+    /// A time is so large that computations would overflow.
     #[error("track {track}, key {key}: time {time} s; times lie within ±{LATEST:e} s")]
     TimeOutOfRange {
         /// The track's index in the set.
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The offending time, seconds.
+        /// The refused time, seconds.
         time: f64,
     },
-    /// Times must increase strictly.
+    /// A time is not after the previous one.
     #[error(
         "track {track}, key {key}: time {time} s does not come after {previous} s; sort the keys and remove duplicates"
     )]
@@ -58,12 +57,12 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The offending time, seconds.
+        /// The refused time, seconds.
         time: f64,
-        /// The time before it, seconds.
+        /// The previous time, seconds.
         previous: f64,
     },
-    /// The quaternion is not close to unit length.
+    /// The norm of a quaternion is not close to 1.
     #[error(
         "track {track}, key {key}: quaternion norm is {norm}; a rotation has norm 1 (±{NORM_TOLERANCE})"
     )]
@@ -72,29 +71,29 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// Its norm.
+        /// The quaternion's norm.
         norm: f64,
     },
-    /// There is no track with that index.
+    /// There is no track with this index.
     #[error("there is no track {track}; the set has {tracks}")]
     NoSuchTrack {
-        /// The index asked for.
+        /// The requested index.
         track: usize,
-        /// Number of tracks in the set.
+        /// The number of tracks of the set.
         tracks: usize,
     },
-    /// Data beside the rotations, such as velocities, must be given for every key of a track.
+    /// Data in addition to rotations, such as velocities, are not one value for each key.
     #[error(
         "track {track} has {keys} keys but {values} values of {quantity}; give one for each key"
     )]
     DataLength {
         /// The track's index in the set.
         track: usize,
-        /// What the values are, such as `velocity`.
+        /// The kind of the values, such as `velocity`.
         quantity: &'static str,
-        /// Number of keys of the track.
+        /// The number of the track's keys.
         keys: usize,
-        /// Number of values given.
+        /// The number of values.
         values: usize,
     },
     /// An upward direction of a path has no length, or is not finite.
@@ -105,7 +104,7 @@ pub enum TrackError {
         /// The point's index in the path.
         key: usize,
     },
-    /// A value beside a rotation is too large.
+    /// A value in addition to a rotation is too large.
     #[error(
         "track {track}, key {key}: the {quantity} is too large; its numbers lie within ±{limit:e}"
     )]
@@ -114,19 +113,19 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// What the values are, such as `velocity`.
+        /// The kind of the values, such as `velocity`.
         quantity: &'static str,
-        /// The largest magnitude.
+        /// The maximum magnitude.
         limit: f64,
     },
-    /// A value beside a rotation is NaN or infinite.
+    /// A value in addition to a rotation is NaN or infinite.
     #[error("track {track}, key {key}: the {quantity} is not finite")]
     DataNotFinite {
         /// The track's index in the set.
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// What the values are, such as `velocity`.
+        /// The kind of the values, such as `velocity`.
         quantity: &'static str,
     },
 }

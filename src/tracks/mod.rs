@@ -1,5 +1,5 @@
-//! Keyframe tracks. Keys and key times are checked, and the signs of keys are continued along the
-//! shortest path, once, when they come into a `TrackSet`.
+//! Keyframe tracks. When keys are added to a `TrackSet`, they and their times are checked, and the signs of keys for
+//! the shortest path are computed once.
 
 pub(crate) mod error;
 pub(crate) mod rotation;

@@ -1,10 +1,10 @@
-//! Rotations as callers have them.
+//! The types of rotations that callers pass.
 
 use glam::Quat;
 
-/// A rotation as callers have it: [`Quat`], or its numbers `x y z w`.
+/// A type of rotations that callers pass: [`Quat`], or the numbers `x y z w`.
 pub trait Rotation: bytemuck::Pod + sealed::Sealed {
-    /// As a quaternion.
+    /// The rotation as a quaternion.
     #[doc(hidden)]
     #[inline]
     fn quat(self) -> Quat {
@@ -16,8 +16,8 @@ impl Rotation for Quat {}
 impl Rotation for [f32; 4] {}
 
 pub(crate) mod sealed {
-    /// Types of which it is known how their four numbers lie in memory. Keys come in as some of
-    /// them, and [`OutputValue`](crate::OutputValue)s of results lie in any.
+    /// Types of four numbers whose order in memory is known. Keys are passed as some of them, and
+    /// [`OutputValue`](crate::OutputValue)s of results are any of them.
     pub trait Sealed {}
 
     impl Sealed for glam::Quat {}

@@ -1,9 +1,7 @@
 //! The set of keyframe tracks: unit quaternions with their key times.
 //!
-//! The first stop on the path of the data. A [`TrackSet`] knows no method, no
-//! frame rate and no device; it is checked once, when keys are pushed, and
-//! everything behind it trusts it: every track has at least one key, times are
-//! finite and strictly increasing, keys are unit quaternions.
+//! A [`TrackSet`] has no method, frame rate or device. Keys are checked when they are added, and all later steps rely
+//! on it: every track has at least one key, times are finite and strictly increasing, and keys are unit quaternions.
 
 pub(crate) mod key_data;
 pub(crate) mod vectors;
@@ -51,8 +49,7 @@ pub struct TrackSet {
     signs: SignBits,
 }
 
-/// Where a track's keys and times lie in the lists of its set. Consecutive tracks with equal times
-/// share them.
+/// The ranges of a track's keys and times in the lists of its set. Consecutive tracks with equal times share them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TrackRange {
     first_key: usize,
@@ -64,19 +61,17 @@ struct TrackRange {
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct Track<'a> {
-    /// The track's name, when it was given one.
+    /// The track's name, if it has one.
     pub name: Option<&'a str>,
     /// Key times in seconds, strictly increasing.
     pub times: &'a [f64],
-    /// Unit keys, one for each time.
+    /// Keys as unit quaternions, one for each time.
     pub keys: &'a [Quat],
-    /// Angular velocities of the keys, rad/s in the body frame; empty where none were
-    /// given.
+    /// Angular velocities at the keys, rad/s in the body frame; empty if none were set.
     pub velocities: &'a [DVec3],
-    /// Tangents with which a curve arrives at each key and leaves it, `x y z w` a second;
-    /// empty where none were given.
+    /// The incoming and outgoing tangent of each key, `x y z w` per second; empty if none were set.
     pub tangents: &'a [[Quat; 2]],
-    /// Tension, continuity and bias of the keys; empty where none were given.
+    /// Tension, continuity and bias of the keys; empty if none were set.
     pub tcb: &'a [Tcb],
 }
 
@@ -87,20 +82,23 @@ impl TrackSet {
         Self::default()
     }
 
-    /// Makes room for so many more tracks with so many keys together, if there is as much memory, so
-    /// that the set does not grow step by step while they are pushed.
+    /// Reserves memory for `tracks` more tracks with `keys` keys in total, if there is enough, so that the set does
+    /// not grow step by step.
     pub fn reserve(&mut self, tracks: usize, keys: usize) {
         // What there is no memory for fails when it is pushed.
         let _ = self.tracks.try_reserve(tracks);
         let _ = self.keys.try_reserve(keys);
     }
 
-    /// Appends a track. `times` are seconds, strictly increasing; `keys` are
-    /// rotations, [`Quat`] or `[f32; 4]` (`x y z w`), one for each time. Keys that are unit to within f32 rounding are
-    /// kept bit for bit, others (norm within 0.1 of 1) are normalised.
+    /// Appends a track. `times` are seconds, strictly increasing; `keys` are rotations, [`Quat`] or `[f32; 4]` (`x y
+    /// z w`), one for each time.
+    ///
+    /// Keys whose norm is 1 within f32 rounding keep their bits; others, whose norm is within 0.1 of 1, are
+    /// normalised.
     ///
     /// # Errors
-    /// A [`TrackError`] that names the key; the set is then unchanged.
+    /// When there are no keys, the numbers of keys and times differ, the times are not finite and strictly
+    /// increasing, or a key's norm is not within 0.1 of 1; then the set is unchanged.
     pub fn push<R: Rotation>(
         &mut self,
         name: impl Into<String>,
@@ -121,11 +119,11 @@ impl TrackSet {
         added
     }
 
-    /// A set whose tracks all have the same key times, as in a `.dat` file.
-    /// `keys` are those of one track after another, `times.len()` keys each.
+    /// Makes a set whose tracks all have the same key times, as in a `.dat` file. `keys` are `times.len()` keys for
+    /// each track, track by track.
     ///
     /// # Errors
-    /// As [`TrackSet::push`]; also when `keys` is not a whole number of tracks.
+    /// As [`TrackSet::push`]; also when the number of keys is not a multiple of the number of times.
     pub fn with_shared_times<R: Rotation>(times: &[f64], keys: &[R]) -> Result<Self, TrackError> {
         let keys = keys.iter().map(|rotation| rotation.quat());
         Self::from_shared_times(times.to_vec(), keys.collect())
@@ -134,7 +132,7 @@ impl TrackSet {
     /// As [`TrackSet::with_shared_times`], without a copy of the keys.
     ///
     /// # Errors
-    /// As there.
+    /// As [`TrackSet::with_shared_times`].
     pub fn from_shared_times(times: Vec<f64>, mut keys: Vec<Quat>) -> Result<Self, TrackError> {
         let len = times.len();
         if len == 0 || !keys.len().is_multiple_of(len) {
@@ -175,8 +173,9 @@ impl TrackSet {
         self.longest
     }
 
-    /// Whether every two neighbouring keys of a track are less than half a turn apart as they
-    /// were given: then the shortest path and the path as authored are the same.
+    /// Whether neighbouring keys of every track, with their original signs, are less than 180° apart: then
+    /// [`KeySigns::Shortest`](crate::KeySigns::Shortest) and [`KeySigns::AsAuthored`](crate::KeySigns::AsAuthored)
+    /// are the same.
     pub(crate) fn arcs_are_short(&self) -> bool {
         !self.signs.any_long
     }
@@ -200,7 +199,7 @@ impl TrackSet {
         self.tracks.is_empty()
     }
 
-    /// Refuses an index that no track has.
+    /// Refuses an index that is out of range.
     pub(crate) fn check_track(&self, track: usize) -> Result<(), TrackError> {
         let tracks = self.track_count();
         if track < tracks {
@@ -216,7 +215,7 @@ impl TrackSet {
         (index < self.track_count()).then(|| self.track(index))
     }
 
-    /// The track at `index`, as `[]` has it of a slice; [`TrackSet::get`] never panics.
+    /// The track at `index`. Use [`TrackSet::get`] for an index that may be out of range.
     ///
     /// # Panics
     /// When `index` is not below [`TrackSet::track_count`].
@@ -233,8 +232,8 @@ impl TrackSet {
         }
     }
 
-    /// The times and keys of a track alone: for short tracks, to look up the other fields of
-    /// [`Track`] would take longer than to evaluate it.
+    /// The times and keys of a track without its other fields, whose lookup would take longer than the evaluation of
+    /// a short track.
     #[inline]
     pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
         let range = self.tracks[index];
@@ -255,8 +254,7 @@ impl TrackSet {
         self.first_key(tracks.end) - self.first_key(tracks.start)
     }
 
-    /// The end of the longest range that starts with the first of `tracks` and has at most `keys`
-    /// keys.
+    /// The end of the longest range of tracks from the first of `tracks` that has at most `keys` keys.
     pub(crate) fn tracks_within(&self, tracks: Range<usize>, keys: usize) -> usize {
         let key_limit = self.first_key(tracks.start).saturating_add(keys);
         let fits = |track: &TrackRange| track.first_key + track.len <= key_limit;
@@ -269,29 +267,28 @@ impl TrackSet {
         range.map_or(self.keys.len(), |range| range.first_key)
     }
 
-    /// Every track in order.
+    /// All tracks in order.
     #[must_use]
     pub fn tracks(&self) -> impl ExactSizeIterator<Item = Track<'_>> {
         (0..self.tracks.len()).map(|index| self.track(index))
     }
 
-    /// The track's name, or `box1`, `box2` … by its index if it has none, or if there is no such
-    /// track.
+    /// The track's name. If it has none, or the index is out of range, `box1`, `box2` … from the index.
     pub fn track_name(&self, index: usize) -> String {
         let name = self.get(index).and_then(|track| track.name);
         name.map_or_else(|| format!("box{}", index.saturating_add(1)), str::to_owned)
     }
 
-    /// First and last key time over all tracks, seconds; `None` when empty.
+    /// The first and the last key time of all tracks, seconds; `None` if there are none.
     #[must_use]
     pub fn time_span(&self) -> Option<(f64, f64)> {
         self.span
     }
 
-    /// Some tracks as a set of their own, such as `0..10` or a list, in that order.
+    /// Makes a set of some tracks, such as `0..10` or a list, in this order.
     ///
     /// # Errors
-    /// When there is no such track.
+    /// When a track's index is out of range.
     pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Result<Self, TrackError> {
         let mut set = Self::default();
         for index in tracks {
@@ -311,8 +308,8 @@ impl TrackSet {
         Ok(set)
     }
 
-    /// Adds a track whose keys lie in the list already, from `first_key` on. Its times are shared
-    /// with the track before if they are equal, because in many files all tracks have the same.
+    /// Adds a track whose keys are already in the list, from `first_key` on. If the times are equal to those of the
+    /// previous track, the tracks share them, because all tracks of many files have the same times.
     fn add_track(&mut self, name: String, times: &[f64], first_key: usize) {
         let len = times.len();
         let keys = &self.keys[first_key..first_key + len];
@@ -336,7 +333,7 @@ impl TrackSet {
         self.widen_span(times);
     }
 
-    /// Widens the time span to these times.
+    /// Extends the time span to these times.
     pub(crate) fn widen_span(&mut self, times: &[f64]) {
         let track_span = (times[0], times[times.len() - 1]);
         let (first, last) = self.span.unwrap_or(track_span);
@@ -398,7 +395,7 @@ pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
     }
 }
 
-/// Refuses data beside the rotations of which there is not one value for each key.
+/// Refuses additional data that are not one value for each key.
 pub(crate) fn check_length(
     track: usize,
     quantity: &'static str,
@@ -417,7 +414,7 @@ pub(crate) fn check_length(
     }
 }
 
-/// Refuses data that is NaN or infinite at a key.
+/// Refuses additional data that are NaN or infinite.
 pub(crate) fn check_finite<T>(
     track: usize,
     quantity: &'static str,
@@ -434,12 +431,11 @@ pub(crate) fn check_finite<T>(
     }
 }
 
-/// A key whose norm differs from 1 by at most this is kept bit for bit, so that results which are
-/// written and loaded again do not change. Rounding to f32 moves the norm of a unit quaternion by
-/// at most about 2 × 2^-24.
+/// The maximum difference of a key's norm from 1 with which the key keeps its bits, so that results which are written
+/// and loaded again do not change. Rounding to f32 changes the norm of a unit quaternion by at most about 2 × 2^-24.
 pub const UNIT_TOLERANCE: f64 = 4.0e-7;
 
-/// A key as it is kept: unit, and with its tiny components at +0.
+/// A key as it is stored: normalised, with very small components replaced by +0.
 pub(crate) fn unit_key(track: usize, key: usize, quat: Quat) -> Result<Quat, TrackError> {
     let exact: DQuat = quat.as_dquat();
     let norm = exact.length();

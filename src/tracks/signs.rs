@@ -1,28 +1,28 @@
-//! Sign continuation. `q` and `-q` are one rotation, and by the shortest path each key counts
-//! with the sign that is nearer to the key before it. That is worked out once, when keys come
-//! into a set, and kept as one bit for each key.
+//! Signs of keys for the shortest path. `q` and `-q` are the same rotation, and on the shortest path each key has the
+//! sign that is nearer to the key before it. The signs are computed once, when keys are added to a set, and stored as
+//! one bit for each key.
 
 use std::ops::Range;
 
 use crate::math::quaternion::{dot, unit};
 
-/// If the inner product of two keys is within this of zero, they may be exactly half a turn apart,
-/// and its sign may be due to the rounding of f32. Such keys keep the signs given.
+/// If the dot product of two keys is within this of zero, they may be exactly 180° apart, and its sign may be due to
+/// the rounding of f32. Such keys keep their signs.
 const DOT_NOISE: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// An inner product in f32 is within 1e-6 of the exact one, so that its sign is certain if its
-/// magnitude exceeds this.
+/// A dot product in f32 is within 1e-6 of the exact one. Its sign is certain if its magnitude exceeds this.
 const IN_DOUBT: f32 = 1e-5;
 
 const BITS: usize = u64::BITS as usize;
 
-/// For each key of a set, whether it counts with the other sign than it was given; a track's
-/// first key counts as given. Nothing is stored until a key turns, which is rare.
+/// For each key of a set, whether its sign is changed; a track's first key keeps its sign. Nothing is stored until a
+/// sign changes, which is rare.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SignBits {
     bits: Vec<u64>,
-    /// Whether any two neighbouring keys are about half a turn apart or more as they were given.
-    /// If none are, the shortest path and the path as authored are the same.
+    /// Whether any two neighbouring keys, with their original signs, are about 180° apart or more. If not,
+    /// [`KeySigns::Shortest`](crate::KeySigns::Shortest) and [`KeySigns::AsAuthored`](crate::KeySigns::AsAuthored)
+    /// are the same.
     pub(crate) any_long: bool,
 }
 
@@ -65,14 +65,14 @@ pub(crate) struct Signs<'a> {
 }
 
 impl Signs<'_> {
-    /// Every key with the sign that it was given.
+    /// All keys keep their signs.
     pub(crate) const AS_AUTHORED: Self = Self {
         bits: &[],
         first: 0,
         count: usize::MAX,
     };
 
-    /// The signs of a part of these keys.
+    /// The signs of some of these keys.
     #[inline]
     pub(crate) fn between(self, keys: Range<usize>) -> Self {
         Self {
@@ -82,26 +82,26 @@ impl Signs<'_> {
         }
     }
 
-    /// Whether the `i`th key counts with the other sign than it was given.
+    /// Whether the sign of the `i`th key is changed.
     #[inline]
     pub(crate) fn is_negated(self, i: usize) -> bool {
         let key = self.first + i;
         (self.bits.get(key / BITS)).is_some_and(|word| word >> (key % BITS) & 1 == 1)
     }
 
-    /// -1 if the `i`th key counts with the other sign than it was given, else 1.
+    /// -1 if the sign of the `i`th key is changed, otherwise 1.
     #[inline]
     pub(crate) fn sign(self, i: usize) -> f32 {
         if self.is_negated(i) { -1.0 } else { 1.0 }
     }
 
-    /// Whether any key counts with the other sign.
+    /// Whether the sign of any key is changed.
     #[inline]
     pub(crate) fn any(self) -> bool {
         !self.bits.is_empty() && self.words().any(|(word, mask)| word & mask != 0)
     }
 
-    /// The sign of all keys, or `None` if they differ.
+    /// The common factor of all keys, or `None` if they differ.
     pub(crate) fn shared(self) -> Option<f32> {
         if !self.any() {
             return Some(1.0);
@@ -112,7 +112,7 @@ impl Signs<'_> {
         all.then_some(-1.0)
     }
 
-    /// The stored words that have bits of these keys, each with the mask of these bits.
+    /// The stored words that contain bits of these keys, each with a mask of these bits.
     #[inline]
     fn words(self) -> impl Iterator<Item = (u64, u64)> {
         let end = (self.first.saturating_add(self.count)).min(self.bits.len() * BITS);

@@ -12,11 +12,11 @@ use crate::tracks::signs::Signs;
 pub(crate) struct TrackKeys<'a> {
     pub(crate) times: &'a [f64],
     pub(crate) keys: &'a [Quat],
-    /// Their signs along the shortest path.
+    /// The keys' signs for the shortest path.
     pub(crate) signs: Signs<'a>,
     /// The track's index in the set.
     pub(crate) index: usize,
-    /// The index of the first of them in the track.
+    /// The index of the first of these keys in the track.
     pub(crate) first_key: usize,
     /// Number of keys of the whole track.
     pub(crate) track_key_count: usize,
@@ -37,7 +37,7 @@ impl<'a> TrackKeys<'a> {
         }
     }
 
-    /// Of a whole track, the keys of some intervals and up to `beside` more on both sides.
+    /// The keys of some intervals of a whole track, and up to `beside` more keys on each side.
     pub(crate) fn around(self, intervals: &Range<usize>, beside: usize) -> Self {
         let end = self.track_key_count.min(intervals.end + 1 + beside);
         let range = intervals.start.saturating_sub(beside)..end;
@@ -51,7 +51,7 @@ impl<'a> TrackKeys<'a> {
     }
 }
 
-/// Keys of a track with their continued signs; `signs` is `None` where no key is negated.
+/// Keys of a track with their signs; `signs` is `None` if no sign is changed.
 #[derive(Clone, Copy)]
 pub(crate) struct SignedKeys<'a> {
     pub(crate) authored: &'a [[f32; 4]],

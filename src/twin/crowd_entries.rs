@@ -2,7 +2,7 @@
 
 use crate::shader::{CrowdChange, CrowdEntry};
 
-/// The entries of the instances of a list, of so many layers each, side by side.
+/// The entries of the instances of a list, with `layers` layers each, one after another.
 pub(crate) fn gather<'a>(
     all: &'a [CrowdEntry],
     visible: &'a [u32],
@@ -12,7 +12,7 @@ pub(crate) fn gather<'a>(
     visible.iter().flat_map(of).copied()
 }
 
-/// What `scatter` takes.
+/// The input of `scatter`.
 pub(crate) fn change(index: u32, entry: &CrowdEntry) -> CrowdChange {
     CrowdChange {
         index,
@@ -23,7 +23,7 @@ pub(crate) fn change(index: u32, entry: &CrowdEntry) -> CrowdChange {
     }
 }
 
-/// Writes an entry that changed where it belongs.
+/// Writes a changed entry to its index.
 pub(crate) fn scatter(change: &CrowdChange, all: &mut [CrowdEntry]) {
     all[change.index as usize] = CrowdEntry {
         clip_and_weight: change.clip_and_weight,

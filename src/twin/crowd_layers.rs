@@ -12,7 +12,7 @@ use crate::simd::lanes::Number;
 use crate::twin::Evaluate as _;
 use crate::twin::quaternion::over;
 
-/// The function of the shader with this name does what `pose` of `shaders/poses/add.wgsl` does.
+/// The function of the shader with this name is the same as `pose` of `shaders/poses/add.wgsl`.
 pub(crate) use crate::twin::pose_add::pose as rotation_added;
 
 /// The buffers that the kernels over layers read. Entries and positions are those of a window of instances.
@@ -68,7 +68,7 @@ pub(crate) fn laid_over(
     each(|below, layer, inverse, weight| below + below * ((layer * inverse - 1.0) * weight))
 }
 
-/// A channel where its time base stands.
+/// The value of a channel at a position of its time base.
 #[inline(always)]
 pub(crate) fn sampled(
     cells: &[[f32; 4]],
@@ -116,7 +116,7 @@ impl Layers<'_> {
         self.cells[index as usize]
     }
 
-    /// The weight of a layer, and the cells of its mask: the first number of each is its joint's part of it.
+    /// The weight of a layer, and the cells of its mask, whose first numbers are the joints' factors of the weight.
     #[inline(always)]
     pub(crate) fn weight_and_mask(&self, entry: &CrowdEntry) -> (f32, &[[f32; 4]]) {
         let mask = self.masks + ((entry.speed_and_modes >> 24) & 0x1f) * self.joints;
@@ -124,7 +124,7 @@ impl Layers<'_> {
         (weight, &self.cells[mask as usize..][..self.joints as usize])
     }
 
-    /// The pose that a layer's additive clip adds the difference from: the channels of each joint.
+    /// The reference pose of a layer's clip: the channels of each joint.
     #[inline(always)]
     pub(crate) fn references_of(&self, entry: &CrowdEntry) -> &[[f32; 4]] {
         let of_clip = self.joints * CHANNELS;
@@ -147,7 +147,7 @@ impl Layers<'_> {
         sampled(self.cells, channel, self.positions[index as usize])
     }
 
-    /// Lays the layers above the first over its value of a channel.
+    /// Blends the layers above the first over its value of a channel.
     #[inline(always)]
     pub(crate) fn over(
         &self,

@@ -12,7 +12,7 @@ use crate::twin::matrix;
 /// The three rows of an affine matrix for column vectors.
 pub(crate) type Rows = [[f32; 4]; 3];
 
-/// A row of a rotation's matrix with the columns scaled, and the translation behind it.
+/// A row of a rotation's matrix with scaled columns, followed by the translation.
 #[inline(always)]
 pub(crate) fn transform_row(rotated: [f32; 3], scale: [f32; 4], moved: f32) -> [f32; 4] {
     let [x, y, z] = rotated;
@@ -31,8 +31,8 @@ pub(crate) fn transform(rotation: [f32; 4], moved: [f32; 4], scale: [f32; 4]) ->
     ]
 }
 
-/// A row of the product: this row times the rows of the other matrix. The term added to the first three
-/// numbers is 0, which changes none but -0, and the last step makes that +0.
+/// A row of the product: this row times the rows of the other matrix. The term added to the first three numbers is 0,
+/// which has an effect only on -0; the last step makes -0 to +0.
 #[inline(always)]
 pub(crate) fn row_product(row: [f32; 4], other: &Rows) -> [f32; 4] {
     let [first, second, third] = other.map(Vec4::from_array);

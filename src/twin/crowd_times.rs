@@ -28,7 +28,7 @@ pub(crate) fn elapsed(entry: &CrowdEntry, clock: u64) -> u64 {
     clock.wrapping_sub(u64::from(entry.anchor) << 8) & ((1 << ELAPSED_BITS) - 1)
 }
 
-/// The tick of the clip at which a layer stands, from 0 to `period`.
+/// The tick of the clip at which a layer is evaluated, from 0 to `period`.
 #[inline(always)]
 pub(crate) fn tick_of(entry: &CrowdEntry, period: u32, clock: u64) -> u32 {
     let modes = entry.speed_and_modes;
@@ -77,7 +77,7 @@ pub(crate) fn span_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> u32 {
     found
 }
 
-/// Where a layer stands in one of its clip's time bases.
+/// The position of a layer in one of its clip's time bases.
 #[inline(always)]
 pub(crate) fn position_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> CrowdPosition {
     let index = span_at(base, spans, tick);
@@ -91,7 +91,7 @@ pub(crate) fn position_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> C
     }
 }
 
-/// Where a layer stands in every time base of its clip.
+/// The position of a layer in every time base of its clip.
 #[inline(always)]
 pub(crate) fn base_positions(
     entry: &CrowdEntry,

@@ -1,6 +1,6 @@
-//! Twins: the functions of the shaders once more in Rust, with the same names and the same order of
-//! operations, so that the CPU gives the bits of an exact Vulkan device. Those of `shaders/forms/` are
-//! an [`Evaluate`], which the loops over a run's samples call.
+//! Twins: the functions of the shaders in Rust, with the same names and the same order of operations, so that the CPU
+//! gives the bits of an exact Vulkan device. Those of `shaders/forms/` are an [`Evaluate`], which the loops over a
+//! run's samples call.
 
 pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;
@@ -33,8 +33,8 @@ use glam::Vec4;
 
 use crate::simd::lanes::Lanes;
 
-/// The formula of one form, for segments of constants `x y z w`, that of the middle first. A run is
-/// evaluated in iterations, each of as many samples as are computed at once.
+/// The formula of one form, for segments of constants `x y z w`, of which the middle is the first. A run is evaluated
+/// in iterations; each computes several samples at once.
 pub(crate) trait Evaluate: NoUninit {
     /// A number that is the same for all samples of a run.
     #[inline(always)]
@@ -49,9 +49,9 @@ pub(crate) trait Evaluate: NoUninit {
     /// their parameters.
     fn load<L: Lanes>(distances: &[f32]) -> L;
 
-    /// The smallest number of iterations in a run for which it pays to begin samples several iterations
-    /// ahead (software pipelining), if it ever pays. A sample takes a long chain of dependent operations, and a processor
-    /// looks ahead no farther than an iteration or two.
+    /// The minimum number of iterations of a run for software pipelining, in which samples start several iterations
+    /// ahead; `None` if it is never faster. A sample is a long chain of dependent operations, and a processor looks
+    /// ahead no more than an iteration or two.
     const PIPELINE_FROM: Option<usize> = None;
 
     /// Intermediate results of samples of later iterations.
@@ -79,11 +79,10 @@ pub(crate) trait Evaluate: NoUninit {
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
 
-    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any
-    /// sample, so that no filter is needed. Each component is a sum `m + r` with that of the
-    /// segment's middle, `m`. If |m| >= 2^-40, either |r| < |m|/2, and the sum is more than 2^-41;
-    /// or both are multiples of 2^-64, and so is the sum, which is +0 if they cancel. If all
-    /// constants of the component are +0, it is +0.
+    /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample, so that no
+    /// filter is needed. Each component is a sum `m + r`, where `m` is the component of the segment's middle. If |m|
+    /// >= 2^-40, either |r| < |m|/2, and the sum exceeds 2^-41; or both are multiples of 2^-64, and so is the sum,
+    /// which is +0 if they cancel. If all constants of the component are +0, it is +0.
     #[inline(always)]
     fn is_canonical(&self) -> bool {
         let constants: &[[f32; 4]] = bytemuck::cast_slice(slice::from_ref(self));
@@ -92,7 +91,7 @@ pub(crate) trait Evaluate: NoUninit {
     }
 }
 
-/// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] is true for it.
+/// The smallest magnitude of a middle's component for which [`Evaluate::is_canonical`] is true.
 pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is not
@@ -103,8 +102,8 @@ fn are_coarse_or_zero(constants: &[[f32; 4]]) -> bool {
     (0..4).all(|c| constants[0][c].abs() >= COARSE || is_zero(c))
 }
 
-/// The parameters of a run's samples, an iteration at a time. After the last sample it gives more
-/// numbers, of which nothing is used.
+/// The parameters of a run's samples, one iteration at a time. After the last sample there are more numbers, which
+/// are not used.
 pub(crate) trait Parameters<L> {
     fn next(&mut self) -> L;
 }

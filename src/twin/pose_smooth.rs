@@ -43,7 +43,7 @@ pub(crate) fn moved(value: [f32; 4], sum: [f32; 4], are_rotations: bool) -> [f32
     moved.map(canonical)
 }
 
-/// The whole function of the shader: `steps` begin at the first that reaches the value at index 0.
+/// The whole function of the shader; `steps` starts with the first step that affects the value at index 0.
 pub(crate) fn pose(
     values: &[[f32; 4]],
     steps: &[[f32; 4]],

@@ -35,8 +35,7 @@ pub(crate) fn scaled(rotation: [f32; 4], square: f32, ratio: f32) -> [f32; 4] {
     ]
 }
 
-/// The function of the shader, whose parts are functions of their own: see
-/// [`rows`](crate::smooth::rows).
+/// The function of the shader; its parts are separate functions for [`rows`](crate::smooth::rows).
 #[inline(always)]
 pub(crate) fn rotation_step(from: [f32; 4], to: [f32; 4]) -> [f32; 4] {
     let rotation = relative_rotation(from, to);

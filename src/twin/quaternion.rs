@@ -42,8 +42,8 @@ pub(crate) fn chord<N: Number>(a: [N; 4], b: [N; 4]) -> ([N; 4], [N; 4]) {
     (sum, difference)
 }
 
-/// The rotation at an angle from the middle of a chord, whose sine and cosine are given, with the inverse
-/// lengths of the sum and of the difference.
+/// The rotation at an angle from the middle of a chord, for the angle's sine and cosine and the inverse lengths of
+/// the sum and of the difference.
 #[inline(always)]
 pub(crate) fn along<N: Number>(
     sum: [N; 4],
@@ -59,7 +59,7 @@ pub(crate) fn along<N: Number>(
     ]
 }
 
-/// The function of the shader, whose parts are functions of their own for blocks of rotations
+/// The function of the shader; its parts are separate functions for blocks of rotations
 /// ([`lay_over`](crate::crowd::lay_over)).
 #[inline(always)]
 pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {

@@ -2,7 +2,7 @@
 
 use crate::shader::SNORM_SHIFT;
 
-/// The whole number of 1/32767 nearest to a value, ties to even, in its 16 bits.
+/// The multiple of 1/32767 nearest to a value, ties to even, in its 16 bits.
 #[inline(always)]
 pub(crate) fn to_snorm(value: f32) -> u16 {
     ((value * 32767.0 + SNORM_SHIFT).to_bits() & 0xffff) as u16

@@ -1,4 +1,4 @@
-//! Results of somebody else's kernels, compared with the engine's bits and with the f64 reference.
+//! Comparison of another implementation's results with the engine's bits and with the f64 reference.
 
 use std::borrow::Cow;
 
@@ -14,55 +14,56 @@ use crate::tracks::rotation::Rotation;
 use crate::tracks::set::TrackSet;
 use crate::verify::{Errors, NORM_BOUND, SamplePosition, differences, error_bound, norm_excess};
 
-/// What [`compare`] found of results that were not this engine's.
+/// The result of [`compare`].
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Comparison {
     /// The method's name.
     pub method: &'static str,
-    /// Rotations compared.
+    /// The number of compared rotations.
     pub rotations: u64,
-    /// Rotations whose bits are not the engine's, which are the same on every device.
+    /// The number of rotations whose bits differ from the engine's (which are the same on every device).
     pub differing: u64,
-    /// Those of them that are the engine's with the other sign: `q` and `-q` are one rotation.
+    /// The number of those rotations that equal the engine's with the other sign: `q` and `-q` are the same rotation.
     pub of_other_sign: u64,
-    /// The first whose bits differ.
+    /// The first rotation whose bits differ.
     pub first_difference: Option<SamplePosition>,
-    /// Largest angle between their result and the reference, radians.
+    /// The largest angle between the compared rotations and the reference, radians.
     pub max_error: f64,
-    /// Root mean square of that angle, radians.
+    /// The root mean square of that angle, radians.
     pub rms_error: f64,
-    /// Where the largest error is.
+    /// The sample with the largest error.
     pub worst: Option<SamplePosition>,
-    /// Largest | |q| - 1 | of theirs.
+    /// The largest | |q| - 1 | of the compared rotations.
     pub max_norm_error: f64,
-    /// Largest angle between the engine's result and the reference, radians.
+    /// The largest angle between the engine's result and the reference, radians.
     pub engine_error: f64,
-    /// The largest `max_error` that the engine allows itself, radians.
+    /// The bound of `max_error` for the engine, radians.
     pub error_bound: f64,
-    /// The largest `max_norm_error` that the engine allows itself.
+    /// The bound of `max_norm_error` for the engine.
     pub norm_bound: f64,
 }
 
-/// What results were like. Of several, the greatest is that of all.
+/// The agreement of results with the engine and the reference. The agreement of several comparisons is the greatest
+/// of theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Agreement {
-    /// They have the engine's bits, within their bounds of the f64 reference.
+    /// The bits are the engine's, and the errors are within the bounds.
     SameBits,
-    /// Other bits than the engine's, but as near to the f64 reference as the engine's have to be.
+    /// Some bits differ from the engine's, but the errors against the f64 reference are within the engine's bounds.
     WithinBounds,
-    /// There was no rotation: nothing was compared with anything.
+    /// There were no rotations, so nothing was compared.
     Nothing,
-    /// An error is over its bound, or a number is NaN.
+    /// An error exceeds its bound, or a number is NaN.
     OutsideBounds,
 }
 
 impl Comparison {
-    /// What came of it.
+    /// The agreement that these numbers show.
     #[must_use]
     pub fn agreement(&self) -> Agreement {
         let is_within_bounds =
@@ -76,7 +77,7 @@ impl Comparison {
     }
 }
 
-/// What was compared with what, and what came of it, in one line.
+/// The comparison and its result, in one line.
 impl std::fmt::Display for Comparison {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
@@ -111,12 +112,12 @@ impl std::fmt::Display for Comparison {
     }
 }
 
-/// Compares results of somebody else's kernels with the bits of the engine, which its CPU gives, and with the
-/// f64 reference: for tests of a renderer's or a game's own way to sample clips. `theirs` has the samples of
-/// the first track, then those of the second, and so on, `x y z w`.
+/// Compares results of another implementation with the engine's bits, which the CPU computes, and with the f64
+/// reference. It is for tests of a renderer's or game's code that samples clips. `theirs` has the samples of the
+/// first track, then those of the second, and so on, `x y z w`.
 ///
-/// It knows nothing of where `theirs` were made. A test of a GPU asks for one by
-/// [`Device::first_vulkan`](crate::Device::first_vulkan), and so fails where there is none.
+/// This function does not know which device computed `theirs`. A test of a GPU should call
+/// [`Device::first_vulkan`](crate::Device::first_vulkan), which fails if there is no Vulkan device.
 ///
 /// ```
 /// use tumble::{SampleTimes, TrackSet, method};
@@ -134,8 +135,8 @@ impl std::fmt::Display for Comparison {
 /// ```
 ///
 /// # Errors
-/// As [`Engine::evaluate`]; and [`Error::ComparedLength`] when `theirs` are not one rotation for each sample of
-/// each track.
+/// As [`Engine::evaluate`]; and [`Error::ComparedLength`] when `theirs` has not one rotation for each sample of each
+/// track.
 pub fn compare<R: Rotation>(
     set: &TrackSet,
     interpolation: Interpolation,
@@ -176,7 +177,7 @@ pub fn compare<R: Rotation>(
     })
 }
 
-/// As quaternions, which lie at multiples of 16 bytes; copied where these do not.
+/// The rotations as quaternions, aligned to 16 bytes; copied if they are not aligned.
 fn quats<R: Rotation>(rotations: &[R]) -> Result<Cow<'_, [Quat]>, OutOfMemoryError> {
     if let Ok(quats) = bytemuck::try_cast_slice(rotations) {
         return Ok(Cow::Borrowed(quats));

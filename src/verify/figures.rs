@@ -1,5 +1,5 @@
-//! How fast a device is, by its own time stamps, on a renderer's device ([`mod@crate::verify::renderer`]): memory,
-//! the bus, a submission, and the engine's cases as shares of these.
+//! Speed of a device by its time stamps, on a renderer's device ([`mod@crate::verify::renderer`]): memory, the bus, a
+//! submission, and the engine's cases relative to these.
 
 use std::time::{Duration, Instant};
 
@@ -18,27 +18,26 @@ use crate::verify::golden::GoldenError;
 use crate::verify::renderer::{Renderer, record, record_clip};
 use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, shared_set};
 
-/// Seconds of the keys of the cases: 26 keys, 0.8 s apart.
+/// The duration of the keys of the cases, seconds: 26 keys, 0.8 s apart.
 const SECONDS: f64 = 20.0;
 
-/// What was measured. Rates are bytes a second; each figure is the median of several runs behind one that
-/// does not count.
+/// Measured speeds. Rates are bytes per second. Each figure is the median of several runs after a run that is
+/// ignored.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Figures {
-    /// `device` where the device has time stamps, else `host`: the clock of the rates and of
-    /// [`FigureCase::seconds`].
+    /// The clock of the rates and of [`FigureCase::seconds`]: `device` if the device has time stamps, else `host`.
     pub clock: &'static str,
-    /// Bytes of each buffer that was filled and copied.
+    /// The size of each buffer that was filled and copied, bytes.
     pub buffer_bytes: u64,
-    /// Filling memory of the device's own (`vkCmdFillBuffer`).
+    /// The rate of filling device memory (`vkCmdFillBuffer`).
     pub fill_rate: f64,
-    /// Copying from the device's own memory into the device's own; bytes written.
+    /// The rate of copying within device memory; only written bytes are counted.
     pub device_copy_rate: f64,
-    /// Copying from the host's memory to the device's.
+    /// The rate of copying from host memory to device memory.
     pub upload_rate: f64,
-    /// Copying from the device's memory to the host's.
+    /// The rate of copying from device memory to host memory.
     pub download_rate: f64,
-    /// Seconds from submitting nothing until its fence is seen, by the host's clock.
+    /// The time from submitting an empty command buffer until the host saw its fence, seconds of the host's clock.
     pub submit_and_fence: f64,
     /// The engine's cases.
     pub cases: Vec<FigureCase>,
@@ -49,32 +48,32 @@ pub struct Figures {
 pub struct FigureCase {
     /// `resident`, `read-back`, `crowd` or `encoded`.
     pub case: &'static str,
-    /// What is evaluated.
+    /// A description of the case.
     pub name: String,
-    /// Values of the result: rotations, or joints.
+    /// The number of the result's values: rotations, or joints.
     pub values: u64,
-    /// Bytes of the result.
+    /// The size of the result, bytes.
     pub bytes: u64,
-    /// Seconds from first asking, keys to result, kernels not compiled yet.
+    /// The time of the first call, from keys to the result, including compilation of kernels, seconds.
     pub first_call: f64,
-    /// Seconds of later calls.
+    /// The time of later calls, seconds.
     pub seconds: f64,
-    /// Seconds of later calls by the host's clock.
+    /// The time of later calls by the host's clock, seconds.
     pub host_seconds: f64,
-    /// Seconds in which the host recorded a later call into commands; none where it was not recorded.
+    /// The time in which the host recorded a later call into commands, seconds; `None` if the case is not recorded.
     pub record_seconds: Option<f64>,
-    /// Bytes of the result in a second.
+    /// The rate of the result, bytes per second.
     pub rate: f64,
-    /// `fill` or `download`: the limit.
+    /// The figure that limits the rate: `fill` or `download`.
     pub limit: &'static str,
-    /// The share of the limit that the rate is.
+    /// The rate as a fraction of that figure.
     pub share: f64,
 }
 
-/// Measures, for about `budget`: cases for which no time is left are left out.
+/// Measures the figures in about the time `budget`. Cases for which no time remains are omitted.
 ///
 /// # Errors
-/// When the device cannot be made, or fails.
+/// When the device cannot be opened, or fails.
 pub fn figures(device: &VulkanDevice, budget: Duration) -> Result<Figures, GoldenError> {
     let deadline = Instant::now() + budget;
     let is_software = matches!(device.info().kind, DeviceKind::Cpu | DeviceKind::Other);
@@ -116,7 +115,7 @@ fn median(mut times: Vec<Duration>) -> f64 {
         .map_or(0.0, Duration::as_secs_f64)
 }
 
-/// The median of up to seven runs behind the first, fewer where they take long.
+/// The median of up to seven runs after the first one; of fewer if they take long.
 fn measured<T>(mut run: impl FnMut() -> Result<T, Error>) -> Result<(T, Vec<T>), Error> {
     const RUNS: usize = 7;
     const LONG: Duration = Duration::from_millis(700);
@@ -128,7 +127,7 @@ fn measured<T>(mut run: impl FnMut() -> Result<T, Error>) -> Result<(T, Vec<T>),
     Ok((first, runs))
 }
 
-/// Seconds by the device's clock, where every run has them, and by the host's.
+/// The time by the device's clock, if every run has it, and by the host's clock, seconds.
 fn seconds(runs: &[Elapsed]) -> (Option<f64>, f64) {
     let on_device: Option<Vec<_>> = runs.iter().map(|run| run.on_device).collect();
     let on_host = runs.iter().map(|run| run.on_host).collect();
@@ -140,7 +139,7 @@ impl Bench {
         Instant::now() > self.deadline
     }
 
-    /// Seconds by the clock that counts.
+    /// The time by the clock of the figures, seconds.
     fn clocked(&mut self, (on_device, on_host): (Option<f64>, f64)) -> f64 {
         if on_device.is_none() {
             self.figures.clock = "host";
@@ -152,7 +151,7 @@ impl Bench {
         Ok((self.renderer.application).buffer(size, ApplicationMemory::Device)?)
     }
 
-    /// The bytes a second of commands that are recorded for each run.
+    /// The rate of commands that are recorded for each run, bytes per second.
     fn rate(
         &mut self,
         bytes: u64,
@@ -198,7 +197,7 @@ impl Bench {
         Ok(())
     }
 
-    /// How many tracks a set of the cases has.
+    /// The number of tracks of the cases' sets.
     fn tracks(&self) -> usize {
         if self.is_software { 256 } else { 4096 }
     }
@@ -238,7 +237,7 @@ impl Bench {
         });
     }
 
-    /// How long the last case took to record, each time; the first does not count.
+    /// Sets the median time of recording the last case; the first time is ignored.
     fn recorded_in(&mut self, mut times: Vec<Duration>) {
         times.remove(0);
         if let Some(case) = self.figures.cases.last_mut() {
@@ -246,7 +245,7 @@ impl Bench {
         }
     }
 
-    /// One clip, kept on the device, whose result stays there.
+    /// A clip on the device whose result stays there.
     fn kept(
         &mut self,
         case: &'static str,
@@ -290,7 +289,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Keys that are held come first: nothing is computed, and what is left is the rate of the kernels' stores.
+    /// Cases of results on the device. The first has constant keys: nothing is computed, so it measures the rate of
+    /// the kernels' stores.
     fn resident(&mut self) -> Result<(), Error> {
         for method in [method::STEP, method::SLERP, method::BESSEL_OVERHAUSER] {
             self.kept("resident", method, Encoding::F32, Layout::TrackMajor)?;
@@ -307,7 +307,7 @@ impl Bench {
         self.kept("encoded", method::SLERP, Encoding::F32, Layout::FrameMajor)
     }
 
-    /// The same clips, read back into memory of the engine's choice, which is used again.
+    /// The same clips, with results that are read back into memory of the engine's choice, which is reused.
     fn read_back(&mut self) -> Result<(), Error> {
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
             if self.is_over() {
@@ -400,7 +400,7 @@ impl Bench {
     }
 }
 
-/// What the engine says of its last call.
+/// The times that the engine reports of its last call.
 fn elapsed(engine: &Engine, on_host: Duration) -> Elapsed {
     let timings = engine.take_timings();
     Elapsed {

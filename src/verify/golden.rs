@@ -1,10 +1,10 @@
-//! Golden hashes: SHA-256 of the bytes of some hundred results, recorded once in `golden.txt` and the same
-//! ever after, on the CPU at every vector width and on every Vulkan device, whichever way its kernels
-//! read and its results are copied.
+//! Golden hashes: hashes of the bytes of some hundred results, recorded in `golden.txt`. They must never change, on
+//! the CPU at every vector width and on every Vulkan device, regardless of how its kernels read and its results are
+//! copied. A hash is the first 64 bits of the SHA-256.
 //!
-//! They catch any change of a bit that all devices make alike, which comparing devices with each other
-//! cannot show. The inputs are made by arithmetic that every machine rounds alike. A hash that changes is
-//! a change of the engine's promise.
+//! They detect changes that all devices make in the same way, which a comparison of devices cannot show. The inputs
+//! are computed with arithmetic that every machine rounds in the same way. A changed hash breaks the engine's
+//! guarantee.
 //!
 //! ```
 //! use tumble::{Device, Engine, verify::golden::Golden};
@@ -53,24 +53,24 @@ const RECORDED: &str = include_str!("golden.txt");
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GoldenError {
-    /// Of a set of tracks.
+    /// The error of a set of tracks.
     #[error(transparent)]
     Evaluate(#[from] Error),
-    /// Of a crowd.
+    /// The error of a crowd.
     #[error(transparent)]
     Crowd(#[from] CrowdError),
 }
 
-/// What an engine makes of a case.
+/// The result of a case on an engine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GoldenResult {
     /// The first 64 bits of the SHA-256 of all bytes, in hexadecimal digits.
     pub hash: String,
-    /// How many bytes there are.
+    /// The number of bytes.
     pub bytes: u64,
 }
 
-/// The cases: each a set, and what is evaluated of it.
+/// The cases: each is a set and an evaluation of it.
 pub struct Golden {
     sets: BTreeMap<&'static str, TrackSet>,
     cases: Vec<Case>,
@@ -83,15 +83,15 @@ struct Case {
 }
 
 enum Evaluation {
-    /// From keys, in one go.
+    /// From keys, in one call.
     Set(Interpolation, SampleTimes, Layout),
-    /// From a clip that stays on the device, encoded.
+    /// From a clip on the device, in an encoding.
     Encoded(Interpolation, SampleTimes, Layout, Encoding),
     /// In chunks.
     Stream(Interpolation, SampleTimes, Layout),
     /// Translations, rotations and scales.
     Transforms(Interpolation, VectorMethod, SampleTimes),
-    /// Layers blended, mixed and added, and walked down a skeleton.
+    /// Layers that are blended, mixed and added, and a skeleton.
     Poses,
     /// Bodies on paths.
     Follow(Box<Follow>),
@@ -101,7 +101,7 @@ enum Evaluation {
     Crowd(CrowdMix, CrowdOutput),
 }
 
-/// What the instances of a crowd play.
+/// The clips of a crowd's instances.
 #[derive(Clone, Copy)]
 struct CrowdMix {
     name: &'static str,
@@ -132,7 +132,7 @@ const SEVERAL: CrowdMix = CrowdMix {
     layers: 3,
 };
 
-/// Ticks by which the clock goes on between the evaluations of a crowd: the last ones are a day and more.
+/// Steps of the clock between the evaluations of a crowd, ticks. The last step is more than a day.
 const CLOCK: [u64; 4] = [0, 11_760, 1 << 33, 61_000_000_000];
 
 impl Default for Golden {
@@ -146,7 +146,7 @@ fn shortest(method: Method) -> Interpolation {
 }
 
 impl Golden {
-    /// Makes the sets and names the cases. The sets take some ten megabytes.
+    /// Makes the sets and names the cases. The sets take about ten megabytes.
     #[must_use]
     pub fn new() -> Self {
         let uneven = random_set(2, 7, 26, &[0.05, 0.3, 0.9], false);
@@ -207,7 +207,7 @@ impl Golden {
         );
     }
 
-    /// Every kind of path, direction, frame and speed.
+    /// Cases for every kind of path, direction, frame and speed.
     fn paths(&mut self) {
         let eased = PathSpeed::Eased {
             start: 0.2,
@@ -266,7 +266,7 @@ impl Golden {
         }
     }
 
-    /// Every kernel.
+    /// Cases for every smoothing kernel.
     fn smoothing(&mut self) {
         for name in [
             "linear",
@@ -289,7 +289,7 @@ impl Golden {
         }
     }
 
-    /// Every method, on every kind of keys, and its derivatives.
+    /// Cases for every method with every kind of keys, and for its derivatives.
     fn methods(&mut self) {
         let frames = SampleTimes::fps(60).between(-1.0, 9.0);
         for method in METHODS {
@@ -317,7 +317,7 @@ impl Golden {
         }
     }
 
-    /// Every encoding in both layouts, and results in chunks.
+    /// Cases for every encoding in both layouts, and for results in chunks.
     fn outputs(&mut self) {
         let frames = SampleTimes::fps(30);
         for encoding in Encoding::ALL {
@@ -348,7 +348,7 @@ impl Golden {
         }
     }
 
-    /// Ends, paths, speeds, and what lies outside the keys.
+    /// Cases for ends, key signs, speeds, and wrap modes.
     fn options(&mut self) {
         let frames = SampleTimes::fps(50).between(-7.0, 21.0);
         let times = SampleTimes::at(
@@ -475,8 +475,8 @@ impl Golden {
         self.rows("closed", "slerp velocity Loop", velocity, &frames);
     }
 
-    /// Every route from keys to results: by segments, straight from keys, by single samples,
-    /// a long track piece by piece.
+    /// Cases for every route from keys to results: by segments, directly from keys, by single samples, and piece by
+    /// piece for a long track.
     fn routes(&mut self) {
         let methods = [
             method::STEP,
@@ -554,8 +554,8 @@ impl Golden {
         }
     }
 
-    /// Every form of a crowd's results, in both precisions, of arcs alone in two layers and of several
-    /// methods in three.
+    /// Cases for every kind of a crowd's results, in both precisions: arcs only in two layers, and several methods in
+    /// three.
     fn crowds(&mut self) {
         use CrowdValues::{Local, Model, Rotations, Skinning};
         for mix in [ARCS, SEVERAL] {
@@ -573,7 +573,7 @@ impl Golden {
         }
     }
 
-    /// How many cases there are.
+    /// Number of cases.
     #[must_use]
     pub fn case_count(&self) -> usize {
         self.cases.len()
@@ -588,7 +588,7 @@ impl Golden {
         &self.cases[case].name
     }
 
-    /// The hash that is recorded for a case's name.
+    /// The recorded hash of the case with this name.
     #[must_use]
     pub fn recorded(name: &str) -> Option<&'static str> {
         static TABLE: OnceLock<BTreeMap<&str, &str>> = OnceLock::new();
@@ -599,22 +599,22 @@ impl Golden {
         table.get(name).copied()
     }
 
-    /// The recorded hashes as they are kept: a line of a hash and a name for each case.
+    /// The recorded hashes as text: a line with a hash and a name for each case.
     #[must_use]
     pub fn table() -> &'static str {
         RECORDED
     }
 
-    /// How many hashes are recorded.
+    /// Number of recorded hashes.
     #[must_use]
     pub fn recorded_count() -> usize {
         RECORDED.lines().count()
     }
 
-    /// What an engine makes of a case.
+    /// Evaluates a case on an engine.
     ///
     /// # Errors
-    /// As the calls of the engine.
+    /// As the engine's functions.
     ///
     /// # Panics
     /// When there is no such case.
@@ -628,7 +628,7 @@ impl Golden {
     }
 }
 
-/// The hash of all bytes that are added.
+/// A hash of all bytes that are added.
 #[derive(Default)]
 struct Hash {
     sha: Sha256,

@@ -1,8 +1,6 @@
-//! Verification: does a device give the CPU's bits, and how far are both from the
-//! f64 reference?
+//! Verification: whether a device gives the CPU's bits, and how far both are from the f64 reference.
 //!
-//! The last word on every result: nothing here trusts what the engine says about
-//! itself. The reference shares no code with the kernels.
+//! Verification does not rely on the engine's reports about itself. The reference shares no code with the kernels.
 
 mod comparison;
 #[cfg(feature = "prove")]
@@ -37,10 +35,10 @@ use crate::time::frame_clock::rounding;
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 
-/// Largest allowed distance of a quaternion's norm from 1.
+/// The bound of a quaternion norm's distance from 1.
 pub const NORM_BOUND: f64 = 4e-7;
 
-/// Largest allowed error of a form against the reference, radians.
+/// The bound of errors against the reference for a form, radians.
 #[must_use]
 pub fn error_bound(form: Form) -> f64 {
     match form {
@@ -49,53 +47,51 @@ pub fn error_bound(form: Form) -> f64 {
     }
 }
 
-/// What [`verify`] found for one set and one method.
+/// The result of [`verify`] for one set and one method.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Verification {
     /// The method's name.
     pub method: &'static str,
-    /// The Vulkan device; `None` when the engine is the CPU's, and nothing was
-    /// compared between devices.
+    /// The Vulkan device; `None` if the engine is the CPU, so that no devices were compared.
     pub device: Option<String>,
-    /// Rotations compared.
+    /// The number of compared rotations.
     pub rotations: u64,
-    /// Rotations whose bits differ between the device and the CPU.
+    /// The number of rotations whose bits differ between the device and the CPU.
     pub differing: u64,
-    /// The first of them.
+    /// The first rotation whose bits differ.
     pub first_difference: Option<SamplePosition>,
-    /// Largest angle between a result and the reference, radians.
+    /// The largest angle between a result and the reference, radians.
     pub max_error: f64,
-    /// Root mean square of that angle, radians.
+    /// The root mean square of that angle, radians.
     pub rms_error: f64,
-    /// Where the largest error is.
+    /// The sample with the largest error.
     pub worst: Option<SamplePosition>,
-    /// Largest | |q| - 1 |.
+    /// The largest | |q| - 1 |.
     pub max_norm_error: f64,
-    /// The largest `max_error` allowed, radians.
+    /// The bound of `max_error`, radians.
     pub error_bound: f64,
-    /// The largest `max_norm_error` allowed: [`NORM_BOUND`], and by how much a key's own norm is
-    /// farther from 1 than rounding to f32 makes it.
+    /// The bound of `max_norm_error`: [`NORM_BOUND`], plus the excess of the keys' norm errors over rounding to f32.
     pub norm_bound: f64,
-    /// One report for each output that follows from the rotations.
+    /// The results for all outputs that are computed from the rotations.
     pub outputs: Vec<OutputVerification>,
 }
 
-/// One rotation of a result.
+/// The location of a rotation in a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SamplePosition {
     /// The index of the track in the set.
     pub track: usize,
-    /// The frame: the index of the sample.
+    /// The index of the sample.
     pub frame: usize,
-    /// Its time, seconds.
+    /// The time of the sample, seconds.
     pub time: f64,
 }
 
 impl SamplePosition {
-    /// Of a rotation by its index in a track-major result.
+    /// The location of the rotation at an index of a track-major result.
     fn new(timeline: &Timeline, index: usize) -> Self {
         let (track, frame) = (index / timeline.len(), index % timeline.len());
         let time = timeline.time_at(track, frame);
@@ -103,20 +99,20 @@ impl SamplePosition {
     }
 }
 
-/// What a comparison came to. Of several, the greatest is that of all.
+/// The verdict of a comparison. The verdict of several comparisons is the greatest of theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Verdict {
-    /// A Vulkan device gives the CPU's bits, and they are within their bounds of the f64 reference.
+    /// A Vulkan device gives the CPU's bits, and the errors against the f64 reference are within their bounds.
     Passed,
-    /// The CPU's results are within their bounds of the f64 reference. No Vulkan device took part, so
-    /// that no two devices were compared.
+    /// The errors of the CPU's results against the f64 reference are within their bounds. No Vulkan device was
+    /// compared.
     ReferenceOnly,
-    /// There was no sample: nothing was compared with anything.
+    /// There were no samples, so nothing was compared.
     Nothing,
-    /// Bits differ between the device and the CPU, or an error is over its bound.
+    /// Bits differ between the device and the CPU, or an error exceeds its bound.
     Failed,
 }
 
@@ -140,7 +136,7 @@ impl std::fmt::Display for Verdict {
 }
 
 impl Verification {
-    /// What was compared with what, and what came of it.
+    /// The verdict that these numbers show.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let is_within_bounds = self.max_error <= self.error_bound
@@ -154,17 +150,16 @@ impl Verification {
         }
     }
 
-    /// Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
-    /// their bounds. `false` where nothing was compared, and on an engine of the CPU's: see
-    /// [`Verification::verdict`].
+    /// Whether a Vulkan device was compared with the CPU, all bits agree, and all errors are within their bounds.
+    /// `false` for an engine on the CPU, and if there were no samples; see [`Verification::verdict`].
     #[must_use]
     pub fn passes(&self) -> bool {
         self.verdict() == Verdict::Passed
     }
 }
 
-/// Evaluates on the engine, on the CPU and with the reference, and compares every
-/// rotation and all that follows from it: velocities, accelerations, encodings.
+/// Evaluates a set on the engine's device, on the CPU and with the reference, and compares every rotation and all
+/// outputs that are computed from it: velocities, accelerations, encodings.
 ///
 /// ```
 /// use tumble::{Engine, SampleTimes, TrackSet, method};
@@ -219,21 +214,20 @@ pub fn verify(
     })
 }
 
-/// By how much the norms of keys differ from 1, beyond what rounding a unit quaternion to f32 does.
-/// Keys within [`UNIT_TOLERANCE`](crate::tracks::set::UNIT_TOLERANCE) are kept as they are, and
-/// curves through them are as long as they.
+/// The largest excess of the keys' norm errors over that of a unit quaternion rounded to f32. Keys within
+/// [`UNIT_TOLERANCE`](crate::tracks::set::UNIT_TOLERANCE) keep their norm, and curves through them have it too.
 fn norm_excess(set: &TrackSet) -> f64 {
     let keys = set.tracks().flat_map(|track| track.keys);
     let off = keys.map(|key| (key.as_dquat().length() - 1.0).abs());
     (off.fold(0.0, f64::max) - f64::from(f32::EPSILON)).max(0.0)
 }
 
-/// The times of a track's keys, and what they count from: a whole second near the first, so that f64 has
-/// them and the samples between them without rounding however late they are.
+/// The times of a track's keys, relative to a whole second near the first one, so that key times and sample times are
+/// exact in f64 even if they are large.
 struct KeyTimes {
     from: f64,
     times: Vec<f64>,
-    /// The largest magnitude of a time as it is.
+    /// The largest magnitude of an absolute time.
     latest: f64,
     steps: bool,
 }
@@ -255,9 +249,8 @@ impl KeyTimes {
         timeline.moment_at(track, sample).since(self.from)
     }
 
-    /// The least error at the moments that a sample may stand for: its time, and a key that is within
-    /// the rounding of that time ([`rounding`]), to which it counts. There a curve may jump, or its
-    /// velocity.
+    /// The smallest error at the times that a sample may represent: its time, and the time of a key that is equal to
+    /// it within rounding ([`rounding`]), because the curve or its velocity may jump there.
     fn least_error(&self, time: f64, error: impl Fn(f64) -> f64) -> f64 {
         let latest = self.latest.max((time + self.from).abs());
         let rounding = 2.0 * rounding(latest, self.steps);
@@ -268,12 +261,12 @@ impl KeyTimes {
     }
 }
 
-/// NaN is as wrong as can be, and must not slip through comparisons.
+/// The error, or infinity for NaN, which would pass comparisons.
 fn worse(error: f64) -> f64 {
     if error.is_nan() { f64::INFINITY } else { error }
 }
 
-/// How many values of `size` elements each differ in their bits, and the first that does.
+/// The number of values, of `size` elements each, whose bits differ, and the index of the first one.
 fn differences<T: NoUninit>(a: &[T], b: &[T], size: usize) -> (u64, Option<usize>) {
     let values = |all| bytemuck::cast_slice::<T, u8>(all).chunks(size * size_of::<T>());
     let mut differing = (0..)
@@ -283,18 +276,18 @@ fn differences<T: NoUninit>(a: &[T], b: &[T], size: usize) -> (u64, Option<usize
     (u64::from(first.is_some()) + differing.count() as u64, first)
 }
 
-/// A result against the reference.
+/// The errors of a result against the reference.
 struct Errors {
-    /// Largest angle, and root mean square, radians.
+    /// The largest angle, and the root mean square, radians.
     max: f64,
     rms: f64,
     worst: Option<SamplePosition>,
-    /// Largest | |q| - 1 |.
+    /// The largest | |q| - 1 |.
     norm: f64,
 }
 
 impl Errors {
-    /// Of a track-major result.
+    /// Measures the errors of a track-major result.
     fn measure(
         set: &TrackSet,
         interpolation: Interpolation,
@@ -327,15 +320,15 @@ impl Errors {
     }
 }
 
-/// One track against the reference.
+/// The errors of one track against the reference.
 #[derive(Default)]
 struct TrackErrors {
-    /// Largest angle, radians, and its sample.
+    /// The largest angle, radians, and its sample.
     max: f64,
     worst: usize,
-    /// Sum of the squared angles.
+    /// The sum of the squared angles.
     squares: f64,
-    /// Largest | |q| - 1 |.
+    /// The largest | |q| - 1 |.
     norm: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Verifies what follows from rotations: velocities, accelerations, poses in the world, and every
+//! Verification of outputs that are computed from rotations: velocities, accelerations, poses in the world, and every
 //! encoding.
 
 use glam::{DQuat, Quat, Vec3};
@@ -19,22 +19,22 @@ use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 use crate::verify::{KeyTimes, differences, worse};
 
-/// What was found of one output.
+/// The result of the verification of one output.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct OutputVerification {
-    /// Its name.
+    /// The output's name.
     pub output: String,
-    /// Values compared between the device and the CPU: one for each track and sample.
+    /// The number of values compared between the device and the CPU: one for each track and sample.
     pub values: u64,
-    /// Values whose bits differ.
+    /// The number of values whose bits differ.
     pub differing: u64,
-    /// Largest error against the reference: in radians for rotations, relative to the track's
-    /// largest value for velocities and accelerations, which counts as at least a thousandth of a
-    /// radian an interval (an interval squared) of mean length.
+    /// The largest error against the reference: in radians for rotations, and relative to the track's largest value
+    /// for velocities and accelerations. That value counts as at least a thousandth of a radian per key interval of
+    /// mean length (per square of it for accelerations).
     pub max_error: f64,
-    /// The largest error allowed.
+    /// The bound of the error.
     pub error_bound: f64,
 }
 
@@ -53,7 +53,7 @@ const QUANTITIES: [(&str, Quantity); 4] = [
     ("acceleration, parent", Quantity::Acceleration(Axes::Parent)),
 ];
 
-/// Samples of a method's derivatives that are compared with the reference, which is slow.
+/// The maximum number of samples whose derivatives are compared with the reference, which is slow.
 const RATES_CHECKED: usize = 4096;
 
 /// Verifies every output of one method.
@@ -200,8 +200,8 @@ fn rate_error(
     })
 }
 
-/// The least scale of errors: a thousandth of a radian in a key interval of mean length, or in its
-/// square for accelerations. A curve that turns evenly has no acceleration but rounding.
+/// The smallest scale of errors: a thousandth of a radian per key interval of mean length, or per square of it for
+/// accelerations. The acceleration of a rotation at constant velocity is only rounding.
 fn rate_floor(keys: &[f64], quantity: Quantity) -> f64 {
     let mean = match keys {
         [first, .., last] => (last - first) / (keys.len() - 1) as f64,
@@ -213,7 +213,7 @@ fn rate_floor(keys: &[f64], quantity: Quantity) -> f64 {
     }
 }
 
-/// Some times within the key interval of a time; the time itself outside the keys.
+/// Some times within the key interval of a time; outside the keys the time itself.
 fn within_interval(keys: &[f64], time: f64) -> [f64; 3] {
     let after = keys.partition_point(|&key| key <= time);
     let (Some(before), Some(&end)) = (after.checked_sub(1), keys.get(after)) else {

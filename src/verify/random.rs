@@ -1,5 +1,5 @@
-//! Random sets and crowds, hostile ones, evaluated on a device and on the CPU: rounds that a seed decides,
-//! the same on every machine, for as long as there is time.
+//! Rounds of random sets and crowds with extreme inputs, evaluated on a device and on the CPU. A seed determines the
+//! rounds; they are the same on every machine.
 
 use std::fmt::Write as _;
 use std::mem::discriminant;
@@ -25,26 +25,27 @@ use crate::verify::sets::{
     SeededRandom, crowd_layer, crowd_library, later, random_set, shared_set,
 };
 
-/// What a round found.
+/// The result of a round.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RandomRound {
-    /// What was evaluated, in words.
+    /// The evaluation, in words.
     pub description: String,
-    /// Values compared: rotations, velocities, accelerations, or joints of a crowd.
+    /// The number of compared values: rotations, velocities, accelerations, or joints of a crowd.
     pub values: u64,
-    /// Bytes compared.
+    /// The number of compared bytes.
     pub bytes: u64,
-    /// Values whose bits differ.
+    /// The number of values whose bits differ.
     pub differing: u64,
-    /// The first of them, by its index in the result.
+    /// The index of the first such value in the result.
     pub first_difference: Option<usize>,
-    /// SHA-256 of what the CPU made: the same on every machine.
+    /// The SHA-256 of the CPU's result, which is the same on every machine.
     pub hash: [u8; 32],
 }
 
-/// One round of a seed: a set in three of four, a crowd in the fourth. Both engines evaluate it, and every
-/// bit is compared. A combination that both refuse for one kind of reason compares nothing, and its round
-/// says so in its description.
+/// Runs round `number` of a seed: three of four rounds are sets, the fourth is a crowd.
+///
+/// Both engines evaluate it, and every bit is compared. If both refuse a combination with the same kind of error,
+/// nothing is compared, and the description says so.
 ///
 /// ```
 /// use tumble::{Device, Engine, verify::random::round};
@@ -55,7 +56,7 @@ pub struct RandomRound {
 /// ```
 ///
 /// # Errors
-/// When the device fails, or refuses what the CPU does not.
+/// When the device fails, or refuses a request that the CPU accepts.
 pub fn round(
     device: &Engine,
     cpu: &Engine,
@@ -90,8 +91,8 @@ fn compared(description: String, found: &[u8], expected: &[u8], size: usize) -> 
     }
 }
 
-/// What both engines make of one request, or why both refuse it: for one kind of reason, of which each reports the
-/// first that one of its threads meets.
+/// The result of a request on both engines, or the kind of error with which both refuse it. Each engine reports the
+/// error that one of its threads meets first.
 fn both<E: std::fmt::Display>(
     mut evaluate: impl FnMut(&Engine) -> Result<Vec<u8>, E>,
     [device, cpu]: [&Engine; 2],
@@ -112,7 +113,7 @@ fn refused(mut description: String, reason: &str) -> RandomRound {
     compared(description, &[], &[], 1)
 }
 
-/// A set with the sizes that it is evaluated at.
+/// A set round: a set and the requests for it.
 fn set_round(
     device: &Engine,
     cpu: &Engine,
@@ -219,8 +220,8 @@ fn interpolation(random: &mut SeededRandom) -> Interpolation {
     interpolation
 }
 
-/// Steps of nothing, of next to nothing, of half a turn and more, at times from milliseconds to seconds
-/// apart; dense keys; one key; the second day.
+/// A random set: zero and very small steps, steps of 180° and more, with intervals from milliseconds to seconds;
+/// dense keys; a single key; or times on the second day.
 fn set(random: &mut SeededRandom) -> (&'static str, TrackSet) {
     let seed = random.next();
     let every = [0.0, 1e-7, 1e-4, 0.02, 0.4, 2.0, 9.0];
@@ -263,8 +264,8 @@ fn set(random: &mut SeededRandom) -> (&'static str, TrackSet) {
     }
 }
 
-/// So many samples that a round takes milliseconds on a card and at most about a tenth of a second on two
-/// cores.
+/// Sample times of a length with which a round takes milliseconds on a card, and at most about a tenth of a second on
+/// two cores.
 fn frames(random: &mut SeededRandom, set: &TrackSet) -> SampleTimes {
     let (start, end) = set.time_span().unwrap_or_default();
     let tracks = set.track_count().max(1);

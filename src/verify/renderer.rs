@@ -1,6 +1,6 @@
-//! What a renderer does with the engine, on a device that is made here as an application would make it:
-//! results from buffer to buffer, recorded into its commands with frames in flight, in memory that only the
-//! device sees, and copied on a queue of their own. Every bit is compared with the CPU's.
+//! Checks of a renderer's uses of the engine, on a device that is made as an application would make it: results from
+//! buffer to buffer, recorded into commands with frames in flight, in memory that only the device can access, and
+//! copied on a separate queue. Every bit is compared with the CPU's.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use glam::{Quat, Vec3};
@@ -27,37 +27,37 @@ use crate::verify::differences;
 use crate::verify::golden::GoldenError;
 use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, random_set, shared_set};
 
-/// Frames in flight.
+/// The number of frames in flight.
 const FRAMES: usize = 3;
 
-/// What was found of one use of the engine.
+/// The result of the check of one use of the engine.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct RendererCheck {
-    /// What was done.
+    /// A description of the use.
     pub name: String,
-    /// Values compared: rotations, or joints of a crowd.
+    /// The number of compared values: rotations, or joints of a crowd.
     pub values: u64,
-    /// Values whose bits differ from the CPU's, and bytes beside a result that changed.
+    /// The number of values whose bits differ from the CPU's, plus the number of bytes next to a result that changed.
     pub differing: u64,
 }
 
-/// What was found on a renderer's device.
+/// The results of all checks on a renderer's device.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct RendererReport {
-    /// Each use of the engine.
+    /// The checks, one for each use of the engine.
     pub checks: Vec<RendererCheck>,
-    /// Whether results lay in memory that the host cannot see; else the device has no such memory.
+    /// Whether results were in memory that the host cannot access; otherwise the device has no such memory.
     pub memory_is_hidden: bool,
-    /// Frames that were in flight at once.
+    /// The number of frames in flight.
     pub frames_in_flight: usize,
-    /// The family of the queue that copied results; nothing where the device has none that only copies.
+    /// The family of the queue that copied results; `None` if the device has no family for copies only.
     pub copy_queue_family: Option<u32>,
-    /// What the validation layer said, where it was asked for.
+    /// The messages of the validation layer, if it was requested.
     pub validation_messages: Vec<String>,
 }
 
-/// An application's device with an engine on it. Clips, crowds, targets and buffers of either are dropped
-/// before it: each function here makes them after it.
+/// An application's device with an engine on it. Clips, crowds, targets and buffers of both must be dropped before
+/// it; therefore each function here makes them after it.
 pub(crate) struct Renderer {
     /// Dropped before its device.
     pub(crate) engine: Engine,
@@ -80,7 +80,7 @@ impl Renderer {
         })
     }
 
-    /// Leaves a clip's result in a buffer, from `offset` on.
+    /// Evaluates a clip into a buffer, from `offset` on.
     pub(crate) fn to_buffer(
         clip: &Clip,
         frames: &SampleTimes,
@@ -93,7 +93,7 @@ impl Renderer {
         unsafe { request.to_buffer(range) }
     }
 
-    /// Makes ready what it takes to record a clip's samples into a buffer, from `offset` on.
+    /// Prepares recording of a clip's samples into a buffer, from `offset` on.
     pub(crate) fn clip_target(
         clip: &Clip,
         frames: &SampleTimes,
@@ -116,7 +116,7 @@ impl Renderer {
         unsafe { crowd.target(output, buffer.range(0, buffer.size)) }
     }
 
-    /// A buffer that nothing has been left in: all bits are set, so that what is not stored shows.
+    /// A buffer in which all bits are set, so that bytes that are not written are detected.
     fn untouched(&mut self, size: u64) -> Result<ApplicationBuffer, Error> {
         let buffer = self.application.buffer(size, ApplicationMemory::Device)?;
         self.fill(&buffer)?;
@@ -149,7 +149,7 @@ impl Renderer {
     }
 }
 
-/// Records a clip's samples, to `offset` bytes behind the beginning of the target's range.
+/// Records a clip's samples, `offset` bytes after the start of the target's range.
 pub(crate) fn record_clip(
     target: &ClipTarget,
     commands: ash::vk::CommandBuffer,
@@ -177,8 +177,8 @@ fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
     unsafe { target.record(commands) }
 }
 
-/// Works on a device that is made here as a renderer's is. With `validation` the Khronos validation layer
-/// watches both the application's calls and the engine's.
+/// Makes a device as a renderer does, and checks the uses of the engine on it. With `validation`, the Khronos
+/// validation layer checks the application's calls and the engine's.
 ///
 /// # Errors
 /// When the device cannot be made, or fails.
@@ -221,9 +221,8 @@ pub fn renderer(
     Ok(report)
 }
 
-/// Every encoding in both layouts, of arcs and polynomials, at frames and at explicit times, behind bytes that
-/// stay as they are: by the engine's submission, twice, and recorded into the application's commands, which run
-/// twice.
+/// Every encoding in both layouts, for arcs and polynomials, at frames and at explicit times, after bytes that must
+/// not change. Each is evaluated twice by the engine's submission, and twice by recorded commands of the application.
 fn buffer_to_buffer(
     renderer: &mut Renderer,
     cpu: &Engine,
@@ -303,7 +302,7 @@ fn buffer_to_buffer(
     Ok(())
 }
 
-/// Two clips are evaluated, and their poses blended, mixed and added, and a skeleton walked, in one submission; twice.
+/// Evaluates two clips, blends, mixes and adds their poses, and evaluates a skeleton, in one submission; twice.
 fn passes(
     renderer: &mut Renderer,
     cpu: &Engine,
@@ -422,8 +421,8 @@ fn passes(
     Ok(())
 }
 
-/// A crowd recorded into the application's commands, each of three frames into a buffer of its own, submitted
-/// without a wait between them.
+/// A crowd recorded into the application's commands: three frames, each with a separate buffer, submitted without a
+/// wait between them.
 fn frames_in_flight(
     renderer: &mut Renderer,
     cpu: &Engine,
@@ -505,7 +504,7 @@ fn frames_in_flight(
     Ok(())
 }
 
-/// Results of several windows that a queue of their own copies while the next window is evaluated.
+/// Results of several windows, each copied on a separate queue while the next window is evaluated.
 fn copied_beside(engine: &Engine, cpu: &Engine, seed: u64) -> Result<RendererCheck, Error> {
     let set = shared_set(seed ^ 0x31, 1024, 26, 0.4, 0.6, 4);
     let frames = SampleTimes::fps(400).between(0.0, 10.0);

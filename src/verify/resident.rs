@@ -1,5 +1,5 @@
-//! Results that stay on a device, timed by the device's own clock, and the rate at which it writes into its own
-//! memory: the limit of the former.
+//! Results that stay on a device, timed by the device's clock, and the rate at which the device writes its memory,
+//! which limits them.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -18,32 +18,32 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::time::frames::{SampleTimes, Timeline};
 
-/// A clip with room for one of its results in the memory of its device.
+/// A clip with memory for one result on its device.
 pub struct Resident<'a> {
     clip: &'a Clip,
     timeline: Timeline,
     layout: Layout,
     encoding: Encoding,
     bytes: u64,
-    /// Made anew where the device was opened again.
+    /// Made again after the device was opened again.
     buffer: Buffer,
 }
 
-/// How long one evaluation took whose result stayed on the device.
+/// The time of one evaluation whose result stayed on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidentTime {
-    /// By the device's clock.
+    /// The time by the device's clock.
     pub on_device: Duration,
-    /// By the host's clock, from the call to its return.
+    /// The time by the host's clock, from the call to its return.
     pub on_host: Duration,
 }
 
 impl Engine {
-    /// How fast its device writes into its own memory, by the device's clock; `None` on the CPU, and on devices
-    /// without a clock.
+    /// Measures the rate at which the device writes its memory, by the device's clock. `None` on the CPU, and on
+    /// devices without a clock.
     ///
     /// # Errors
-    /// When the device fails, or has no room for a buffer to write.
+    /// When the device fails, or has no memory for the test.
     pub fn write_rates(&self) -> Result<Option<WriteRates>, Error> {
         let Some(opened) = self.backend.opened() else {
             return Ok(None);
@@ -53,8 +53,8 @@ impl Engine {
 }
 
 impl Clip {
-    /// Makes room for a result in the device's own memory, in which [`Resident::evaluate`] leaves it; `None` on the
-    /// CPU, and on devices without a clock or that have no room for it in one allocation.
+    /// Allocates device memory for a result of [`Resident::evaluate`]. `None` on the CPU, on devices without a clock,
+    /// and on devices that cannot allocate the result at once.
     ///
     /// # Errors
     /// When the frames do not fit the clip, or the device fails.
@@ -97,14 +97,14 @@ fn room(engine: &VulkanEngine, bytes: u64) -> Result<Buffer, VulkanError> {
 }
 
 impl Resident<'_> {
-    /// Bytes of the result.
+    /// The size of the result, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Evaluates into the device's memory. Nobody else may use the engine meanwhile: its timings
-    /// ([`Engine::take_timings`]) are taken.
+    /// Evaluates into the device's memory. Nothing else may use the engine at the same time, because this takes the
+    /// engine's timings ([`Engine::take_timings`]).
     ///
     /// # Errors
     /// As [`Clip::evaluate`].

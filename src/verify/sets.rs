@@ -1,6 +1,5 @@
-//! Sets and crowds made of a seed by additions, multiplications, divisions and square roots alone: the
-//! same bits on every machine, whatever its sine is. So what is recorded of them on one machine is what
-//! every other has to find.
+//! Sets and crowds made from a seed with additions, multiplications, divisions and square roots only. They have the
+//! same bits on every machine, regardless of its sine function, so that results recorded on one machine apply to all.
 
 use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
 
@@ -26,7 +25,7 @@ impl SeededRandom {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -58,7 +57,7 @@ pub(crate) fn random_rotation(random: &mut SeededRandom) -> [f64; 4] {
     }
 }
 
-/// The rotation moved a little: the step's half-angle is about `size` where that is small.
+/// The rotation after a random step, whose half-angle is about `size` if that is small.
 fn stepped(random: &mut SeededRandom, q: [f64; 4], size: f64) -> [f64; 4] {
     let step = random_rotation(random);
     normalised([0, 1, 2, 3].map(|c| q[c] + size * step[c]))
@@ -68,8 +67,8 @@ fn key(q: [f64; 4], sign: f32) -> Quat {
     Quat::from_array(q.map(|c| sign * c as f32))
 }
 
-/// Tracks with times of their own, each step's size drawn from `sizes`, every fourth sign
-/// turned where `turned`, and with velocities, tangents and tension for most tracks.
+/// Tracks with separate times; each step's size is drawn from `sizes`. With `has_negated_keys`, every fourth key is
+/// negated. Most tracks have velocities, tangents and tension.
 pub(crate) fn random_set(
     seed: u64,
     tracks: usize,
@@ -148,7 +147,7 @@ fn give_data(set: &mut TrackSet, seed: u64) {
     }
 }
 
-/// Tracks that share times `step` apart; each key's step has that size.
+/// Tracks that share times `step` seconds apart; every rotation between keys has the size `size`.
 pub(crate) fn shared_set(
     seed: u64,
     tracks: usize,
@@ -222,7 +221,7 @@ pub(crate) fn vectors_set() -> TrackSet {
     set
 }
 
-/// Walks of points, some of which stand still for a while.
+/// Random walks of points, some of which stand still for a time.
 pub(crate) fn paths_set() -> TrackSet {
     let mut random = SeededRandom(14);
     let mut set = TrackSet::new();
@@ -246,12 +245,12 @@ pub(crate) fn paths_set() -> TrackSet {
     set
 }
 
-/// A point whose coordinates are at most `reach` from 0.
+/// A point whose coordinates are at most `reach` in magnitude.
 fn point(random: &mut SeededRandom, reach: f64) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.between(-reach, reach) as f32))
 }
 
-/// A skeleton whose joints hang from random ones before them; some are roots.
+/// A skeleton in which the parent of each joint is a random one before it; some joints are roots.
 fn skeleton(random: &mut SeededRandom, joints: usize) -> Skeleton {
     let parent = |joint: usize, random: &mut SeededRandom| match random.below(8) {
         0 => None,
@@ -262,8 +261,8 @@ fn skeleton(random: &mut SeededRandom, joints: usize) -> Skeleton {
     Skeleton::new(parents, offsets).expect("parents come before their children")
 }
 
-/// Keys as games have them: most joints at the same times, some at fewer, some still; a few with
-/// translations and scales.
+/// Keys as in games: many joints have the same times, some fewer keys, some a single value; a few have translations
+/// and scales.
 fn joints_set(random: &mut SeededRandom, joints: usize, keys: usize) -> TrackSet {
     let mut shared = Vec::new();
     let mut time = random.between(-1.0, 2.0);
@@ -340,7 +339,7 @@ pub(crate) fn crowd_library(
     Ok(library)
 }
 
-/// What a layer of an instance may play.
+/// A random layer of an instance.
 pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
     CrowdLayer {
         clip: random.below(library.clip_count()),

@@ -1,5 +1,5 @@
-//! Clips on the CPU: windows of a result, cut into tasks for the threads. Where a window has a few explicit times of
-//! each of many tracks, such as the poses of a crowd, each lane evaluates one sample, and no runs are listed.
+//! Clips on the CPU: windows of a result, divided into tasks for the threads. For a window with a few explicit times
+//! of each of many tracks, such as the poses of a crowd, each lane evaluates one sample, and no runs are listed.
 
 use bytemuck::Zeroable;
 use glam::Quat;
@@ -23,11 +23,11 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::RunSource;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
-/// Tracks whose rows are evaluated before they are transposed into frames: their rotations at one
-/// frame fill four cache lines.
+/// The number of tracks whose rows are evaluated before they are transposed into frames: their rotations at one frame
+/// fill four cache lines.
 const TILE: usize = 16;
 
-/// Frames of one task of a frame-major window: a task with fewer takes hardly less time.
+/// The number of frames of one task of a frame-major window; a task with fewer frames takes hardly less time.
 const TASK_FRAMES: usize = 256;
 
 impl CpuEngine {
@@ -99,8 +99,8 @@ impl CpuEngine {
         })?
     }
 
-    /// Evaluates a window on this thread; the whole result has `rotations` rotations, or is read again
-    /// at once.
+    /// Evaluates a window on this thread. `rotations` is the number of rotations of the whole result; `None` if the
+    /// result is read again at once.
     fn window(
         &self,
         clip: &ClipData,
@@ -209,8 +209,7 @@ impl CpuEngine {
     }
 }
 
-/// Cuts a frame-major window into tasks of some frames of some tracks, each with its slices of the
-/// output.
+/// Divides a frame-major window into tasks of some frames of some tracks, each with its slices of the output.
 fn frame_tasks<'a>(
     window: &Window,
     output: &'a mut [[f32; 4]],
@@ -239,8 +238,7 @@ fn frame_tasks<'a>(
     all
 }
 
-/// Cuts a window into tasks, each with its own part of the output, which has `each` elements for a
-/// rotation.
+/// Divides a window into tasks, each with its part of the output, which has `each` elements for a rotation.
 fn tasks<'a, T>(
     window: &Window,
     each: usize,
@@ -266,14 +264,14 @@ const LANES: usize = 64;
 /// A window of a clip at sparse times, evaluated by one lookup for each sample.
 pub(crate) struct SparseTimes<'a> {
     pub(crate) clip: &'a ClipData,
-    /// Sample `k` of track `t` lies at `times[t × stride + k]`.
+    /// Sample `k` of track `t` is at `times[t × stride + k]`.
     pub(crate) times: &'a [f64],
     pub(crate) stride: usize,
     pub(crate) window: &'a Window,
     /// `[track][sample]`.
     pub(crate) output: &'a mut [[f32; 4]],
-    /// Tracks with a sample that takes more than a lookup, outside the keys or on a curve that is
-    /// evaluated in f64, by their index in the window: the caller evaluates their rows.
+    /// Tracks with a sample that needs more than a lookup, outside the keys or on a curve that is evaluated in f64,
+    /// by their index in the window: the caller evaluates their rows.
     pub(crate) others: Vec<usize>,
 }
 
@@ -283,7 +281,7 @@ struct ArcLanes {
     middles: [[f32; 4]; LANES],
     tangents: [[f32; 4]; LANES],
     parameters: [f32; LANES],
-    /// Where each sample is stored in the output.
+    /// The index of each sample in the output.
     outputs: [usize; LANES],
     count: usize,
 }

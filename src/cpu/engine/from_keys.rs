@@ -1,6 +1,6 @@
-//! Sets with fewer samples than keys: straight from the keys. A sample whose curve turns too far for the
-//! small-angle series is left `UNRESOLVED`; then the intervals of such samples alone are prepared, and the samples
-//! are overwritten.
+//! Sets with fewer samples than keys, evaluated directly from the keys. A sample whose curve rotates too far for the
+//! small-angle series is marked as `UNRESOLVED`; then only the intervals of such samples are prepared, and the
+//! samples are overwritten.
 
 use glam::Quat;
 use rayon::prelude::*;
@@ -65,13 +65,13 @@ impl CpuEngine {
     }
 }
 
-/// What is prepared together, with the samples of each group in the result.
+/// Groups that are prepared together, each with its samples in the result.
 type FallbackBatch<'o> = Vec<(Group, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
-    /// Evaluates the unresolved ones of a track's consecutive samples from `first` on, by way of
-    /// segments. Resolved samples between them are evaluated again, to the same bits. `key` is the index
-    /// of a key at or before all of the samples between keys.
+    /// Evaluates the unresolved ones of a track's consecutive samples from `first` on, by segments. Resolved samples
+    /// between them are evaluated again, with the same bits. `key` is the index of a key at or before all samples
+    /// that are between keys.
     pub(crate) fn resolve(
         &self,
         request: &SetRequest<'_>,

@@ -1,5 +1,5 @@
-//! The CPU as a device: its threads, its vector width, and sets batch by batch: a thread prepares some
-//! intervals, evaluates them while their segments are in its cache, and forgets them.
+//! The CPU as a device: its threads and its vector width, and evaluation of sets batch by batch: a thread prepares
+//! some intervals, evaluates them while their segments are in its cache, and drops them.
 
 pub(crate) mod clip;
 pub(crate) mod from_keys;
@@ -22,24 +22,24 @@ use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// Rotations that one task evaluates: enough to make its cost small, few enough to
-/// share a short result among all threads.
+/// The number of rotations of one task: enough to make its overhead small, and few enough to divide a short result
+/// among all threads.
 pub(crate) const TASK: usize = 16 * 1024;
 
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
-    /// Whether results are written by streaming stores; `None` where that depends on them.
+    /// Whether results are written by streaming stores; `None` if that depends on the result.
     pub(crate) streaming_stores: Option<bool>,
-    /// `None`: the process's.
+    /// The engine's threads; `None`: the process's threads.
     private_threads: Option<Threads>,
     pub(crate) scratch_pool: ScratchPool,
-    /// Bytes that the segments of a clip may take, if there is a limit.
+    /// The limit of the segments of a clip, bytes, if there is one.
     pub(crate) memory: Option<usize>,
 }
 
 impl CpuEngine {
-    /// With `threads` threads of its own; by default with the process's shared ones.
+    /// Makes an engine with `threads` threads; `None`: with the process's shared threads.
     pub(crate) fn new(
         width: VectorWidth,
         streaming_stores: Option<bool>,
@@ -58,7 +58,7 @@ impl CpuEngine {
         })
     }
 
-    /// Without threads of its own.
+    /// Makes an engine on the process's shared threads.
     pub(crate) fn on_shared_threads(width: VectorWidth) -> Self {
         Self {
             width,
@@ -69,7 +69,7 @@ impl CpuEngine {
         }
     }
 
-    /// Runs `work` with the engine's own threads, or with the process's where it has none.
+    /// Runs `work` on the engine's threads, or on the process's if the engine has none.
     pub(crate) fn on_threads<R: Send>(
         &self,
         work: impl FnOnce() -> R + Send,
@@ -107,16 +107,16 @@ impl CpuEngine {
     }
 }
 
-/// A batch has at most as many tracks as make this many rotations. Where a set has too few tracks
-/// to keep all threads busy that way, the limit goes down to [`TASK`] rotations.
+/// The maximum number of rotations of a batch's tracks. If a set has too few tracks to keep all threads busy with it,
+/// the limit is reduced down to [`TASK`] rotations.
 const BATCH_ROTATIONS: usize = 3 * TASK;
 
-/// The most keys of a batch: so few that their segments stay in a core's cache.
+/// The maximum number of keys of a batch, whose segments then stay in a core's cache.
 const BATCH_KEYS: usize = 1024;
 
 impl CpuEngine {
-    /// Evaluates some tracks into `output`, `[track][sample]`. With `cuts_tracks` a long track may
-    /// be cut into parts, which the threads share.
+    /// Evaluates some tracks into `output`, `[track][sample]`. With `cuts_tracks` a long track may be divided into
+    /// parts for several threads.
     pub(crate) fn evaluate_batches(
         &self,
         request: &SetRequest<'_>,
@@ -177,8 +177,7 @@ impl CpuEngine {
     }
 }
 
-/// Cuts `output` among tasks of `each` consecutive batches; `steps` is the argument
-/// of [`Batch::samples`].
+/// Divides `output` among tasks of `each` consecutive batches; `steps` is the argument of [`Batch::samples`].
 pub(crate) fn tasks<'b, 'o>(
     set: &TrackSet,
     timeline: &Timeline,

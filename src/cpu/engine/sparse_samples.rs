@@ -14,13 +14,13 @@ use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::times::interval_at;
 
-/// Samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
+/// The number of samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
 const TASK_SAMPLES: usize = 512;
 
-/// Two intervals with samples with at most this many others between them are prepared together.
+/// Two intervals with samples and at most this many other intervals between them are prepared together.
 pub(crate) const APART: usize = 2;
 
-/// Consecutive samples, and the key intervals of a track in which they lie.
+/// Consecutive samples, and the key intervals of a track that contain them.
 pub(crate) struct Group {
     pub(crate) intervals: Range<usize>,
     pub(crate) samples: Range<usize>,
@@ -29,7 +29,7 @@ pub(crate) struct Group {
 /// The samples of a track in order of time, and the groups that they form.
 struct Sorted {
     timeline: Timeline,
-    /// Which sample of the request each of them is; `None` where they are these.
+    /// The index in the request of each sample; `None` if the samples are in the request's order.
     request_indices: Option<Vec<u32>>,
     groups: Vec<Group>,
 }
@@ -162,8 +162,8 @@ impl Sorted {
 }
 
 impl Group {
-    /// Adds the next sample, which lies in an interval of a track whose last key is `last`, to the last
-    /// group, or as a new one.
+    /// Adds the next sample, which is in an interval of a track whose last key is `last`, to the last group or to a
+    /// new one.
     pub(crate) fn put(groups: &mut Vec<Self>, interval: usize, last: usize, sample: usize) {
         match groups.last_mut() {
             Some(Self { intervals, samples })
@@ -180,8 +180,8 @@ impl Group {
     }
 }
 
-/// The intervals of a track in which frames at a rate lie, which increase. `key` is the index of a key at or
-/// before all of those between keys.
+/// The intervals of a track that contain frames at a rate, in increasing order. `key` is the index of a key at or
+/// before all frames that are between keys.
 pub(crate) fn intervals_of_frames(
     request: &SetRequest<'_>,
     track: usize,

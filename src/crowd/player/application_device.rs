@@ -1,5 +1,5 @@
-//! Crowds on an application's own Vulkan device, recorded into its own command buffers. These
-//! functions are unsafe, because the compiler cannot check what the application promises.
+//! Crowds on an application's Vulkan device, recorded into the application's command buffers. These functions are
+//! unsafe, because the compiler cannot check the application's promises.
 #![allow(unsafe_code)]
 
 use std::sync::Arc;
@@ -15,20 +15,21 @@ use crate::output::crowd::CrowdOutput;
 use crate::output::pose_error::OFFSET_STEP;
 
 impl Crowd {
-    /// Makes ready what it takes to evaluate into a range of a buffer of the application's own, on the
-    /// device that the engine was made from ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)):
-    /// kernels are compiled and memory is allocated here, once, and not when a frame is recorded. The range has
-    /// room for the instances that are [visible](Crowd::set_visible) now; where it has room for more, so many may be
-    /// visible later.
+    /// Prepares evaluations into a range of the application's buffer, on the device that the engine was made from
+    /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)). Kernels are compiled and memory is allocated
+    /// here, not when a frame is recorded.
+    ///
+    /// The range must have room for the instances that are [visible](Crowd::set_visible) now. If it has room for
+    /// more, more instances may be visible later.
     ///
     /// # Errors
-    /// When the engine is the CPU, the range does not start at a multiple of 256 bytes or is too short,
-    /// there are no inverse bind matrices for skinning matrices, or the device fails.
+    /// When the engine was not made by `from_vulkan`, the range does not start at a multiple of 256 bytes or is too
+    /// short, skinning matrices are requested but the library has no inverse bind matrices, or the device fails.
     ///
     /// # Safety
-    /// The buffer must belong to the engine's device, have memory, be made for use as
-    /// `STORAGE_BUFFER`, contain the range, and live as long as the target. The target must be
-    /// dropped after all work that was recorded with it has ended, and before the device.
+    /// The buffer must belong to the engine's device, be bound to memory, have the usage `STORAGE_BUFFER`, contain
+    /// the range, and live as long as the target. The target must be dropped after all work that was recorded with it
+    /// has ended, and before the device is destroyed.
     pub unsafe fn target(
         &self,
         output: impl Into<CrowdOutput>,
@@ -55,23 +56,25 @@ impl Crowd {
         Ok(CrowdTarget::new(device, output, range, room)?)
     }
 
-    /// Records an evaluation at the clock's time into the application's command buffer: up to 20 bytes for
-    /// each layer that changed since the last evaluation, 4 for each instance of a new
-    /// [list](Crowd::set_visible), and the dispatches; of an empty list nothing. Nothing is waited for and
-    /// nothing allocated. What is recorded behind it, or submitted to the same queue later, sees the
-    /// result; it waits for all that was recorded before it.
+    /// Records an evaluation at the clock's time into the application's command buffer.
+    ///
+    /// The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
+    /// instance of a new [list](Crowd::set_visible), and dispatch the kernels. If no instance is visible, nothing is
+    /// recorded. Recording neither waits nor allocates. Barriers are included: the evaluation waits for all commands
+    /// recorded before it, and commands that are recorded after it, or submitted to the same queue later, see the
+    /// result.
     ///
     /// # Errors
-    /// When the target is another crowd's, or more instances are visible than it has room for; then nothing is
+    /// When the target belongs to another crowd, or more instances are visible than it has room for; then nothing is
     /// recorded.
     ///
     /// # Safety
-    /// The command buffer must be of the engine's device, in recording, outside of a render pass, and
-    /// of the family of the engine's queue. Everything that is recorded must be submitted once to the
-    /// engine's queue, in the order of the calls: the device keeps what instances play, and a frame
-    /// that is thrown away would keep from it what changed. Whoever submits keeps the engine from
-    /// submitting meanwhile. Several targets may alternate; two evaluations with one target are in order on
-    /// the queue.
+    /// The command buffer must belong to the engine's device and to the queue family of the engine's queue, and must
+    /// be in the recording state, outside a render pass. All recorded evaluations must be submitted to the engine's
+    /// queue, once and in the order in which they were recorded: the device stores the layers of instances, and would
+    /// miss the changes of a frame that is not submitted ([`Crowd::forget_recorded`]). The engine must not submit
+    /// while the application submits to this queue. Several targets may alternate. Two evaluations with one target
+    /// are executed in order on the queue.
     pub unsafe fn record(
         &mut self,
         target: &CrowdTarget,
@@ -98,8 +101,8 @@ impl Crowd {
         Ok(())
     }
 
-    /// Takes back that anything was recorded since the instances were last known to be on the device:
-    /// the next evaluation writes all of them. Call it if a recorded frame was discarded.
+    /// Marks all layers as unknown to the device, so that the next evaluation writes all of them. Call it if a
+    /// recorded frame was discarded.
     pub fn forget_recorded(&mut self) {
         self.instances.forget();
     }

@@ -24,14 +24,14 @@ use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
-/// The farthest that a clock goes, ticks: whole numbers of f64.
+/// The clock's limit, ticks: below it, f64 represents all whole numbers.
 const FARTHEST: f64 = (1u64 << 52) as f64;
 
-/// Many instances of a library's skeleton, each of which plays clips at its own time and speed.
+/// Many instances of a library's skeleton, each of which plays clips at its time and speed.
 ///
-/// All of them follow one clock, which counts whole ticks: where an instance stands is a function of
-/// whole numbers, so that a clip in a loop gives the same bits in the first second and a day later.
-/// What an instance plays is [set](Crowd::set) when it changes, and costs nothing while it goes on.
+/// All instances follow one clock, which counts whole ticks. An instance's time in its clip is computed in whole
+/// numbers, so a clip in a loop has the same bits in the first second and a day later. A layer is [set](Crowd::set)
+/// when the instance starts to play something else; until then it costs no calls.
 ///
 /// The CPU and every Vulkan device give the same bits.
 pub struct Crowd {
@@ -42,13 +42,13 @@ pub struct Crowd {
     /// The push constants that all dispatches share.
     arguments: CrowdDispatch,
     pub(crate) device: Option<Arc<DeviceCrowd>>,
-    /// What was submitted and not taken yet.
+    /// The submission whose result was not taken yet.
     submitted: Option<Submitted>,
-    /// What evaluates on the device for the host, for the output that was asked for last.
+    /// The objects for evaluations on the device whose result is read back, for the last requested output.
     reader: Option<CrowdReader>,
-    /// Memory for the CPU: the entries of the instances that are evaluated, where these are not all.
+    /// Memory for the CPU: the entries of the visible instances, if these are not all instances.
     gathered: Vec<CrowdEntry>,
-    /// Memory for a bit for each instance.
+    /// A bit for each instance.
     seen: Vec<u64>,
 }
 
@@ -57,18 +57,19 @@ struct Submitted {
     output: CrowdOutput,
     /// Vectors of four numbers of its result.
     len: usize,
-    /// The result, where it is there already: on the CPU, and of no instances.
+    /// The result, if it exists already: on the CPU, and if no instance is visible.
     values: Option<Vec<[f32; 4]>>,
 }
 
 impl Engine {
-    /// A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the
-    /// start of the library's first clip until they are [set](Crowd::set). The library is copied, to the
-    /// device too.
+    /// Makes a crowd of 1 to 1 000 000 instances with 1 to 4 layers each.
+    ///
+    /// All instances stand still at the start of the library's first clip until they are [set](Crowd::set). The
+    /// library is copied, also to the device.
     ///
     /// # Errors
-    /// When the library has no clips, there are too many instances or layers, or there is not the
-    /// memory.
+    /// When the library has no clips, the number of instances or layers is out of range, there is not enough memory,
+    /// or the device fails.
     pub fn crowd(
         &self,
         library: &CrowdLibrary,
@@ -145,24 +146,23 @@ impl Crowd {
         self.instances.entries.len() / self.layer_count()
     }
 
-    /// Layers of an instance.
+    /// Number of layers of an instance.
     #[must_use]
     pub fn layer_count(&self) -> usize {
         self.arguments.layers as usize
     }
 
-    /// The library that it was made of.
+    /// The library from which the crowd was made.
     #[must_use]
     pub fn library(&self) -> &CrowdLibrary {
         &self.library
     }
 
-    /// Sets what a layer of an instance plays from now on: 16 bytes that reach the device with the next
-    /// evaluation. A fade of the layer ends with it.
+    /// Sets the clip that a layer of an instance plays from now on. Its 16 bytes reach the device with the next
+    /// evaluation. A fade of the layer ends.
     ///
     /// # Errors
-    /// When there is no such instance, layer, clip or mask, or a number is out of range; then
-    /// everything stays.
+    /// When there is no such instance, layer, clip or mask, or a number is out of range; then nothing changes.
     pub fn set(
         &mut self,
         instance: usize,
@@ -175,11 +175,11 @@ impl Crowd {
         Ok(())
     }
 
-    /// Sets what many layers play, an instance, a layer and what it plays each; of two changes of
-    /// one layer the later one counts.
+    /// Sets many layers. Each change is an instance, a layer and the clip that it plays. If two changes are for one
+    /// layer, the later one counts.
     ///
     /// # Errors
-    /// As [`Crowd::set`], with the index of the first change that is refused; then everything stays.
+    /// As [`Crowd::set`], with the index of the first change that is refused; then nothing changes.
     pub fn set_all(&mut self, changes: &[(usize, usize, CrowdLayer)]) -> Result<(), CrowdError> {
         for (change, &(instance, layer, plays)) in changes.iter().enumerate() {
             if let Err(reason) = self.packed(instance, layer, plays) {
@@ -193,7 +193,7 @@ impl Crowd {
         Ok(())
     }
 
-    /// The index of a layer's entry, and the entry for what it is to play.
+    /// The index of a layer's entry, and the new entry.
     fn packed(
         &self,
         instance: usize,
@@ -207,8 +207,7 @@ impl Crowd {
         Ok((index, entry))
     }
 
-    /// What a layer of an instance plays, and where it stands now. Speed and weight are as they were
-    /// rounded.
+    /// The clip that a layer of an instance plays, with its current time. Speed and weight are the rounded ones.
     ///
     /// # Errors
     /// When there is no such instance or layer.
@@ -218,8 +217,7 @@ impl Crowd {
         Ok(CrowdLayer::moved(entry, clips, clock, clock))
     }
 
-    /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's
-    /// length.
+    /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
     ///
     /// # Errors
     /// When there is no such instance or layer.
@@ -244,19 +242,21 @@ impl Crowd {
         Ok(instance * self.layer_count() + layer)
     }
 
-    /// Vectors of four numbers of a result, `[instance][joint]`, of the instances that are
-    /// [visible](Crowd::set_visible).
+    /// The length of a result for the [visible](Crowd::set_visible) instances, `[instance][joint]`, in vectors of
+    /// four numbers.
     #[must_use]
     pub fn output_len(&self, output: impl Into<CrowdOutput>) -> usize {
         self.visible_count() * self.library.joint_count() * output.into().vector_count()
     }
 
-    /// Evaluates all instances, or those that are [visible](Crowd::set_visible), at the clock's time,
-    /// `[instance][joint]`: a rotation, or the three rows of a matrix. Waits until it is done.
+    /// Evaluates all [visible](Crowd::set_visible) instances at the clock's time, and waits for the result.
+    ///
+    /// The result is `[instance][joint]`: a rotation, or the three rows of a matrix.
     ///
     /// # Errors
-    /// When `output` is not exactly as long as the result, skinning matrices are asked for and the
-    /// library has no inverse bind matrices, a submission is in flight, or the device fails.
+    /// When `output` is not exactly as long as the result ([`Crowd::output_len`]), skinning matrices are requested
+    /// but the library has no inverse bind matrices, the result of [`Crowd::submit`] was not taken yet, or the device
+    /// fails.
     pub fn evaluate_into(
         &mut self,
         values: CrowdValues,
@@ -271,7 +271,7 @@ impl Crowd {
         self.on_cpu(values, output)
     }
 
-    /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four halves.
+    /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four half-precision floats.
     ///
     /// # Errors
     /// As [`Crowd::evaluate_into`].
@@ -285,12 +285,11 @@ impl Crowd {
         self.wait_half_into(output)
     }
 
-    /// Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it
-    /// while instances and the clock are changed for the next one. The CPU evaluates before this
-    /// returns.
+    /// Starts an evaluation at the clock's time and returns at once. A Vulkan device evaluates while instances and
+    /// the clock are changed for the next frame. The CPU evaluates before this function returns.
     ///
     /// # Errors
-    /// As [`Crowd::evaluate_into`], and when the result of the submission before was not taken.
+    /// As [`Crowd::evaluate_into`], and when the result of the previous submission was not taken.
     pub fn submit(&mut self, output: impl Into<CrowdOutput>) -> Result<(), CrowdError> {
         let output = output.into();
         self.check_idle(output)?;
@@ -325,19 +324,19 @@ impl Crowd {
         Ok(())
     }
 
-    /// What was submitted and not taken yet.
+    /// The output of the submission whose result was not taken yet.
     #[must_use]
     pub fn submitted(&self) -> Option<CrowdOutput> {
         self.submitted.as_ref().map(|submitted| submitted.output)
     }
 
-    /// Vectors of four numbers of the result that was submitted and not taken yet.
+    /// The length of that result, in vectors of four numbers.
     #[must_use]
     pub fn submitted_len(&self) -> Option<usize> {
         self.submitted.as_ref().map(|submitted| submitted.len)
     }
 
-    /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
+    /// Whether the submitted evaluation has ended, so that [`Crowd::wait_into`] does not wait.
     ///
     /// # Errors
     /// When nothing was submitted, or the device fails.
@@ -349,16 +348,16 @@ impl Crowd {
         }
     }
 
-    /// Waits for what was submitted, and takes its result.
+    /// Waits for the submitted evaluation, and takes its result.
     ///
     /// # Errors
-    /// When nothing was submitted, it was in 16 bits, `output` is not as long as the result, or the
-    /// device fails.
+    /// When nothing was submitted, the result is in 16 bits, `output` is not as long as the result, or the device
+    /// fails.
     pub fn wait_into(&mut self, output: &mut [[f32; 4]]) -> Result<(), CrowdError> {
         self.take_into(false, output, |value| value)
     }
 
-    /// Waits for what was submitted in 16 bits, and takes its result.
+    /// Waits for an evaluation that was submitted in 16 bits, and takes its result.
     ///
     /// # Errors
     /// As [`Crowd::wait_into`].
@@ -366,7 +365,7 @@ impl Crowd {
         self.take_into(true, output, |value| value.map(to_any_half))
     }
 
-    /// Takes what was submitted; `stored` makes of the CPU's values what a device would leave.
+    /// Takes the result of the submission; `stored` converts a value of the CPU to the output's type.
     fn take_into<T: Pod>(
         &mut self,
         is_half: bool,
@@ -450,16 +449,16 @@ impl Crowd {
         }
     }
 
-    /// The clock, ticks.
+    /// The clock's time, ticks.
     #[must_use]
     pub fn clock(&self) -> u64 {
         self.instances.clock
     }
 
-    /// Sets the clock, ticks; all instances move with it, forwards or backwards.
+    /// Sets the clock's time, ticks, forwards or backwards. All instances follow.
     ///
     /// # Errors
-    /// From 2^52 ticks on, which is two centuries at 705 600 ticks a second.
+    /// When `ticks` is 2^52 or more, two centuries at 705 600 ticks a second.
     pub fn set_clock(&mut self, ticks: u64) -> Result<(), CrowdError> {
         let rounded_ticks = ticks as f64;
         if rounded_ticks >= FARTHEST {
@@ -471,7 +470,7 @@ impl Crowd {
         Ok(())
     }
 
-    /// Moves the clock on by some ticks.
+    /// Moves the clock forward by `ticks`.
     ///
     /// # Errors
     /// As [`Crowd::set_clock`].
@@ -479,11 +478,12 @@ impl Crowd {
         self.set_clock(self.clock().saturating_add(ticks))
     }
 
-    /// Moves the clock on by the ticks nearest to some seconds. Where the sum must not drift, as in a
-    /// film at 30000/1001 frames a second, [`Crowd::set_clock`] to the ticks of each frame's time.
+    /// Moves the clock forward by `seconds`, rounded to ticks. The rounding errors of many steps add up: if the clock
+    /// must follow frames exactly, as in a film at 30000/1001 frames a second, use [`Crowd::set_clock`] with each
+    /// frame's time.
     ///
     /// # Errors
-    /// When the seconds are negative or no number, and as [`Crowd::set_clock`].
+    /// When `seconds` is negative or NaN, and as [`Crowd::set_clock`].
     pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
         match u64::try_from(self.ticks_of(seconds)?) {
             Ok(ticks) => self.advance_ticks(ticks),
@@ -491,10 +491,10 @@ impl Crowd {
         }
     }
 
-    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).
+    /// Rounds a time in seconds to ticks, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).
     ///
     /// # Errors
-    /// When it is no number, or out of reach.
+    /// When `seconds` is NaN, or 2^52 ticks or more in magnitude.
     pub fn ticks_of(&self, seconds: f64) -> Result<i64, CrowdError> {
         let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
         match ticks.abs() < FARTHEST {

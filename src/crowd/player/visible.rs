@@ -1,14 +1,16 @@
-//! Which instances of a crowd are evaluated.
+//! The visible instances of a crowd, which alone are evaluated.
 
 use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
 use crate::memory::{reserved, zeroed};
 
 impl Crowd {
-    /// From now on evaluates the instances of a list alone, as a camera sees them: a result has their rows and no
-    /// others, in the list's order, with the bits that they have among all. The others go on meanwhile; they cost
-    /// nothing. The list is in any order, names no instance twice, and may be empty. It goes to a device with the next
-    /// evaluation, 4 bytes for each, and not again while it stays.
+    /// Limits evaluations to a list of instances, for example those that a camera sees.
+    ///
+    /// The result has the rows of these instances only, in the list's order, with the same bits as among all
+    /// instances. The clips of the other instances continue without any work. The list may be in any order and may be
+    /// empty; no instance may be in it twice. A device gets it with the next evaluation, 4 bytes for each instance,
+    /// and only when it changed.
     ///
     /// ```
     /// use tumble::glam::{Quat, Vec3};
@@ -28,7 +30,7 @@ impl Crowd {
     /// ```
     ///
     /// # Errors
-    /// When an instance is not there or is named twice, or there is not the memory; then everything stays.
+    /// When an instance does not exist or is in the list twice, or there is not enough memory; then nothing changes.
     pub fn set_visible(&mut self, instances: &[u32]) -> Result<(), CrowdError> {
         let count = self.instance_count();
         if self.instances.visible.as_deref() == Some(instances) {
@@ -66,18 +68,18 @@ impl Crowd {
         Ok(())
     }
 
-    /// From now on evaluates all instances again.
+    /// Makes all instances visible again.
     pub fn set_all_visible(&mut self) {
         self.instances.set_visible(None);
     }
 
-    /// The instances that are evaluated, in the order of results; `None`: all of them.
+    /// The visible instances, in the order of results; `None`: all of them.
     #[must_use]
     pub fn visible(&self) -> Option<&[u32]> {
         self.instances.visible.as_deref()
     }
 
-    /// How many instances are evaluated.
+    /// Number of visible instances.
     #[must_use]
     pub fn visible_count(&self) -> usize {
         self.instances.visible_count(self.layer_count())

@@ -1,16 +1,18 @@
-//! Weights of layers, set at once or faded by the clock.
+//! Weights of layers: set at once, or changed by the clock.
 
 use crate::crowd::fade::{CrowdFade, weight_units};
 use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
 
 impl Crowd {
-    /// Sets the weight of a layer above the first, 0 to 1, in units of 2^-15. The rest of what it plays goes on, and
-    /// a fade of it ends. With the weight 1, a layer that is neither additive nor masked has the bits of its clip.
+    /// Sets the weight of a layer above the first, 0 to 1, rounded to a multiple of 2^-15.
+    ///
+    /// The layer's clip, time and speed stay, and its fade ends. With the weight 1, a layer that is neither additive
+    /// nor masked has the bits of its clip.
     ///
     /// # Errors
-    /// When there is no such instance or layer, the layer is the first, or the weight is out of range; then
-    /// everything stays.
+    /// When there is no such instance or layer, the layer is the first, or the weight is out of range; then nothing
+    /// changes.
     pub fn set_weight(
         &mut self,
         instance: usize,
@@ -24,9 +26,10 @@ impl Crowd {
         Ok(())
     }
 
-    /// Lets the weight of a layer above the first go from what it is now to another one, in equal parts for equal
-    /// ticks of the clock, within so many ticks; 0 is at once. From then on it stays. Another fade of the layer,
-    /// [`Crowd::set`] and [`Crowd::set_weight`] end it.
+    /// Fades the weight of a layer above the first from its current value to `weight`, linearly within `ticks` of the
+    /// clock; with 0 ticks it changes at once.
+    ///
+    /// Afterwards the weight stays. [`Crowd::set`], [`Crowd::set_weight`] and another fade of the layer end the fade.
     ///
     /// ```
     /// use tumble::glam::{Quat, Vec3};
@@ -50,7 +53,7 @@ impl Crowd {
     /// ```
     ///
     /// # Errors
-    /// As [`Crowd::set_weight`], or when there is not the memory.
+    /// As [`Crowd::set_weight`], or when there is not enough memory.
     pub fn fade(
         &mut self,
         instance: usize,
@@ -67,9 +70,11 @@ impl Crowd {
         self.set_fade(instance, layer, fade)
     }
 
-    /// Sets the weight of a layer above the first as a function of the clock: as [`Crowd::fade`], from any weight,
-    /// and from any time, before now or later. What [`Crowd::get_fade`] reports, set in another crowd whose clock
-    /// stands at the same time, gives the same weights at all times.
+    /// Sets the weight of a layer above the first as a function of the clock. Unlike [`Crowd::fade`], it starts at
+    /// any weight and at any time, past or future.
+    ///
+    /// The fade that [`Crowd::get_fade`] returns, set in another crowd at the same time of the clock, gives the same
+    /// weights at all times.
     ///
     /// # Errors
     /// As [`Crowd::fade`].
@@ -87,8 +92,8 @@ impl Crowd {
         Ok(())
     }
 
-    /// The fade that the weight of a layer follows, with its weights as they were rounded; one that has ended too,
-    /// for the clock may go back. `None` where the weight does not change with the clock.
+    /// The fade of a layer's weight, with its rounded weights; also a fade that has ended, because the clock may go
+    /// back. `None` if the weight does not change with the clock.
     ///
     /// # Errors
     /// When there is no such instance or layer.
@@ -97,7 +102,7 @@ impl Crowd {
         Ok(self.instances.fades.get(index))
     }
 
-    /// The index of the entry of a layer that has a weight.
+    /// The index of the entry of a layer above the first.
     fn weighted_index(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
         let index = self.entry_index(instance, layer)?;
         match layer {

@@ -1,4 +1,4 @@
-//! A clip: a set prepared for one method, on a device, ready for any frames.
+//! A clip: a set prepared for one method, stored on a device, for evaluation at any times.
 
 pub(crate) mod request;
 
@@ -18,8 +18,8 @@ use crate::stream::{Chunk, run};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::{SampleTimes, Timeline};
 
-/// A set prepared for one method, on its engine's device; evaluate it as often as
-/// needed, at any frames.
+/// A set that is prepared for one method and stored on its engine's device. It may be evaluated any number of times,
+/// at any sample times.
 pub struct Clip {
     engine: Engine,
     pub(crate) uploaded: Uploaded,
@@ -30,7 +30,7 @@ impl Clip {
         Self { engine, uploaded }
     }
 
-    /// The engine that it was uploaded to.
+    /// The engine to which the clip was uploaded.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
@@ -40,29 +40,29 @@ impl Clip {
         self.uploaded.data.track_count()
     }
 
-    /// The samples that `frames` means for this clip.
+    /// The sample times of `frames` for this clip.
     ///
     /// # Errors
-    /// When they do not fit it.
+    /// When the frames do not fit the clip.
     pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
         frames.resolve(self.track_count(), self.uploaded.data.time_span)
     }
 
-    /// The rotation of every track at every sample, `[track][frame]`: short for
+    /// Evaluates the rotation of every track at every sample, `[track][frame]`. Short for
     /// [`request`](Clip::request)`(frames).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not
-    /// the memory for the result, or the device fails.
+    /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not enough memory
+    /// for the result, or the device fails.
     pub fn evaluate(&self, frames: &SampleTimes) -> Result<Rotations, Error> {
         self.request(frames).evaluate()
     }
 
-    /// The vectors of a clip of angular velocities or accelerations: short for
+    /// Evaluates the vectors of a clip of angular velocities or accelerations. Short for
     /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
-    /// As [`Clip::evaluate`]; also when the clip is of rotations.
+    /// As [`Clip::evaluate`], but the clip must not be of rotations.
     pub fn rates(&self, frames: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
         self.request(frames).layout(layout).rates()
     }
@@ -71,7 +71,7 @@ impl Clip {
         self.uploaded.data.interpolation.quantity
     }
 
-    /// The stored values, whatever they are.
+    /// The values of any quantity.
     pub(crate) fn samples<T>(
         &self,
         timeline: &Timeline,
@@ -82,13 +82,13 @@ impl Clip {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// Into memory of the result's type, of which [`Engine::evaluate_into`] says more: short for
+    /// Evaluates into memory of the result's type, as [`Engine::evaluate_into`]. Short for
     /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`,
-    /// which takes memory of any type.
+    /// which accepts memory of any type.
     ///
     /// # Errors
-    /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
-    /// type.
+    /// As [`Clip::evaluate`], but for any quantity; also when `output` is not exactly as long as the result, or its
+    /// type does not fit the quantity.
     pub fn evaluate_into<R: OutputValue>(
         &self,
         frames: &SampleTimes,
@@ -100,7 +100,7 @@ impl Clip {
             .evaluate_values_into(output)
     }
 
-    /// Evaluates a window of the result into `output`, encoded, if both fit the result.
+    /// Evaluates a window of the result into `output`, in an encoding; refuses windows and outputs that do not fit.
     pub(crate) fn encode_window_into(
         &self,
         timeline: &Timeline,
@@ -117,8 +117,8 @@ impl Clip {
         Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
     }
 
-    /// A request for the samples that `frames` means: of all tracks, track by track, as rotations of four
-    /// f32, unless it says otherwise.
+    /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
+    /// f32 a value.
     pub fn request<'a>(&'a self, frames: &'a SampleTimes) -> Request<'a> {
         Request::of_clip(self, frames)
     }

@@ -1,5 +1,5 @@
-//! Results of sets whose segments would take more memory than there may be: piece by piece, some samples of some
-//! tracks, each of which is prepared, evaluated and forgotten.
+//! Results of sets whose segments would exceed the memory limit: piece by piece. A piece is some samples of some
+//! tracks, which is prepared, evaluated and dropped.
 
 use std::sync::Arc;
 
@@ -19,15 +19,15 @@ use crate::prepare::prepared::segment_size;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Keys of a piece, at the least: with fewer, most of the work would be that of preparing the intervals beside it
-/// again.
+/// The minimum number of keys of a piece: with fewer, the repeated preparation of neighbouring intervals would take
+/// most of the time.
 const MIN_KEYS: usize = 256;
 
-/// Values of a piece that are evaluated at once, where they do not lie together in the result.
+/// The number of values of a piece that are evaluated at once, if they are not contiguous in the result.
 const SCATTERED: usize = 1 << 16;
 
-/// Keys of a track from which on a piece is cut at a sample: the intervals at the cut, which both pieces prepare, are
-/// then few beside the others.
+/// The minimum number of keys of a track for which a piece is divided at a sample: both pieces prepare the intervals
+/// at the division, which are then few relative to the others.
 const KEYS_TO_CUT: usize = 8;
 
 /// Bytes that a key takes when it is prepared: its segment, its constant, and its span.
@@ -41,12 +41,12 @@ pub(crate) fn segment_bytes(set: &TrackSet, interpolation: &Interpolation) -> us
     set.key_count().saturating_mul(key_bytes(interpolation))
 }
 
-/// What is evaluated in pieces.
+/// A set that is evaluated in pieces.
 pub(crate) struct SetPieces<'a> {
     pub(crate) backend: &'a Arc<Backend>,
     pub(crate) set: &'a TrackSet,
     pub(crate) interpolation: &'a Interpolation,
-    /// That of the whole set, times as they were given.
+    /// The timeline of the whole set, with the original times.
     pub(crate) timeline: &'a Timeline,
     pub(crate) encoding: Encoding,
     /// Bytes that the segments of a piece may take.
@@ -73,19 +73,19 @@ impl SetPieces<'_> {
         Ok(())
     }
 
-    /// Whether a piece may have only the intervals in which its samples lie: not where tracks go on outside their
-    /// keys, and not where the whole track says how fast it is traversed.
+    /// Whether a piece may contain only the intervals of its samples: not if tracks continue outside their keys, and
+    /// not if the speed depends on the whole track.
     fn cuts_tracks(&self) -> bool {
         self.interpolation.wrap().are_held() && self.interpolation.speed == Speed::AsKeyed
     }
 
-    /// Bytes that the segments of a window take, about.
+    /// The approximate size of the segments of a window, bytes.
     pub(crate) fn bytes(&self, window: &Window) -> usize {
         let keys = self.keys(window);
         keys.saturating_mul(key_bytes(self.interpolation))
     }
 
-    /// Keys of the intervals that are prepared for a piece.
+    /// The number of keys of the intervals that are prepared for a piece.
     fn keys(&self, piece: &Window) -> usize {
         match self.batch(piece) {
             Batch::Tracks(tracks) => self.set.keys_of(tracks),
@@ -96,7 +96,7 @@ impl SetPieces<'_> {
         }
     }
 
-    /// What is prepared for a piece.
+    /// The intervals that are prepared for a piece.
     fn batch(&self, piece: &Window) -> Batch {
         let tracks = piece.tracks.clone();
         let Some((from, to)) = self.time_span(piece).filter(|_| self.cuts_tracks()) else {
@@ -129,7 +129,7 @@ impl SetPieces<'_> {
         })
     }
 
-    /// A piece in two, if its segments take too much and it can be cut.
+    /// The two halves of a piece, if its segments are too large and it can be divided.
     fn halves(&self, piece: &Window) -> Option<[Window; 2]> {
         let limit = (self.limit / key_bytes(self.interpolation)).max(MIN_KEYS);
         let keys = self.keys(piece);
@@ -148,7 +148,7 @@ impl SetPieces<'_> {
         (tracks.len() > 1).then(|| [part(tracks.start..middle), part(middle..tracks.end)])
     }
 
-    /// Prepares what a window needs, all at once.
+    /// Prepares the segments of a window, all at once.
     pub(crate) fn prepared(&self, window: &Window) -> Result<PreparedWindow, EvaluateError> {
         let (timeline, first_sample) = self.timeline.part(&window.tracks, &window.samples);
         let to_prepare = PrepareRequest {
@@ -215,9 +215,9 @@ impl SetPieces<'_> {
 /// Some samples of some tracks of a set, prepared.
 pub(crate) struct PreparedWindow {
     clip: Uploaded,
-    /// Of the tracks that are prepared.
+    /// The timeline of the prepared tracks.
     timeline: Timeline,
-    /// The first of these tracks.
+    /// The index of the first prepared track.
     first_track: usize,
     /// Samples of the set's timeline before the first of `timeline`.
     skipped_samples: usize,
@@ -236,7 +236,7 @@ impl PreparedWindow {
         })
     }
 
-    /// Works on what is prepared, with the samples and a part of the window as they are there.
+    /// Calls `work` with the prepared tracks, the samples, and a part of the window relative to them.
     pub(crate) fn with<T>(
         &self,
         part: &Window,

@@ -1,4 +1,4 @@
-//! Cuts curves that one polynomial does not fit in two, until every subcurve fits.
+//! Division of curves that one polynomial does not fit into two subcurves, until every subcurve fits.
 
 use bytemuck::Zeroable;
 
@@ -26,17 +26,17 @@ pub(crate) struct Subcurve {
     pub(crate) span: usize,
     /// The curve's index in [`Cutter::curves`].
     curve: usize,
-    /// Where its interval starts, and how long that is, seconds.
+    /// The start and the length of its interval, seconds.
     interval: (f64, f64),
     pub(crate) piece: CurvePiece,
-    /// Its index among the segments, chosen when it is fitted; `None` after that if it is one of
-    /// the finest pieces and does not fit.
+    /// Its index among the segments, chosen when it is fitted; `None` after that if it is one of the finest pieces
+    /// and does not fit.
     pub(crate) segment: Option<usize>,
 }
 
 impl Subcurve {
-    /// Both halves, if it is cut further. The first keeps the segment of the whole, so that segments
-    /// lie nearly in the order in which they are evaluated.
+    /// Both halves, if it is divided further. The first keeps the segment of the whole, so that segments are nearly
+    /// in the order of evaluation.
     fn halves(self) -> Option<[Self; 2]> {
         let (start, duration) = self.interval;
         let [first, second] = self.piece.halves(start, duration)?;
@@ -54,9 +54,8 @@ impl Subcurve {
 }
 
 impl Cutter {
-    /// Adds the curve of a span that starts at a time. If the span has a segment, the curve is known
-    /// not to fit as a whole and is cut into at least two subcurves; else it is cut only if it does
-    /// not fit.
+    /// Adds the curve of a span that starts at a time. If the span has a segment, the curve is known not to fit as a
+    /// whole and is divided into at least two subcurves; otherwise it is divided only if it does not fit.
     pub(crate) fn push(
         &mut self,
         span: usize,
@@ -82,7 +81,7 @@ impl Cutter {
         self.curves.push(curve);
     }
 
-    /// Cuts and fits the curves that were added. Shape and quantity are the same at every call.
+    /// Divides and fits the curves that were added. Shape and quantity are the same at every call.
     pub(crate) fn cut(
         &mut self,
         shape: &'static Shape,
@@ -130,7 +129,7 @@ impl Cutter {
         });
     }
 
-    /// The subcurve as a curve of its own.
+    /// The subcurve as a separate curve.
     pub(crate) fn curve(&self, subcurve: &Subcurve) -> IntervalCurve {
         IntervalCurve {
             piece: subcurve.piece,

@@ -1,11 +1,11 @@
 //! Curves in f64 by their formulas, and their fit by the polynomials that the kernels evaluate, in vector
 //! lanes.
 //!
-//! A [`Shape`] is a formula as a value, so that the preparation need not know which it is;
-//! [`shape`](crate::fit::exact::shape) has those that several methods share. An [`IntervalCurve`] is one curve
-//! of a shape, or the piece of it that one polynomial fits. In a [`FitBlock`] wait up to [`LANES`] curves of
-//! one shape: each is sampled at Chebyshev nodes, and each component of the rotation becomes the polynomial
-//! through the samples ([`nodes`](crate::fit::nodes)).
+//! A [`Shape`] is a formula as a value, so that the preparation is independent of it;
+//! [`shape`](crate::fit::exact::shape) has those that several methods share. An [`IntervalCurve`] is one curve of a
+//! shape, or the piece of it that one polynomial fits. A [`FitBlock`] collects up to [`LANES`] curves of one shape:
+//! each is sampled at Chebyshev nodes, and each component of the rotation becomes the polynomial through the samples
+//! ([`nodes`](crate::fit::nodes)).
 
 use std::sync::Arc;
 
@@ -40,9 +40,9 @@ pub(crate) struct Shape {
     pub(crate) small_angle: f64,
     /// Samples the curves of a block and fits polynomials to them.
     pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
-    /// The same, of velocities and accelerations.
+    /// As `fit`, for velocities and accelerations.
     pub(crate) fit_rates: fn(&mut FitBlock, &mut [PolynomialSegment]),
-    /// The same, of any quantity of curves at constant speed.
+    /// As `fit`, for any quantity of curves at constant speed.
     pub(crate) fit_at_constant_speed: fn(&mut FitBlock, &mut [PolynomialSegment]),
 }
 
@@ -56,7 +56,7 @@ impl Shape {
         numbers
     }
 
-    /// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be cut without a try.
+    /// The tier for a curve with this squared extent; [`Tier::Piece`] if it is to be divided without a try.
     pub(crate) fn tier(&self, squared_extent: f64) -> Tier {
         if squared_extent <= self.small_angle {
             Tier::SmallAngle
@@ -82,7 +82,7 @@ pub(crate) struct IntervalCurve {
     pub(crate) arc_lengths: Option<Arc<ArcLengths>>,
 }
 
-/// The part of an interval that one polynomial fits, from where until where, as fractions of the interval.
+/// The part of an interval that one polynomial fits: its start and its end, as fractions of the interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CurvePiece {
     from: f64,
@@ -91,7 +91,7 @@ pub(crate) struct CurvePiece {
     cuts: u8,
 }
 
-/// A curve that no polynomial fits even after so many cuts turns by dozens of radians within one
+/// The maximum number of halvings. A curve that no polynomial fits even then rotates by dozens of radians within one
 /// interval; the host evaluates it in f64 for every device.
 const MAX_CUTS: u8 = 4;
 
@@ -107,8 +107,8 @@ impl CurvePiece {
         start + duration * self.from
     }
 
-    /// Both halves of a piece of that interval; `None` if it is not cut further. They meet at a time
-    /// that an f64 has: far from 0 that is not quite the middle, and may be one of the ends.
+    /// Both halves of a piece of the interval; `None` if it is not divided further. They meet at a time that f64
+    /// represents: far from 0 that is not exactly the middle, and may be one of the ends.
     pub(crate) fn halves(self, start: f64, duration: f64) -> Option<[Self; 2]> {
         let cuts = self.cuts + 1;
         let mut middle = 0.5 * (self.from + self.to);
@@ -137,11 +137,12 @@ impl CurvePiece {
     }
 }
 
-/// A part of an interval's duration within which polynomials in f32 have the same coefficients.
+/// The largest difference, as a fraction of an interval's duration, for which polynomials in f32 have the same
+/// coefficients.
 pub(crate) const INDISTINCT: f64 = 1.0 / (1u64 << 28) as f64;
 
 impl IntervalCurve {
-    /// A whole curve, traversed as the key times say.
+    /// A whole curve with the speed of the key times.
     pub(crate) fn new(
         shape: &'static Shape,
         numbers: FormulaNumbers,
@@ -212,20 +213,19 @@ impl IntervalCurve {
     }
 }
 
-/// How a curve is fitted, by how far it turns.
+/// The degree with which a curve is fitted; it depends on the angle of the curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tier {
-    /// Degree 6, for curves that turn through small angles, such as between the dense keys of
-    /// motion capture.
+    /// Degree 6, for curves of small angles, such as between the dense keys of motion capture.
     SmallAngle,
     /// Degree 10.
     Full,
-    /// Degree 10 for a piece of a curve, which may turn any distance.
+    /// Degree 10 for a piece of a curve of any angle.
     Piece,
 }
 
 impl Tier {
-    /// The nodes at which its curves are sampled, as [`Nodes::offsets`] has them.
+    /// The nodes at which its curves are sampled, in the order of [`Nodes::offsets`].
     #[inline(always)]
     pub(crate) fn offsets(self) -> &'static [f64] {
         static SMALL_ANGLE_OFFSETS: [f64; 7] = SMALL_ANGLE_NODES.offsets();
@@ -241,8 +241,7 @@ impl Tier {
 /// fits a curve of most shapes within 2e-8.
 pub(crate) const SMALL_ANGLE: f64 = 0.002;
 
-/// The squared extent above which curves are cut without trying to fit them whole: hardly any
-/// would fit.
+/// The squared extent above which curves are divided without trying to fit the whole, because very few would fit.
 pub(crate) const LARGEST_UNCUT: f64 = 0.2;
 
 /// The largest accepted estimate of twice a fit's truncation error; see [`tail`](crate::fit::nodes::tail).
@@ -256,7 +255,7 @@ const SHORT_REACH: f64 = 0.785;
 pub(crate) type FitRow = [f64; LANES];
 pub(crate) type FitRowF32 = [f32; LANES];
 
-/// Up to [`LANES`] curves that wait to be fitted, all of one shape and tier.
+/// A block of up to [`LANES`] curves of one shape and tier that are to be fitted.
 pub(crate) struct FitBlock {
     pub(crate) shape: &'static Shape,
     pub(crate) tier: Tier,
@@ -307,7 +306,7 @@ impl FitBlock {
         }
     }
 
-    /// How many more it takes.
+    /// The number of curves for which it has room.
     pub(crate) fn room(&self) -> usize {
         LANES - self.count
     }

@@ -37,9 +37,9 @@ impl InLanes for ExactSteps<'_> {
 }
 
 /// Calls `again` with `state` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
-/// which is the first of `lanes`; a lane is in doubt where its number is not 0, and NaN is not. Most vectors
-/// have none. `again` is a function and no closure: a closure in code for vectors would be compiled anew
-/// for each width.
+/// which is the first of `lanes`; a lane is in doubt if its number is not 0 and not NaN. In most vectors there is
+/// none. `again` is a function instead of a closure, because a closure in vector code would be compiled for each
+/// width.
 #[inline(always)]
 pub(crate) fn redo<D: Doubles, S: ?Sized>(
     doubt: D,
@@ -54,7 +54,7 @@ pub(crate) fn redo<D: Doubles, S: ?Sized>(
     }
 }
 
-/// The rest of [`redo`], rarely needed and so not inlined into loops over vectors.
+/// The rest of [`redo`], which is rarely needed and therefore not inlined into loops over vectors.
 #[inline(never)]
 fn redo_lanes<S: ?Sized>(
     lanes: Range<usize>,
@@ -75,7 +75,7 @@ fn units<L: Lanes>(keys: &[[f32; 4]; ROW_LEN], lane: usize) -> [L::Doubles; 4] {
     normalised(widened(L::load_rotations(&keys[lane..])))
 }
 
-/// Finds for each interval of some lanes whether a frame lies in it.
+/// Finds the intervals of some lanes that contain a frame.
 pub(crate) struct FindFrames<'a> {
     pub(crate) clock: FrameClock,
     pub(crate) intervals: &'a Intervals,
@@ -96,7 +96,7 @@ impl InLanes for FindFrames<'_> {
     }
 }
 
-/// What a [`HandleRule`] gets of a key interval, or of the intervals in a vector's lanes.
+/// The data of a key interval, or of the intervals in a vector's lanes, for a [`HandleRule`].
 #[derive(Clone, Copy)]
 pub(crate) struct KeyInterval<R> {
     /// Seconds.
@@ -129,7 +129,7 @@ pub(crate) trait HandleRule {
     /// Whether curves are in cumulative form, not by their control rotations.
     const IS_CUMULATIVE: bool = false;
 
-    /// At constant velocity the two handles of an interval are together this part of its logarithm.
+    /// The fraction of an interval's logarithm that the sum of its two handles is at constant velocity.
     const HANDLE_SHARE: f64 = 2.0 / 3.0;
 
     /// The handle of the first or of the last key of a track, from the logarithm of its interval's
@@ -152,8 +152,8 @@ pub(crate) trait HandleRule {
     }
 }
 
-/// Whether a handle ends at the key's own quaternion with the other sign. No arc leads there more than any
-/// other, and so the construction by arcs has no curve: of the parabola through half turns there and back.
+/// Whether a handle ends at the key's quaternion with the other sign. No arc to it is distinguished, so the
+/// construction by arcs defines no curve. This happens for the parabola through rotations by 180° there and back.
 fn is_opposite(handle: Vector) -> bool {
     let square: f64 = handle.iter().map(|part| part * part).sum();
     (square - std::f64::consts::PI * std::f64::consts::PI).abs() < 1e-5
@@ -162,7 +162,7 @@ fn is_opposite(handle: Vector) -> bool {
 /// The condition for the handle of a track's first or last key.
 #[derive(Clone, Copy)]
 pub(crate) enum EndHandle {
-    /// The velocity is that which turns by this half-rotation vector within the interval.
+    /// The velocity would rotate by this half-rotation vector within the interval.
     Velocity(Vector),
     /// The curve continues the parabola through the last three keys.
     Parabolic,

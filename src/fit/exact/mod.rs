@@ -1,5 +1,5 @@
-//! The exact way, in f64, for every method, angle and quantity: the handles of keys, the curves by
-//! their formulas, and the polynomials fitted to them.
+//! Exact fitting, in f64, for every method, angle and quantity: the handles of keys, the curves by their formulas,
+//! and the polynomials that are fitted to them.
 
 pub(crate) mod cut;
 pub(crate) mod expansion;

@@ -1,5 +1,5 @@
-//! The first half of a fit: how the curves of a block are sampled at the nodes, and the sampling that serves any
-//! formula, by the formula itself in f64. The second half, [`FitBlock::interpolate`], is the same for all.
+//! The first half of a fit: sampling of the curves of a block at the nodes; one implementation works for any formula,
+//! by the formula itself in f64. The second half, [`FitBlock::interpolate`], is the same for all.
 
 use std::marker::PhantomData;
 
@@ -14,7 +14,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::doubles::Doubles;
 use crate::simd::lanes::{Lanes, MAX_LANES};
 
-/// A way to sample the curves of a block.
+/// A method of sampling the curves of a block.
 pub(crate) trait Sampling: 'static {
     /// Whether it samples in the units [`FitBlock::scales`].
     const IS_SCALED: bool = false;

@@ -1,4 +1,4 @@
-//! Formulas as values: what makes a [`Shape`] of a formula, and the shapes that several methods share.
+//! Formulas as values: construction of a [`Shape`] from a formula, and the shapes that several methods share.
 
 use crate::curve::formula::{DeCasteljau, Formula, NUMBERS, Product, RotationVector, StraightLine};
 use crate::fit::exact::expansion::Expansion;
@@ -57,8 +57,8 @@ pub(crate) static ROTATION_VECTOR: Shape = Shape {
     ..shape_of::<RotationVector>(13)
 };
 
-/// How velocities and accelerations are fitted: in vector lanes, compiled for each formula; in WebAssembly, where
-/// every page would carry that, curve by curve, with the same bits.
+/// The function that fits velocities and accelerations: in vector lanes, compiled for each formula; in WebAssembly,
+/// where every page would load that code, curve by curve, with the same bits.
 const fn rates_of<F: Formula>() -> fn(&mut FitBlock, &mut [PolynomialSegment]) {
     if cfg!(target_arch = "wasm32") {
         fit::<Motion>

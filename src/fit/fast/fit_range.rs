@@ -3,15 +3,14 @@
 
 use crate::fit::nodes::{DEGREE_8_END_NODES, END_NODES, HALF_END_NODES, Nodes};
 
-/// The squared extents (sums of the three half-rotation vectors' squares) up to which
-/// [`WHOLE_DEGREE_8`] and [`WHOLE`] fit curves with a truncation error of at most 7e-8 in a component.
-/// A fit in two halves has a smaller one for every longer curve that comes straight from keys.
+/// The squared extents (sums of the three half-rotation vectors' squares) up to which [`WHOLE_DEGREE_8`] and
+/// [`WHOLE`] fit curves with a truncation error of at most 7e-8 in a component. For every longer curve that is
+/// computed directly from keys, a fit in two halves has a smaller error.
 pub(crate) const LONGEST_DEGREE_8: f64 = 0.01;
 pub(crate) const LONGEST_WHOLE: f64 = 0.16;
 
-/// A range of the parameter's range, counted from the start of the curve or back from its end, and
-/// the nodes at which curves are sampled there. Values and derivatives at the range's ends and at
-/// its middle need no sampling.
+/// A range of the parameter, relative to the start of the curve or backwards from its end, and the nodes at which
+/// curves are sampled there. Values and derivatives at the range's ends and at its middle need no sampling.
 pub(crate) struct FitRange<const SAMPLED: usize, const PAIRS: usize> {
     pub(crate) nodes: &'static Nodes<PAIRS>,
     pub(crate) middle: BasisValues,
@@ -85,8 +84,8 @@ impl<const SAMPLED: usize, const PAIRS: usize> FitRange<SAMPLED, PAIRS> {
 }
 
 impl FitRange<2, 5> {
-    /// The range for a parameter that runs backwards. The three basis functions change places, as
-    /// `1 - Bᵢ(1 - t) = B₄₋ᵢ(t)`.
+    /// The range for a parameter that runs backwards. The three basis functions are exchanged, because `1 - Bᵢ(1 - t)
+    /// = B₄₋ᵢ(t)`.
     const fn backward(mut self) -> Self {
         self.middle.weights = backward(self.middle.weights);
         self.middle.rates = backward(self.middle.rates);

@@ -1,10 +1,9 @@
-//! Steps, handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then
-//! fits the curves whole or in two halves.
+//! Steps, handles and curves in vector lanes of f32, directly from four keys; the Hermite fit then fits the curves as
+//! a whole or in two halves.
 //!
-//! Steps come from the differences of neighbouring keys, which are as exact in f32 as the keys,
-//! and rotations are stored as their difference from the identity: rounding errors are then small
-//! where the curve turns little. Only the vector between the handles is computed in f64, because
-//! the rounding errors of all others would add up in it.
+//! Steps are computed from the differences of neighbouring keys, which are as exact in f32 as the keys, and rotations
+//! are stored as their difference from the identity: then rounding errors are small for small angles. Only the vector
+//! between the handles is computed in f64, because the rounding errors of all other numbers would add up in it.
 
 use bytemuck::Zeroable;
 
@@ -48,11 +47,11 @@ const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
 const THIRD: f32 = 1.0 / 3.0;
 const TWO_THIRDS: f32 = 2.0 / 3.0;
 
-/// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
-/// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
+/// The largest square of the half-rotation vectors from which a tangent is computed, and of their sum. Up to it no
+/// other branch of the tangent's logarithm is nearer than the principal one.
 const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 
-/// Lanes behind those of a block, in which curves of earlier blocks wait to be fitted.
+/// Lanes after those of a block, in which curves of earlier blocks wait to be fitted.
 pub(crate) const SPARE_LANES: usize = 3 * MAX_LANES;
 
 /// The first key of each curve, its three half-rotation vectors, and its last key.

@@ -22,7 +22,7 @@ pub(crate) struct BetweenKeys<L> {
     pub(crate) end: [L; 4],
 }
 
-/// A way to fit such curves by `PAIRS` pairs of nodes.
+/// A method of fitting such curves by `PAIRS` pairs of nodes.
 pub(crate) trait KeyFit<const PAIRS: usize> {
     /// Fits the curves into the segments with these indices; a fit in two halves also fills the
     /// segment after each. `samples` is scratch memory.
@@ -103,7 +103,7 @@ struct RangeEnd<L> {
 }
 
 impl<L: Lanes> RangeEnd<L> {
-    /// A rotation that turns at `times` a half-rotation vector per unit of the parameter.
+    /// A rotation whose half-rotation vector changes by `times` a vector per unit of the parameter.
     #[inline(always)]
     fn new(rotation: [L; 4], vector: [L; 3], times: f32) -> Self {
         Self {

@@ -1,5 +1,5 @@
-//! The fast way, in f32 straight from four keys, for curves that turn through moderate angles. Lanes whose
-//! numbers are outside its range are marked, and go the exact way.
+//! Fast fitting, in f32 directly from four keys, for curves of moderate angles. Lanes whose numbers are outside its
+//! range are marked, and are fitted by exact fitting.
 
 pub(crate) mod exp_log;
 pub(crate) mod fit_range;

@@ -1,5 +1,5 @@
-//! Curves that turn through small angles, in vector lanes of f32: the coefficients that the kernels
-//! evaluate follow straight from the keys, and nothing is sampled or fitted.
+//! Curves of small angles, in vector lanes of f32: the coefficients for the kernels are computed directly from the
+//! keys; nothing is sampled or fitted.
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
@@ -12,15 +12,14 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
-/// Up to this many curves are computed one by one: in vectors most lanes would be wasted.
+/// The maximum number of curves that are computed one by one, because most lanes of vectors would be unused.
 const CURVES_ONE_BY_ONE: usize = 6;
 
 /// The small-angle curves of a block's intervals.
 #[derive(Zeroable)]
 pub(crate) struct SmallAngleLanes {
     powers: [[[f32; 4]; ROW_LEN]; 7],
-    /// Whether a lane's curve turns through small angles only, so that `powers` are its
-    /// coefficients.
+    /// Whether a lane's curve has small angles only, so that `powers` are its coefficients.
     pub(crate) is_valid: [bool; ROW_LEN],
 }
 
@@ -96,7 +95,7 @@ impl SmallAnglePass<'_> {
         small_angle_cubic([before, from[j + 1], to[j + 1], after], first, last)
     }
 
-    /// The keys before and after lane `j + 1`; a key without a neighbour stands for it itself.
+    /// The keys before and after lane `j + 1`; a missing neighbour is replaced by the key itself.
     #[inline(always)]
     fn neighbours(&self, j: usize) -> [[f32; 4]; 2] {
         let Intervals { from, to, .. } = self.intervals;

@@ -1,21 +1,20 @@
-//! Arc length of curves, by which they are traversed at constant speed.
+//! Arc lengths of curves, for constant speed.
 
 use crate::math::dual::Dual;
 use crate::math::quadrature::{gauss, integral};
 use crate::math::quaternion::{length, step};
 
-/// A curve's parameter is divided into this many equal parts; the arc length up to each is kept.
+/// The number of equal parts of a curve's parameter; the arc length up to each is stored.
 const PARTS: usize = 8;
 
 /// A curve that is slower than this fraction of its mean speed counts as at rest.
 const SLOW: f64 = 1e-4;
 
-/// The distance in the parameter from a point of rest at which the direction is taken: a curve that
-/// starts from rest has turned by a billionth of its length there, and its direction is known to
-/// seven digits.
+/// The distance in the parameter from a point of rest at which the direction is computed: there, a curve that starts
+/// from rest has rotated by a billionth of its length, and its direction is known to seven digits.
 const NEXT_TO_REST: f64 = 1e-5;
 
-/// How far outside its interval a curve is followed at most, in parts of the interval.
+/// The maximum distance outside its interval to which a curve is followed, as a fraction of the interval.
 const FARTHEST_OUTSIDE: f64 = 0.25;
 
 /// A curve: its rotation as a function of the parameter, in dual numbers.
@@ -23,12 +22,12 @@ pub(crate) trait Moving: Fn(Dual) -> [Dual; 4] {}
 
 impl<F: Fn(Dual) -> [Dual; 4]> Moving for F {}
 
-/// How far a curve has turned at each eighth of its parameter, radians.
+/// The angle that a curve has covered at each eighth of its parameter, radians.
 #[derive(Debug)]
 pub(crate) struct ArcLengths {
     lengths: [f64; PARTS + 1],
-    /// The fractions of the length at which the curve is when its interval starts and ends: 0 and 1, but
-    /// far from the time 0, where the exact start and end lie between two times of f64.
+    /// The fractions of the length at the start and the end of the curve's interval: 0 and 1, except for large times,
+    /// where the exact start and end are between two numbers of f64.
     ends: [f64; 2],
 }
 
@@ -45,18 +44,18 @@ impl ArcLengths {
         }
     }
 
-    /// Lets the interval start and end where the curve has turned by these fractions of its length.
+    /// Sets the fractions of the length at the start and the end of the interval.
     pub(crate) fn set_ends(&mut self, ends: [f64; 2]) {
         self.ends = ends;
     }
 
-    /// How far the whole curve turns, radians.
+    /// The angle of the whole curve, radians.
     pub(crate) fn total(&self) -> f64 {
         self.lengths[PARTS]
     }
 
-    /// The curve's own parameter at `t`, which runs from 0 to 1 over the interval, with the first two
-    /// derivatives by `t`.
+    /// The parameter of the curve at `t`, which runs from 0 to 1 over the interval, with the first two derivatives by
+    /// `t`.
     pub(crate) fn parameter(&self, curve: &impl Moving, t: f64) -> Dual {
         let [from, to] = self.ends;
         let mut u = self.parameter_at(curve, (from + (to - from) * t) * self.total());
@@ -73,8 +72,8 @@ impl ArcLengths {
         Dual::new(u, first, -along * (first / speed) * (first / speed))
     }
 
-    /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection
-    /// where that leaves the part which contains it.
+    /// The parameter at which the curve has covered `target` radians: Newton's method, or bisection if Newton's
+    /// method leaves the part that contains it.
     fn parameter_at(&self, curve: &impl Moving, target: f64) -> f64 {
         let part = self.lengths.partition_point(|&length| length <= target);
         let part = part.saturating_sub(1).min(PARTS - 1);
@@ -129,7 +128,7 @@ fn arc_length_between(curve: &impl Moving, from: f64, to: f64) -> f64 {
     integral(&speed(curve), from, to, FINEST, &differ)
 }
 
-/// The most halvings. They are needed where a curve almost stops: its speed has a corner there.
+/// The maximum number of halvings, which are needed where a curve almost stops, because its speed has a corner there.
 const FINEST: u32 = 8;
 
 /// The angular speed by the parameter.

@@ -1,4 +1,4 @@
-//! What an engine reports of itself: what it chose for its device, and how long its kernels take to compile.
+//! Reports of an engine about itself: its choices for its device, and the time to compile its kernels.
 
 use std::time::{Duration, Instant};
 
@@ -7,34 +7,34 @@ use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 
-/// What the engine chose for a device, where options left it the choice.
+/// The engine's choices for a device, where options are `Automatic`.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct EngineChoices {
-    /// `samples` or `runs`: what neighbouring invocations take ([`Mapping`](crate::gpu::options::Mapping)).
+    /// `samples` or `runs`: the work of neighbouring invocations ([`Mapping`](crate::gpu::options::Mapping)).
     pub mapping: &'static str,
     /// `texel-buffers` or `storage-buffers`: how kernels read.
     pub reads: &'static str,
     /// `in-place` or `staged`: how results reach the host.
     pub transfer: &'static str,
-    /// `same-queue`, `apart` or `copy-queue`: how staged results are copied.
+    /// `same-queue`, `apart` or `copy-queue`: the queue on which staged results are copied.
     pub read_back: &'static str,
-    /// `direct`, `small-direct` or `host`: how uploads come to the device by default.
+    /// `direct`, `small-direct` or `host`: the default of uploads to the device.
     pub uploads: &'static str,
-    /// Whether the caller's memory is imported.
+    /// Whether kernels write into the caller's memory, which is imported.
     pub imports_memory: bool,
-    /// Windows in flight.
+    /// The number of windows in flight.
     pub windows_in_flight: usize,
-    /// Rotations of a window, at most.
+    /// The maximum number of rotations of a window.
     pub window: usize,
-    /// The queue family that computes.
+    /// The index of the queue family that computes.
     pub queue_family: u32,
-    /// The queue family that copies.
+    /// The index of the queue family that copies.
     pub copy_queue_family: u32,
 }
 
 impl VulkanEngine {
-    /// Compiles every kernel, and says how long each took.
+    /// Compiles every kernel and reports how long each took.
     pub(crate) fn compile_kernels(
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
@@ -49,7 +49,7 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// What was chosen for its device.
+    /// The choices for the device.
     pub(crate) fn choices(&self) -> EngineChoices {
         let device: &LogicalDevice = &self.device;
         let queues = [QueueLane::Kernels, QueueLane::Copies].map(|lane| device.family(lane));

@@ -1,5 +1,5 @@
-//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two dispatches or
-//! three are in flight: the host writes the keys of one while the device works on the others.
+//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two or three dispatches are in
+//! flight: the host writes the keys of one while the device evaluates the others.
 
 use std::iter::from_fn;
 use std::ops::Range;
@@ -20,7 +20,7 @@ use crate::gpu::upload::Upload;
 use crate::output::encoding::Encoding;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
 
-/// What the host writes for one dispatch.
+/// The data that the host writes for one dispatch.
 #[derive(Default)]
 pub(crate) struct KeyUploads {
     keys: Upload,
@@ -70,8 +70,8 @@ impl VulkanEngine {
         result
     }
 
-    /// Submits one dispatch; `output` are the bytes of the whole result that it makes, and `keys` those
-    /// of the set where kernels can read them in place.
+    /// Submits one dispatch. `output` is the range of bytes in the whole result that it writes; `keys` are the bytes
+    /// of the set's keys if kernels can read them in place.
     fn start_keys(
         &self,
         flight: &mut InFlight<KeyUploads>,

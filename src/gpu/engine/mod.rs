@@ -43,30 +43,31 @@ use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
 
-/// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
-/// speed demand fewer.
+/// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
+/// require fewer.
 const WINDOW: u64 = 1 << 21;
 
-/// Rotations down to which windows are halved when memory is short or the device slow: 1 MiB.
+/// The minimum number of rotations of a window, 1 MiB; windows are halved down to it if memory is short or the device
+/// slow.
 const SMALLEST_WINDOW: usize = 1 << 16;
 
-/// Windows in flight: the host fills one while the device works on another.
+/// The number of windows in flight: the host fills one while the device evaluates another.
 const IN_FLIGHT: usize = 2;
 
-/// The same where a second queue copies: one is filled, one evaluated, and one on its way back.
+/// The number of windows in flight if a second queue copies: one is filled, one evaluated, and one copied back.
 const IN_FLIGHT_WITH_COPIES: usize = 3;
 
 /// A Vulkan device with its kernels.
 pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
-    /// Made when they are first needed.
+    /// Pipelines, which are made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
     pub(crate) in_flight: Exclusive<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Exclusive<Vec<InFlight<KeyUploads>>>,
     pub(crate) in_flight_count: usize,
-    /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
+    /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
-    /// Whether the caller's memory is imported where the device can.
+    /// Whether the caller's memory is imported if the device can.
     pub(crate) imports: bool,
     /// Rotations of one window.
     pub(crate) window: AtomicUsize,
@@ -74,14 +75,14 @@ pub(crate) struct VulkanEngine {
     pub(crate) group_bytes: usize,
     /// Bytes that the segments of one clip may take on the device; `None` without a memory budget.
     pub(crate) clip_bytes: Option<usize>,
-    /// Whether kernels that differ from the CPU are used all the same.
+    /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
 }
 
 impl VulkanEngine {
-    /// An engine on a device that is open, whose exactness is still to be tested.
+    /// Makes an engine on an open device, whose exactness was not tested yet.
     pub(crate) fn new(device: Arc<LogicalDevice>, options: &EngineOptions) -> Self {
         let info = &device.physical.info;
         let in_flight_count = match device.copies_apart {
@@ -118,10 +119,10 @@ impl VulkanEngine {
         }
     }
 
-    /// An engine on an application's device.
+    /// Makes an engine on an application's device.
     ///
     /// # Safety
-    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
+    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan).
     pub(crate) unsafe fn from_handles(
         handles: VulkanHandles,
         options: &EngineOptions,
@@ -156,8 +157,8 @@ impl VulkanEngine {
         Ok(Self::new(Arc::new(device), options))
     }
 
-    /// The kinds of lists that its kernels over segments work on. What binds more storage buffers than the
-    /// device can is left out.
+    /// The kinds of lists that the engine's kernels over segments can use. Kinds that bind more storage buffers than
+    /// the device allows are left out.
     pub(crate) fn lists(&self) -> Vec<List> {
         let mut all = vec![List::Samples, List::Frames];
         let has_room = self.device.reads_texels || self.device.physical.storage_buffers > 4;
@@ -168,8 +169,8 @@ impl VulkanEngine {
         all
     }
 
-    /// The pipeline of a kernel, made when it is first needed, and checked then unless this kernel is known to be
-    /// exact on this device.
+    /// The pipeline of a kernel. It is made when it is first needed, and checked then, unless this kernel is known to
+    /// be exact on this device.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
         let kept = || lock(&self.pipelines)[kernel as usize].clone();
         if let Some(pipeline) = kept() {
@@ -204,8 +205,8 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// Checks every kernel, while `each` returns true; with `only_unknown` those alone that are not known to
-    /// pass.
+    /// Checks every kernel, while `each` returns true; with `only_unknown`, the kernels that are known to pass are
+    /// not run.
     pub(crate) fn check_kernels(
         &self,
         only_unknown: bool,
@@ -250,14 +251,14 @@ impl VulkanEngine {
         outcome
     }
 
-    /// What is known of each kernel.
+    /// The known results of the kernels' checks.
     pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
         self.bindable()
             .map(|code| self.known_kernel(code))
             .collect()
     }
 
-    /// The kernels that the device may be given: those that bind no more storage buffers than it allows.
+    /// The kernels that this device can run: those that bind no more storage buffers than it allows.
     pub(crate) fn bindable(&self) -> impl Iterator<Item = &'static KernelCode> {
         let limit = self.device.physical.storage_buffers;
         let needed = |code: &KernelCode| Pipeline::storage_buffers(&self.device, code.kernel);
@@ -275,8 +276,8 @@ impl VulkanEngine {
         }
     }
 
-    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,
-    /// are used again where they are large enough.
+    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed, are reused if they
+    /// are large enough.
     pub(crate) fn upload(
         &self,
         clip: &ClipData,
@@ -304,7 +305,7 @@ impl VulkanEngine {
         Ok(ClipBuffers { device, groups })
     }
 
-    /// What is listed for a job.
+    /// The request for the work lists of a job.
     pub(crate) fn list_request<'a>(&'a self, job: Job<'a>) -> ListRequest<'a> {
         ListRequest {
             device: &self.device,
@@ -314,7 +315,7 @@ impl VulkanEngine {
         }
     }
 
-    /// Refuses what is longer than a kernel can bind.
+    /// Refuses a buffer that is longer than a kernel can bind.
     pub(crate) fn check_size(
         &self,
         subject: &'static str,
@@ -332,7 +333,7 @@ impl VulkanEngine {
         self.window.load(Ordering::Relaxed)
     }
 
-    /// Halves the size of later windows; false when it is at its minimum already.
+    /// Halves the size of later windows; false if it is at its minimum already.
     pub(crate) fn halve_windows(&self) -> bool {
         let half = self.window() / 2;
         let smaller = half >= SMALLEST_WINDOW;
@@ -342,8 +343,8 @@ impl VulkanEngine {
         smaller
     }
 
-    /// Frees the buffers that are kept for the next evaluation and not in use by another; false when
-    /// there are none.
+    /// Frees the buffers that are kept for the next evaluation and that no other evaluation uses; false if there are
+    /// none.
     pub(crate) fn give_back(&self) -> bool {
         let in_flight = self.in_flight.idle().map_or(0, |kept| kept.len());
         let keys_in_flight = self.keys_in_flight.idle().map_or(0, |kept| kept.len());
@@ -351,7 +352,7 @@ impl VulkanEngine {
         in_flight + keys_in_flight + free > 0
     }
 
-    /// A buffer with these bytes, in the memory that kernels read fastest.
+    /// Makes a buffer with these bytes, in the memory that kernels read fastest.
     pub(crate) fn resident(
         &self,
         name: &str,
@@ -379,9 +380,9 @@ impl VulkanEngine {
         Ok(resident)
     }
 
-    /// Evaluates in f32 into memory of the engine's choice: the device's own, mapped, where
-    /// it writes in place and one allocation can hold the result; from the second time on that the same is
-    /// asked for, memory that a card's copies go to.
+    /// Evaluates in f32 into memory of the engine's choice. This is mapped device memory, if the device writes in
+    /// place and one allocation can contain the result. When the same request is repeated on a card, it is memory
+    /// that the card's copies write directly.
     pub(crate) fn evaluate(
         &self,
         job: Job<'_>,
@@ -443,7 +444,7 @@ impl VulkanEngine {
         self.run(job, window, target, kept.as_deref())
     }
 
-    /// A buffer that was given back, when one fits closely, else a new one.
+    /// A free buffer of about this size, if there is one, else a new one.
     fn output_buffer(&self, bytes: u64, residence: Residence) -> Result<Buffer, VulkanError> {
         let mut free = lock(&self.free);
         let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
@@ -454,8 +455,8 @@ impl VulkanEngine {
         Buffer::new(&self.device, "tumble rotations", bytes, residence)
     }
 
-    /// A pass over poses: runs a kernel with these inputs, of at most as many values of 16 bytes as a
-    /// window has rotations. It has `count` invocations; `detail` is passed to the kernel.
+    /// Runs the kernel of a pass over poses with these inputs, each of at most as many values of 16 bytes as a window
+    /// has rotations. The kernel has `count` invocations and the parameter `detail`.
     pub(crate) fn pass(
         &self,
         kernel: Kernel,
@@ -485,13 +486,12 @@ impl VulkanEngine {
     }
 }
 
-/// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
-/// than evaluating.
+/// Output buffers of dropped results, for reuse: the first access to fresh memory takes longer than evaluating.
 type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
 
-/// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
+/// A result in mapped memory. When it is dropped, its buffer returns to the engine.
 struct MappedQuats {
-    /// There until it is dropped.
+    /// `Some` until it is dropped.
     buffer: Option<Buffer>,
     count: usize,
     free: FreeBuffers,
@@ -505,7 +505,7 @@ impl Storage for MappedQuats {
     }
 }
 
-/// The most output buffers that are kept for later evaluations.
+/// The maximum number of output buffers that are kept for later evaluations.
 const KEPT: usize = 4;
 
 impl Drop for MappedQuats {

@@ -1,5 +1,5 @@
-//! The walk over a result's windows. Two are in flight: the host lists the work of one while the
-//! device evaluates the other; three where a second queue brings back the one before.
+//! Evaluation of a result window by window. Two windows are in flight: the host lists the work of one while the
+//! device evaluates the other; three if a second queue copies results back.
 
 use std::mem::take;
 use std::sync::Arc;
@@ -23,11 +23,10 @@ use crate::shader::{Dispatch, Grid, Item, LINE, List, WORKGROUP};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
 
-/// Bytes of the lines in which a card's memory is written, at most.
+/// The maximum size of the lines in which a card's memory is written, bytes.
 const LINE_BYTES: u64 = 128;
 
-/// The last aligned offset that is a whole number of rotations before the start of a window; a
-/// binding begins there.
+/// The largest aligned offset that is a whole number of rotations before the start of a window, for a binding.
 fn aligned_before(start: u64, rotation: u64, alignment: u64) -> Option<u64> {
     let mut aligned = start / alignment * alignment;
     while !(start - aligned).is_multiple_of(rotation) {
@@ -36,12 +35,12 @@ fn aligned_before(start: u64, rotation: u64, alignment: u64) -> Option<u64> {
     Some(aligned)
 }
 
-/// What comes with one dispatch over segments.
+/// The push constants of one dispatch over segments.
 #[derive(Clone, Copy)]
 pub(crate) enum Arguments {
-    /// Of a grid, whose neighbouring invocations take neighbouring samples.
+    /// For a grid, in which neighbouring invocations evaluate neighbouring samples.
     Grid(Grid),
-    /// Of items, or of listed samples.
+    /// For items, or for listed samples.
     Listed(Dispatch),
 }
 
@@ -55,8 +54,8 @@ impl Arguments {
 }
 
 impl VulkanEngine {
-    /// Values of a window, of this encoding: `self.window()` counts rotations of 16 bytes; of larger ones
-    /// a window holds fewer.
+    /// The number of values of a window in this encoding. `self.window()` is for rotations of 16 bytes; for larger
+    /// values it is smaller.
     pub(crate) fn window_of(&self, encoding: Encoding) -> usize {
         let each = encoding.bytes().div_ceil(Encoding::F32.bytes());
         (self.window() / each).max(1)
@@ -78,7 +77,7 @@ impl VulkanEngine {
         self.run(job, window, Target::External(buffer), None)
     }
 
-    /// The lists of a result that the host reads, where it was asked for before.
+    /// The lists of a result that the host reads, if the same result was requested before.
     pub(crate) fn kept(
         &self,
         job: Job<'_>,
@@ -87,7 +86,7 @@ impl VulkanEngine {
         self.kept_lists(job, window, self.window_of(job.encoding))
     }
 
-    /// The lists that a clip keeps of a result, in windows of so many values; none under a memory budget.
+    /// The lists that a clip keeps of a result, in windows of this number of values; `None` under a memory budget.
     fn kept_lists(
         &self,
         job: Job<'_>,
@@ -100,7 +99,7 @@ impl VulkanEngine {
         (job.lists).lists(self.list_request(job), whole, values_per_window)
     }
 
-    /// Evaluates a window of a result, cut into smaller windows that suit the device.
+    /// Evaluates a window of a result, divided into smaller windows that suit the device.
     pub(crate) fn run(
         &self,
         job: Job<'_>,
@@ -216,8 +215,8 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// Where a binding begins that has a value at `start`: where a line of memory does on cards, and whole
-    /// values before it.
+    /// The start of a binding for a value at `start`: on cards the start of a memory line, and a whole number of
+    /// values before `start`.
     pub(crate) fn binding_before(&self, start: u64, rotation: u64) -> u64 {
         let info = &self.device.physical.info;
         let least = info.min_storage_buffer_offset_alignment.max(1);
@@ -227,8 +226,8 @@ impl VulkanEngine {
             .unwrap_or(0)
     }
 
-    /// The dispatch of a group of a window: with the stride of its samples, what the store needs beside a
-    /// rotation, and how many values behind the beginning of the binding the window's result begins.
+    /// The dispatch of a group of a window. `like` is the stride of its samples, the parameter of the store, and the
+    /// index of the window's first value in the binding.
     pub(crate) fn dispatch_of(
         &self,
         work: &Work,
@@ -265,8 +264,8 @@ impl VulkanEngine {
         (Arguments::Listed(dispatch), groups)
     }
 
-    /// Values of a window where results stay on a card, which is done with them long before anybody
-    /// notices; `None` on devices that take their time.
+    /// The number of values of a window whose results stay on a card, which is too fast for long windows to be a
+    /// problem; `None` on slow devices.
     pub(crate) fn at_once(&self) -> Option<usize> {
         const AT_ONCE: usize = 1 << 24;
         let info = &self.device.physical.info;
@@ -275,15 +274,14 @@ impl VulkanEngine {
         (self.maps_samples).then(|| AT_ONCE.min(usize::try_from(listed).unwrap_or(AT_ONCE)))
     }
 
-    /// Whether a result goes into one binding.
+    /// Whether the whole result fits one binding.
     fn binds_at_once(&self, job: Job<'_>, whole: &Window) -> bool {
         let bytes = (whole.len() * job.encoding.bytes()) as u64 + LINE_BYTES;
         let range = self.device.physical.info.max_storage_buffer_range;
         bytes <= range.min(u64::from(u32::MAX))
     }
 
-    /// Evaluates all windows of a result whose lists are kept into an application's buffer, in one
-    /// submission.
+    /// Evaluates all windows of a result whose lists are kept, in one submission, into an application's buffer.
     fn run_kept(
         &self,
         job: Job<'_>,
@@ -344,18 +342,18 @@ impl VulkanEngine {
         kernels.submit()
     }
 
-    /// Enough workgroups for `items`, within the limit along x.
+    /// The number of workgroups for `items`, within the limit along x.
     pub(crate) fn workgroups(&self, items: u32) -> [u32; 3] {
         let groups = items.div_ceil(WORKGROUP);
         let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
         [x, groups.div_ceil(x), 1]
     }
 
-    /// Starts pieces of work one after another, and finishes all that is in flight, also after an
-    /// error: work that was submitted uses the caller's buffers. Where a piece takes long, windows are
-    /// halved before `work` is asked for more. Several callers wait for each other, so that the
-    /// memory in flight is that of one; nothing is locked meanwhile. Work on a result that others wait for
-    /// goes on after the call: whoever uses the same buffers next waits for it.
+    /// Starts pieces of work one after another, and finishes all that are in flight, also after an error, because
+    /// submitted work uses the caller's buffers. If a piece takes long, windows are halved before `work` is called
+    /// again. Several callers wait for each other, so that only one uses memory for work in flight; nothing is locked
+    /// during this. Work on an exported result continues after the call: the next user of the same buffers waits for
+    /// it.
     pub(crate) fn run_pipelined<U: Default, W>(
         &self,
         kept: &Exclusive<Vec<InFlight<U>>>,

@@ -1,4 +1,4 @@
-//! How fast a device writes into its own memory, by its own time stamps.
+//! The rate at which a device writes its memory, by its time stamps.
 
 use std::time::Duration;
 
@@ -15,36 +15,36 @@ use crate::shader::{
     WORKGROUP,
 };
 
-/// Bytes a second that a device writes into its own memory: medians of several runs, by its own clock.
+/// Rates at which a device writes its memory, bytes per second: medians of several runs, by the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
-    /// By the kernel that the engine uses on the device, over one constant: on cards neighbouring invocations store
-    /// neighbouring rotations.
+    /// The rate of the kernel that the engine uses on the device, for one constant. On cards, neighbouring
+    /// invocations store neighbouring rotations.
     pub store: f64,
-    /// By `vkCmdFillBuffer`.
+    /// The rate of `vkCmdFillBuffer`.
     pub fill: f64,
-    /// Bytes that were written at once.
+    /// The number of bytes of one run.
     pub bytes: u64,
 }
 
 impl WriteRates {
-    /// The faster of both: what no kernel exceeds for long.
+    /// The higher of the two rates, which no kernel exceeds for long.
     #[must_use]
     pub fn limit(&self) -> f64 {
         self.store.max(self.fill)
     }
 }
 
-/// More than caches hold.
+/// A size that exceeds the caches.
 const CARD_BYTES: u64 = 512 << 20;
 const SOFTWARE_BYTES: u64 = 16 << 20;
 const LEAST_BYTES: u64 = 1 << 20;
 
-/// Runs that count, behind one that does not.
+/// The number of runs, after one that is ignored.
 const RUNS: usize = 7;
 
 impl VulkanEngine {
-    /// `None` on a device without a clock.
+    /// Measures the rates; `None` on a device without a clock.
     pub(crate) fn write_rates(&self) -> Result<Option<WriteRates>, VulkanError> {
         let physical = &self.device.physical;
         if physical.timestamp_bits() == 0 {
@@ -74,7 +74,7 @@ impl VulkanEngine {
         }))
     }
 
-    /// By the kernel that the device's mapping takes, over one constant.
+    /// The rate of the kernel for the device's mapping, for one constant.
     fn store_rate(&self, buffer: &Buffer, bytes: u64) -> Result<f64, VulkanError> {
         let samples = (bytes / size_of::<[f32; 4]>() as u64) as u32;
         let upload = |bytes: &[u8]| self.resident("tumble write rate", bytes, &mut Vec::new());
@@ -124,7 +124,7 @@ impl VulkanEngine {
         })
     }
 
-    /// Bytes a second of what is recorded, the median of some runs.
+    /// The rate of recorded commands, bytes per second: the median of some runs.
     fn rate(
         &self,
         bytes: u64,

@@ -49,7 +49,7 @@ fn number(random: &mut Random, bits: u32) -> u64 {
     word.checked_shr(64 - random_bits).unwrap_or(0)
 }
 
-/// An entry that may stand anywhere in a clip of a period, when the clock stands at a time.
+/// An entry at any time of a clip with this period, for a time of the clock.
 fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> CrowdEntry {
     let wrap = random.below(3);
     let within = number(random, 32) % (u64::from(period) * u64::from(wrap.max(1)) + 1);
@@ -253,7 +253,7 @@ fn rows(random: &mut Random) -> Rows {
     [random.vector(), random.vector(), random.vector()]
 }
 
-/// Expects what lies there before, of which the kernel changes some.
+/// Expects the values `after`, of which the kernel writes those that differ from `before`.
 fn over<T: NoUninit>(mut trial: Trial, before: &[T], after: &[T]) -> Trial {
     trial.before = bytemuck::pod_collect_to_vec(&bytes(before));
     trial.expected = bytemuck::pod_collect_to_vec(&bytes(after));
@@ -357,7 +357,7 @@ fn half(random: &mut Random) -> Trial {
     trial
 }
 
-/// Entries of any words.
+/// Entries of random words.
 fn any_entries(random: &mut Random, count: u32) -> Vec<CrowdEntry> {
     let any = |random: &mut Random| CrowdEntry {
         clip_and_weight: random.word(),

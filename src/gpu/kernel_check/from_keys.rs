@@ -1,4 +1,4 @@
-//! Trials of the kernels that evaluate samples straight from keys.
+//! Trials of the kernels that evaluate samples directly from keys.
 
 use bytemuck::Zeroable as _;
 
@@ -15,8 +15,7 @@ use crate::simd::dispatch::in_lanes;
 use super::random::Random;
 use super::{Trial, bytes};
 
-/// A key as a kernel reads it, with the sign that was given, and with the one that continues the
-/// keys before it.
+/// A key as a kernel reads it, with its original sign and with the sign for the shortest path.
 #[derive(Clone, Copy)]
 pub(crate) struct StoredKey {
     pub(crate) stored: [u32; 4],
@@ -41,10 +40,10 @@ impl StoredKey {
 
 const KEYS: usize = 23;
 const SAMPLES: usize = 75;
-/// One more than an invocation takes.
+/// One more row than an invocation evaluates.
 const ROWS: usize = ROWS_PER_INVOCATION as usize + 1;
 
-/// Some rows of keys, and samples of all of them.
+/// Some rows of keys, and samples of them.
 struct KeyRows {
     keys: Vec<StoredKey>,
     samples: Vec<KeySample>,

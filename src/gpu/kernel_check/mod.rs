@@ -1,5 +1,5 @@
-//! The check of kernels: what a device makes of a kernel is compared, bit for bit, with what the kernel's twin
-//! makes of the same inputs, before the first result of that kernel is used.
+//! The check of kernels: before the first result of a kernel is used, its output on the device is compared, bit for
+//! bit, with the output of its twin for the same inputs.
 
 mod crowd;
 mod from_keys;
@@ -20,20 +20,20 @@ use crate::shader::Kernel;
 #[cfg(test)]
 pub(crate) use from_keys::StoredKey;
 
-/// What lies in a result before a kernel runs, and stays where it stores nothing.
+/// The contents of a result before a kernel runs, which stay where it stores nothing.
 const UNTOUCHED: u32 = u32::MAX;
 
-/// Values behind a result that no kernel may touch.
+/// The number of values after a result that no kernel may write.
 const GUARD: usize = 16;
 
-/// One dispatch of a kernel: all that it reads, and what its twin makes of it.
+/// One dispatch of a kernel: its inputs, and the output of its twin.
 pub(super) struct Trial {
     /// The buffers that it reads, in the order of their bindings.
     inputs: Vec<Vec<u8>>,
-    /// What comes with the dispatch.
+    /// The push constants of the dispatch.
     arguments: Vec<u8>,
     groups: [u32; 3],
-    /// What the kernel finds where it stores.
+    /// The contents of the output before the dispatch.
     before: Vec<u32>,
     expected: Vec<u32>,
 }
@@ -67,7 +67,7 @@ impl Trial {
         self.expected[first..end].copy_from_slice(words);
     }
 
-    /// Runs it, and counts the values that differ.
+    /// Runs the trial, and counts the values that differ.
     fn differing(&self, pipeline: &Pipeline) -> Result<usize, VulkanError> {
         let mut expected = self.expected.clone();
         expected.resize(expected.len() + GUARD, UNTOUCHED);
@@ -86,7 +86,7 @@ pub(super) fn bytes<T: NoUninit>(values: &[T]) -> Vec<u8> {
     bytemuck::cast_slice(values).to_vec()
 }
 
-/// Workgroups of 64 for so many invocations, in one column or in one row.
+/// Workgroups of 64 for this number of invocations, in one column or in one row.
 fn groups(invocations: usize, in_row: bool) -> [u32; 3] {
     let count = (invocations as u32).div_ceil(64);
     match in_row {

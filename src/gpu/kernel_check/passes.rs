@@ -1,6 +1,5 @@
-//! Which kernels were found to be exact on which devices: kept from process to process in the user's cache
-//! directory, where there is one. Only what passed is kept, so that a file that is lost costs no more than
-//! another check.
+//! The kernels that were found to be exact on devices, kept from process to process in the user's cache directory, if
+//! there is one. Only passed checks are stored, so a lost file costs only another check.
 
 use std::collections::BTreeSet;
 use std::env;
@@ -14,13 +13,13 @@ use crate::threads::lock;
 /// The file's name.
 const FILE: &str = "kernel-checks";
 
-/// How every line of it begins. Another number where checks are other ones than before.
+/// The start of every line. The number changes when the checks change.
 const MARK: &str = "exact 1";
 
-/// The most that is read of it, bytes.
+/// The maximum number of bytes that are read.
 const MAX_BYTES: usize = 1 << 20;
 
-/// The most lines that are written.
+/// The maximum number of lines that are written.
 const MAX_LINES: usize = 4096;
 
 /// A kernel that passed on a device.
@@ -28,7 +27,8 @@ const MAX_LINES: usize = 4096;
 pub(crate) struct KernelPass(String);
 
 impl KernelPass {
-    /// Of code by its hash ([`Pipeline::code_hash`](crate::gpu::pipeline::Pipeline::code_hash)).
+    /// The pass of a kernel with this hash of its code
+    /// ([`Pipeline::code_hash`](crate::gpu::pipeline::Pipeline::code_hash)).
     pub(crate) fn new(physical: &PhysicalDevice, code: u64) -> Self {
         Self::of(&of_device(physical, env::vars_os()), code)
     }
@@ -37,7 +37,7 @@ impl KernelPass {
         Self(format!("{MARK} {device} {code:016x}"))
     }
 
-    /// Of a line of the file; `None` for one that no version with the same checks has written.
+    /// Parses a line of the file; `None` if no version with the same checks wrote it.
     fn parse(line: &str) -> Option<Self> {
         let fields: Vec<&str> = line
             .strip_prefix(MARK)?
@@ -61,7 +61,7 @@ impl KernelPass {
     }
 }
 
-/// How the variables begin that change what drivers and loaders do.
+/// Prefixes of the environment variables that affect drivers and loaders.
 const OF_DRIVERS: [&str; 22] = [
     "ACO_",
     "AMD_",
@@ -87,8 +87,8 @@ const OF_DRIVERS: [&str; 22] = [
     "__NV_",
 ];
 
-/// A device with its driver, and what the driver's compiler goes by besides: its name and version in words, the
-/// variables of the environment that change drivers, and on software devices the processor's instructions.
+/// A hash of a device with its driver, and of other inputs of the driver's compiler: its name and version, the
+/// environment variables that affect drivers, and on software devices the processor's instructions.
 fn of_device(
     physical: &PhysicalDevice,
     environment: impl Iterator<Item = (std::ffi::OsString, std::ffi::OsString)>,

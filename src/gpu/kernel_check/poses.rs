@@ -8,7 +8,7 @@ use crate::twin::{pose_add, pose_blend, pose_mix, pose_smooth, pose_steps, pose_
 use super::random::Random;
 use super::{Trial, bytes, groups};
 
-/// Values of a pass: more than a workgroup, and not a multiple of anything.
+/// The number of values of a pass: more than a workgroup, and not a multiple of its size.
 const COUNT: usize = 131;
 
 const IDENTITY: [f32; 4] = [0.0, 0.0, 0.0, 1.0];

@@ -1,4 +1,4 @@
-//! Random inputs for kernels, always the same ones: ordinary values, and hostile ones among them. The checks of
+//! Random inputs for kernels, the same in every run: ordinary values, and extreme ones among them. The checks of
 //! kernels on devices use them, and the tests of the twins.
 
 use fastrand::Rng;
@@ -11,21 +11,21 @@ use crate::shader::{
     LONGEST_TANGENT_PART, PI, TINY_BITS, TangentWeights,
 };
 
-/// An angle in R⁴ between two keys, well within what the small-angle series takes.
+/// An angle in R⁴ between two keys, well within the range of the small-angle series.
 const ORDINARY_STEP: f32 = 0.02;
 
-/// The largest number that the host is taken to give to kernels.
+/// The largest number that the host is assumed to pass to kernels.
 const LARGEST_CANONICAL: f32 = 1.0e12;
 
 pub(crate) struct Random {
     rng: Rng,
-    /// Whether numbers are as the host gives them to kernels: 0 or at least 2^-64, none of them huge, and
+    /// Whether numbers are as the host passes them to kernels: 0 or at least 2^-64 in magnitude, not very large, and
     /// rotations of norm 1.
     are_canonical: bool,
 }
 
 impl Random {
-    /// Of all numbers that are finite.
+    /// A generator of all finite numbers.
     #[cfg(test)]
     pub(crate) fn new() -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Random {
         }
     }
 
-    /// Of numbers as the host gives them to kernels.
+    /// A generator of numbers as the host passes them to kernels.
     pub(crate) fn canonical() -> Self {
         Self {
             rng: Rng::with_seed(1),
@@ -67,7 +67,7 @@ impl Random {
         2.0 * self.rng.f32() - 1.0
     }
 
-    /// Of a magnitude between two powers of 2, each as often as the others.
+    /// A number whose magnitude is between two powers of 2, with equally probable exponents.
     fn scaled(&mut self, powers: std::ops::Range<i32>) -> f32 {
         let exponent = (1023 + self.rng.i32(powers)) as u64;
         let magnitude = (1.0 + self.rng.f64()) * f64::from_bits(exponent << 52);
@@ -103,7 +103,7 @@ impl Random {
         self.allowed(near)
     }
 
-    /// From -1 to 1, or hostile: near a border, tiny or subnormal.
+    /// A number from -1 to 1, or an extreme one: near a border, very small or subnormal.
     pub(crate) fn number(&mut self) -> f32 {
         match self.rng.u32(..10) {
             0 => self.border(),
@@ -113,7 +113,7 @@ impl Random {
         }
     }
 
-    /// As [`Random::number`], or of any magnitude whatsoever, but finite.
+    /// As [`Random::number`], or a finite number of any magnitude.
     pub(crate) fn finite(&mut self) -> f32 {
         match self.once_in(4) {
             true => self.scaled(-149..127),
@@ -126,7 +126,7 @@ impl Random {
         self.finite().abs()
     }
 
-    /// A vector of ordinary length; rarely a hostile or a huge one.
+    /// A vector of ordinary length, or rarely an extreme or a very long one.
     pub(crate) fn vector<const N: usize>(&mut self) -> [f32; N] {
         match self.rng.u32(..12) {
             0 => std::array::from_fn(|_| self.finite()),
@@ -139,7 +139,7 @@ impl Random {
         }
     }
 
-    /// A unit quaternion; some have components that are 0 or tiny.
+    /// A unit quaternion; some have components that are 0 or very small.
     pub(crate) fn unit(&mut self) -> [f32; 4] {
         loop {
             let raw: [f64; 4] = std::array::from_fn(|_| match self.rng.u32(..8) {
@@ -163,7 +163,7 @@ impl Random {
         moved.to_array().map(|c| canonical(c as f32))
     }
 
-    /// Two keys that are at most about pi/2 apart in R⁴, some equal and some hardly apart.
+    /// Two keys that are at most about pi/2 apart in R⁴; some are equal or almost equal.
     pub(crate) fn pair(&mut self) -> [[f32; 4]; 2] {
         let from = self.unit();
         match self.rng.u32(..8) {
@@ -181,7 +181,7 @@ impl Random {
         }
     }
 
-    /// A rotation as it is stored: a unit quaternion, or one that is not quite.
+    /// A rotation as it is stored: a unit quaternion, or one whose norm is not exactly 1.
     pub(crate) fn rotation(&mut self) -> [f32; 4] {
         match self.rng.u32(..8) {
             0 if !self.are_canonical => std::array::from_fn(|_| canonical(self.number())),
@@ -214,8 +214,8 @@ impl Random {
         }
     }
 
-    /// An angle in R⁴ between two keys: mostly within the small-angle series, at one of its limits, or
-    /// beyond.
+    /// An angle in R⁴ between two keys: usually within the small-angle series, otherwise at one of its limits or
+    /// outside.
     pub(crate) fn step(&mut self) -> f32 {
         match self.rng.u32(..12) {
             0 => 0.0,
@@ -241,8 +241,8 @@ impl Random {
         })
     }
 
-    /// The weight of a step in a tangent; one in four makes an [`ORDINARY_STEP`] as long as the
-    /// small-angle series allows.
+    /// The weight of a step in a tangent; one in four makes an [`ORDINARY_STEP`] as long as the small-angle series
+    /// allows.
     fn weight(&mut self) -> f32 {
         let limit = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
         match self.rng.u32(..4) {

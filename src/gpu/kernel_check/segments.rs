@@ -1,4 +1,4 @@
-//! Trials of the kernels that evaluate segments: each form by each list, in every encoding of its store.
+//! Trials of the kernels that evaluate segments: each form with each list, in every encoding of its store.
 
 use crate::cpu::evaluate::one;
 use crate::fit::constant_velocity::arc_polynomial;
@@ -21,7 +21,7 @@ const CONSTANTS: usize = 6;
 
 /// A form of segments.
 trait Segment: Evaluate {
-    /// Of numbers that need not be a rotation's.
+    /// A segment of numbers that need not be a rotation's.
     fn any(random: &mut Random) -> Self;
     /// The arc between two keys.
     fn between(keys: [[f32; 4]; 2]) -> Self;
@@ -85,14 +85,14 @@ fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
         .collect()
 }
 
-/// What all work of a dispatch is made of.
+/// The inputs that all work of a dispatch shares.
 struct SegmentInputs<S> {
     encoding: Encoding,
     segments: Vec<S>,
     constants: Vec<[f32; 4]>,
     distances: Vec<f32>,
     items: Vec<Item>,
-    /// Where each sample is stored, and the rotation.
+    /// The offset of each stored sample, and its rotation.
     stored: Vec<(usize, [f32; 4])>,
 }
 
@@ -114,7 +114,7 @@ impl<S: Segment> SegmentInputs<S> {
         }
     }
 
-    /// Makes up an item, and stores what it evaluates; `outputs` are the offsets of its samples.
+    /// Makes an item, and stores its values; `outputs` are the offsets of its samples.
     fn item(
         &mut self,
         random: &mut Random,
@@ -195,12 +195,11 @@ impl<S: Segment> SegmentInputs<S> {
         self.encoding.row().detail
     }
 
-    /// Items of up to 16 samples, one an invocation: of one track, or of three whose samples lie between each
-    /// other's.
+    /// Items of up to 16 samples, one for each invocation: of one track, or of three tracks with interleaved samples.
     fn runs(mut self, random: &mut Random, is_listed: bool, is_one: bool) -> Trial {
         const ITEMS: usize = 101;
         const BEFORE: usize = 2;
-        /// Where the first value of the result is stored.
+        /// The offset of the first value of the result.
         const FIRST: usize = 5;
         let stride = if is_one { 1 } else { 3 };
         let mut next = vec![0; stride];
@@ -234,7 +233,7 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, arguments, groups(ITEMS, is_one))
     }
 
-    /// Samples in any segments, one an invocation, some of which do nothing.
+    /// Samples in any segments, one for each invocation; some invocations do nothing.
     fn samples(mut self, random: &mut Random, in_row: bool) -> Trial {
         const SAMPLES: usize = 203;
         const BEFORE: usize = 5;
@@ -305,7 +304,7 @@ impl<S: Segment> SegmentInputs<S> {
         }
     }
 
-    /// The blocks of a row whose items are the last ones from `first_item` on.
+    /// The blocks of a row whose items are the last ones, from `first_item` on.
     fn blocks(&self, first_item: usize, [first, end]: [u32; 2]) -> Vec<Block> {
         let items = &self.items[first_item..];
         let starts = (first..end).step_by(BLOCK_SAMPLES as usize);
@@ -328,7 +327,7 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, arguments, groups)
     }
 
-    /// A grid whose samples lie beside each other, as one row.
+    /// A grid with contiguous samples, as one row.
     fn track_by_track(mut self, random: &mut Random, is_listed: bool) -> Trial {
         const SAMPLES: u32 = 709;
         let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
@@ -355,7 +354,7 @@ impl<S: Segment> SegmentInputs<S> {
         self.grid(&blocks, grid, [2, tiles.div_ceil(2), 1], is_listed)
     }
 
-    /// A grid whose tracks lie beside each other, a row each.
+    /// A grid with contiguous tracks, with a row for each track.
     fn frame_by_frame(mut self, random: &mut Random, is_listed: bool) -> Trial {
         const SAMPLES: u32 = 43;
         const ROWS: u32 = 11;

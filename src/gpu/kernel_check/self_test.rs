@@ -1,4 +1,4 @@
-//! The trial of the self-test's kernel, and the numbers that its expressions take.
+//! The trial of the self-test's kernel, and the inputs of its expressions.
 
 use bytemuck::Zeroable as _;
 
@@ -17,7 +17,7 @@ pub(super) fn trial() -> Trial {
     trial
 }
 
-/// Values of ordinary size in no order, and sums that lie half way between floats.
+/// Values of ordinary size in random order, and sums that are half-way between floats.
 pub(crate) fn probes() -> Vec<Probe> {
     let mut state = 1u32;
     let mut next = || {

@@ -1,10 +1,10 @@
-//! Queue families and memory of devices, as their drivers report them, for tests: those of drivers'
-//! sources and of published reports (vulkan.gpuinfo.org), sizes rounded.
+//! Queue families and memory of devices for tests, as their drivers report them: from the drivers' source code and
+//! from published reports (vulkan.gpuinfo.org), with rounded sizes.
 
 use ash::vk;
 use vk::{MemoryPropertyFlags as M, QueueFlags as Q};
 
-/// What a choice is made of.
+/// The properties on which choices depend.
 pub(crate) struct Card {
     pub(crate) families: Vec<vk::QueueFamilyProperties>,
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
@@ -20,7 +20,7 @@ fn families(all: &[(Q, u32)]) -> Vec<vk::QueueFamilyProperties> {
     all.iter().map(family).collect()
 }
 
-/// Heaps in MiB, with whether they are the device's, and types, with their heaps.
+/// Heaps in MiB, with whether they are device-local; and memory types, with their heaps.
 fn memory(heaps: &[(u64, bool)], types: &[(M, u32)]) -> vk::PhysicalDeviceMemoryProperties {
     let mut memory = vk::PhysicalDeviceMemoryProperties::default();
     (memory.memory_heap_count, memory.memory_type_count) = (heaps.len() as u32, types.len() as u32);

@@ -1,64 +1,64 @@
-//! What a report of a device has beside [`DeviceInfo`](crate::gpu::physical::DeviceInfo): its loader,
-//! memory, queues and address on the bus, as the driver reports them.
+//! Details of a device in addition to [`DeviceInfo`](crate::gpu::physical::DeviceInfo), as the driver reports them:
+//! loader, memory, queues and address on the bus.
 
 use ash::{ext, vk};
 
 use crate::gpu::physical::PhysicalDevice;
 
-/// What Vulkan reports of a device.
+/// Details that Vulkan reports of a device.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct DeviceDetails {
-    /// The loader's version of Vulkan.
+    /// The loader's Vulkan version.
     pub loader: String,
-    /// The driver's own number for its version.
+    /// The driver's version number, in the driver's format.
     pub driver_version: u32,
-    /// Its memory.
+    /// The memory heaps, in Vulkan's order.
     pub heaps: Vec<MemoryHeap>,
-    /// Kinds of memory, in Vulkan's order.
+    /// The memory types, in Vulkan's order.
     pub memory_types: Vec<MemoryType>,
-    /// Its queues.
+    /// The queue families, in Vulkan's order.
     pub queue_families: Vec<QueueFamily>,
-    /// Nanoseconds of one tick of its time stamps.
+    /// The unit of time stamps, nanoseconds.
     pub timestamp_period: f64,
-    /// Limits that decide over what the engine does.
+    /// The limits that affect the engine.
     pub limits: Limits,
-    /// How it computes with f32.
+    /// The properties of f32 arithmetic.
     pub float_controls: FloatControlsReport,
-    /// Its address on the PCI bus, `0000:01:00.0`, where the driver reports it.
+    /// The address on the PCI bus, `0000:01:00.0`, if the driver reports it.
     pub pci_address: Option<String>,
 }
 
-/// A heap of a device's memory.
+/// A memory heap.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct MemoryHeap {
-    /// Its size.
+    /// The size, bytes.
     pub bytes: u64,
-    /// Whether it is the device's own.
+    /// Whether the heap is device-local.
     pub is_device_local: bool,
 }
 
-/// A kind of memory.
+/// A memory type.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct MemoryType {
-    /// The index of its heap.
+    /// The index of the heap.
     pub heap: u32,
-    /// `device-local`, `host-visible`, `host-coherent`, `host-cached`, and other flags as a number.
+    /// The flags: `device-local`, `host-visible`, `host-coherent`, `host-cached`, and others as a number.
     pub properties: Vec<String>,
 }
 
-/// A family of queues.
+/// A queue family.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct QueueFamily {
-    /// How many there are.
+    /// The number of queues.
     pub queues: u32,
-    /// `graphics`, `compute`, `transfer`, `sparse`, and other flags as a number.
+    /// The flags: `graphics`, `compute`, `transfer`, `sparse`, and others as a number.
     pub abilities: Vec<String>,
-    /// Valid bits of its time stamps; 0 without them.
+    /// The number of valid bits of time stamps; 0 if there are none.
     pub timestamp_bits: u32,
 }
 
-/// Limits of a device.
+/// Limits of a device, with Vulkan's names.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[allow(missing_docs)] // the names are Vulkan's
 pub struct Limits {
@@ -76,7 +76,7 @@ pub struct Limits {
     pub subgroup_size: u32,
 }
 
-/// What a device says of its arithmetic in f32.
+/// Properties of a device's f32 arithmetic (`VkPhysicalDeviceFloatControlsProperties`).
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[allow(missing_docs)] // the names are Vulkan's
 pub struct FloatControlsReport {
@@ -86,7 +86,7 @@ pub struct FloatControlsReport {
     pub flushes_denormals: bool,
 }
 
-/// The names of the flags that are set; a flag without a name is a number.
+/// The names of the flags that are set; a flag without a name is reported as a number.
 fn names(flags: u32, known: &[(u32, &str)]) -> Vec<String> {
     let named = known.iter().filter(|(flag, _)| flags & flag != 0);
     let mut all: Vec<String> = named.map(|(_, name)| (*name).to_owned()).collect();
@@ -103,7 +103,7 @@ fn version(number: u32) -> String {
 }
 
 impl PhysicalDevice {
-    /// What a report has of it.
+    /// The details of the device.
     pub(crate) fn details(&self) -> DeviceDetails {
         let instance = &self.instance.raw;
         // SAFETY: the physical device belongs to the instance, here and below.

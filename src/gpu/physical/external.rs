@@ -1,4 +1,4 @@
-//! What a device can import, and export to others: memory and semaphores.
+//! Memory and semaphores that a device can import or export.
 
 use ash::vk;
 
@@ -8,15 +8,15 @@ use crate::gpu::physical::PhysicalDevice;
 pub(crate) const HOST_ALLOCATION: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
 
-/// The handle type of exported memory: a file that only drivers read.
+/// The handle type of exported memory: an opaque file descriptor.
 pub(crate) const FILE: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::OPAQUE_FD;
 
-/// The handle type of exported semaphores: a file that only drivers read.
+/// The handle type of exported semaphores: an opaque file descriptor.
 pub(crate) const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =
     vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
 
-/// What buffers are made for.
+/// The usage of buffers.
 pub(crate) fn usage(is_texels: bool) -> vk::BufferUsageFlags {
     let usage = vk::BufferUsageFlags::STORAGE_BUFFER
         | vk::BufferUsageFlags::TRANSFER_SRC
@@ -27,13 +27,13 @@ pub(crate) fn usage(is_texels: bool) -> vk::BufferUsageFlags {
     }
 }
 
-/// Whether a device can import such memory for a buffer.
+/// Whether a device can import host allocations for a buffer.
 pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> bool {
     let features = external_features(physical, is_texels, HOST_ALLOCATION);
     features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
 }
 
-/// Whether a device can export the memory of a buffer of results as a file.
+/// Whether a device can export the memory of a buffer of results as a file descriptor.
 pub(crate) fn may_be_exported(physical: &PhysicalDevice) -> bool {
     let features = external_features(physical, false, FILE);
     features.contains(vk::ExternalMemoryFeatureFlags::EXPORTABLE)
@@ -56,7 +56,7 @@ fn external_features(
     found.external_memory_properties.external_memory_features
 }
 
-/// Whether a device can export timeline semaphores as files.
+/// Whether a device can export timeline semaphores as file descriptors.
 pub(crate) fn timelines_may_be_exported(physical: &PhysicalDevice) -> bool {
     let mut kind =
         vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);

@@ -1,4 +1,4 @@
-//! What a Vulkan device is and what it can do.
+//! The properties of a Vulkan device.
 
 #[cfg(test)]
 pub(crate) mod cards;
@@ -24,7 +24,7 @@ use crate::shader::spirv::FloatControls;
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
 
-/// The most storage buffers that a kernel binds where none is a texel buffer. Vulkan promises 4.
+/// The maximum number of storage buffers that a kernel binds without texel buffers. Vulkan guarantees 4.
 const MAX_STORAGE_BUFFERS: u32 = 6;
 
 /// A physical device, not yet opened.
@@ -33,40 +33,41 @@ pub(crate) struct PhysicalDevice {
     pub(crate) instance: Arc<Instance>,
     pub(crate) raw: vk::PhysicalDevice,
     pub(crate) queue_family: u32,
-    /// As the driver counts its versions.
+    /// The driver's version number, in the driver's format.
     pub(crate) driver_version: u32,
     families: Vec<vk::QueueFamilyProperties>,
-    /// Nanoseconds of one tick of a time stamp.
+    /// The unit of time stamps, nanoseconds.
     timestamp_period: f64,
     pub(crate) float_controls: FloatControls,
-    /// The extension must be enabled: the device is older than Vulkan 1.2.
+    /// Whether the float-controls extension must be enabled, because the device is older than Vulkan 1.2.
     pub(crate) float_controls_extension: bool,
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
-    /// It has timeline semaphores.
+    /// Whether the device has timeline semaphores.
     pub(crate) has_timelines: bool,
-    /// Their extension must be enabled: the device is older than Vulkan 1.2.
+    /// Whether the extension of timeline semaphores must be enabled, because the device is older than Vulkan 1.2.
     pub(crate) timelines_extension: bool,
     max_texel_buffer_elements: u32,
-    /// Bytes that memory which is not coherent becomes visible in, and a multiple of which they are.
+    /// The size and alignment in which non-coherent memory is invalidated and flushed, bytes.
     pub(crate) non_coherent_atom: u64,
-    /// Storage buffers that one kernel may bind.
+    /// The maximum number of storage buffers that a kernel may bind.
     pub(crate) storage_buffers: u32,
-    /// It has not all of Vulkan (`MoltenVK`), and wants that said when it is opened.
+    /// Whether the device implements a subset of Vulkan (`MoltenVK`), whose extension must be enabled.
     pub(crate) portability_subset: bool,
-    /// What its driver wants to find in a pipeline cache: vendor, device and the cache's UUID.
+    /// The expected header of a pipeline cache: vendor, device and the cache's UUID.
     pub(crate) pipeline_cache: (u32, u32, [u8; 16]),
-    /// Shaders may have integers of 64 bits.
+    /// Whether shaders may use integers of 64 bits.
     pub(crate) has_int64: bool,
-    /// Memory and semaphores can be exported as files (`VK_KHR_external_memory_fd`, `VK_KHR_external_semaphore_fd`).
+    /// Whether memory and semaphores can be exported as file descriptors (`VK_KHR_external_memory_fd`,
+    /// `VK_KHR_external_semaphore_fd`).
     pub(crate) memory_files: bool,
     pub(crate) semaphore_files: bool,
-    /// The alignment of imported memory, bytes; `None` where memory cannot be imported.
+    /// The alignment of imported memory, bytes; `None` if memory cannot be imported.
     pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
 }
 
-/// Every device with a compute queue and Vulkan 1.1, fastest kind first; among
-/// equals the loader's order.
+/// Lists every device with a compute queue and Vulkan 1.1, fastest kind first; devices of one kind in the loader's
+/// order.
 pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError> {
     let instance = Instance::new(validation)?;
     let mut devices = Vec::new();
@@ -91,7 +92,7 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
 }
 
 impl PhysicalDevice {
-    /// `None` for a device that cannot compute or has only Vulkan 1.0.
+    /// Reads a device's properties; `None` if it cannot compute or has only Vulkan 1.0.
     pub(crate) fn new(
         instance: &Arc<Instance>,
         raw: vk::PhysicalDevice,
@@ -214,9 +215,9 @@ impl PhysicalDevice {
         }))
     }
 
-    /// Whether its kernels read texel buffers, and store 64 bits at once. Hardware combines the
-    /// loads of neighbouring lanes. Lavapipe loads lane by lane, and takes longer for 32 bits of a
-    /// storage buffer than for a texel of 128.
+    /// Whether the device's kernels read texel buffers and store 64 bits at once. Hardware combines the loads of
+    /// neighbouring lanes. Lavapipe loads lane by lane, and 32 bits of a storage buffer take longer than a texel of
+    /// 128 bits.
     pub(crate) fn reads_texels(&self, reads: Reads) -> bool {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
@@ -231,8 +232,8 @@ impl PhysicalDevice {
         }
     }
 
-    /// Whether neighbouring invocations take neighbouring samples. Hardware runs neighbouring lanes together, and stores
-    /// what they store at neighbouring addresses as whole lines; software devices store lane by lane.
+    /// Whether neighbouring invocations evaluate neighbouring samples. Hardware runs neighbouring lanes together, and
+    /// writes their stores to neighbouring addresses as whole lines; software devices store lane by lane.
     pub(crate) fn maps_samples(&self, mapping: Mapping) -> bool {
         match mapping {
             Mapping::Automatic => {
@@ -244,8 +245,7 @@ impl PhysicalDevice {
         }
     }
 
-    /// Whether results stay where kernels write them, in memory that the host reads; else they are
-    /// copied out of the device's own memory.
+    /// Whether the host reads results where kernels write them; otherwise they are copied from device memory.
     pub(crate) fn in_place(&self, transfer: Transfer) -> bool {
         match (transfer, self.info.kind) {
             (Transfer::InPlace, _)
@@ -257,7 +257,7 @@ impl PhysicalDevice {
         }
     }
 
-    /// How staged results are copied.
+    /// The method of copying staged results.
     pub(crate) fn copies(&self, options: &EngineOptions) -> Copies {
         if self.in_place(options.transfer) || !self.has_timelines {
             return Copies::Together;
@@ -271,7 +271,7 @@ impl PhysicalDevice {
         )
     }
 
-    /// Refuses a queue family that the device has not, or that can do none of some work.
+    /// Refuses a queue family that does not exist, or has none of the flags `any_of`.
     pub(crate) fn check_family(
         &self,
         family: u32,
@@ -281,7 +281,7 @@ impl PhysicalDevice {
         check_family(&self.families, family, any_of, work)
     }
 
-    /// Refuses what kernels cannot see as one buffer.
+    /// Refuses a size that kernels cannot access as one buffer.
     pub(crate) fn check_range(&self, subject: &'static str, bytes: u64) -> Result<(), VulkanError> {
         let limit = self.info.max_storage_buffer_range;
         match bytes > limit {
@@ -294,7 +294,7 @@ impl PhysicalDevice {
         }
     }
 
-    /// Valid bits of a time stamp of its queue; 0 where there are none.
+    /// The number of valid bits of time stamps of the compute queue; 0 if there are none.
     pub(crate) fn timestamp_bits(&self) -> u32 {
         let family = self.families.get(self.queue_family as usize);
         family.map_or(0, |family| family.timestamp_valid_bits)
@@ -307,14 +307,14 @@ impl PhysicalDevice {
         Duration::from_nanos((ticks as f64 * self.timestamp_period) as u64)
     }
 
-    /// Whether the host and the device see each other's writes into memory of a type by themselves.
+    /// Whether memory of a type is coherent: the host and the device see each other's writes without flushing.
     pub(crate) fn is_coherent(&self, memory_type: u32) -> bool {
         let flags = self.memory.memory_types[memory_type as usize].property_flags;
         flags.contains(vk::MemoryPropertyFlags::HOST_COHERENT)
     }
 
-    /// The first memory type allowed by `allowed` with all of `required`; one that also has the first
-    /// of `preferred`, where there is one, else the next.
+    /// The first memory type of `allowed` with all of `required`, and with the first of `preferred` that any type
+    /// has.
     pub(crate) fn memory_type(
         &self,
         allowed: u32,
@@ -343,7 +343,7 @@ fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {
     }
 }
 
-/// As RFC 9562 writes it.
+/// The UUID in the notation of RFC 9562.
 fn uuid(bytes: [u8; 16]) -> String {
     let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     let parts = [0..8, 8..12, 12..16, 16..20, 20..32];

@@ -1,4 +1,4 @@
-//! Which queue of a device copies results to the host while another computes.
+//! The choice of the queue that copies results to the host while another one computes.
 
 use ash::vk;
 
@@ -12,26 +12,26 @@ pub(crate) struct QueueIndex {
     pub(crate) index: u32,
 }
 
-/// How results are copied out of the device's own memory.
+/// The method of copying results from device memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Copies {
     /// In the submission of the kernels.
     Together,
-    /// In submissions of their own, on the kernels' queue.
+    /// In separate submissions, on the kernels' queue.
     Apart,
-    /// In submissions of their own, on another queue.
+    /// In separate submissions, on another queue.
     Beside(QueueIndex),
 }
 
-/// What the families of engines for other work can do besides.
+/// The flags of families for other work.
 const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
     vk::QueueFlags::VIDEO_DECODE_KHR.as_raw()
         | vk::QueueFlags::VIDEO_ENCODE_KHR.as_raw()
         | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
 );
 
-/// The family of the queue that computes: the first that can and does not draw, which a desktop keeps
-/// busy; else the first that can.
+/// The family of the queue that computes: the first with compute and without graphics, which a desktop keeps busy;
+/// otherwise the first with compute.
 pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     use vk::QueueFlags as Flags;
     let computes = |family: &vk::QueueFamilyProperties| {
@@ -45,7 +45,7 @@ pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u
     index.map(|index| index as u32)
 }
 
-/// Refuses a family that is not there, or has none of some flags.
+/// Refuses a family that does not exist, or has none of some flags.
 pub(crate) fn check_family(
     families: &[vk::QueueFamilyProperties],
     family: u32,
@@ -63,9 +63,9 @@ pub(crate) fn check_family(
     }
 }
 
-/// The queue that runs beside one of the family `compute` that disturbs it least: a copy engine;
-/// else a family that computes and does not draw; else a second queue of the family itself; else
-/// any other family that computes or draws. Families for video and optical flow are left alone.
+/// The queue that can run beside one of the family `compute` and disturbs it least: a copy engine; otherwise a family
+/// with compute and without graphics; otherwise a second queue of the same family; otherwise any other family with
+/// compute or graphics. Families for video and optical flow are not used.
 pub(crate) fn copy_queue(
     families: &[vk::QueueFamilyProperties],
     compute: u32,
@@ -94,7 +94,7 @@ pub(crate) fn copy_queue(
     })
 }
 
-/// How a device copies whose results are staged.
+/// The method of copying for a device whose results are staged.
 pub(crate) fn copies(
     families: &[vk::QueueFamilyProperties],
     compute: u32,

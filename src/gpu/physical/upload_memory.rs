@@ -1,4 +1,4 @@
-//! Which memory of a device the host writes what kernels read to.
+//! The choice of the memory in which the host writes data for kernels.
 
 use ash::vk;
 
@@ -10,7 +10,7 @@ const DIRECT: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
         | vk::MemoryPropertyFlags::HOST_COHERENT.as_raw(),
 );
 
-/// Memory that is made for other purposes, or needs features that are not enabled.
+/// Memory for other purposes, or that needs features which are not enabled.
 const SPECIAL: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
     vk::MemoryPropertyFlags::PROTECTED.as_raw()
         | vk::MemoryPropertyFlags::LAZILY_ALLOCATED.as_raw()
@@ -18,21 +18,21 @@ const SPECIAL: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
         | vk::MemoryPropertyFlags::DEVICE_UNCACHED_AMD.as_raw(),
 );
 
-/// An upload is small beside a heap of which it is at most this part. Of the old window of 256 MiB
-/// that is 4 MiB, which leaves room for those of other programs.
+/// An upload is small if it is at most this fraction of the heap. For the old window of 256 MiB that is 4 MiB, which
+/// leaves room for other programs.
 const SMALL: u64 = 64;
 
-/// Memory of the device that the host writes.
+/// Device-local memory that the host can write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DirectMemory {
-    /// Its memory type.
+    /// The memory type.
     pub(crate) memory_type: u32,
-    /// The largest upload that goes there by itself.
+    /// The maximum size of an upload that uses it by default, bytes.
     pub(crate) largest: u64,
 }
 
-/// The memory that is the device's and visible to the host, in the largest heap that has such.
-/// Where that is also the largest heap of the device, uploads of any size go there.
+/// Memory that is device-local and host-visible, in the largest heap with such memory. If this is also the device's
+/// largest heap, uploads of any size use it.
 pub(crate) fn direct(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<DirectMemory> {
     let heaps = memory.memory_heaps_as_slice();
     let size = |memory_type: &vk::MemoryType| {
@@ -56,8 +56,8 @@ pub(crate) fn direct(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<Dire
     })
 }
 
-/// Whether there is memory that is the device's own and that the host caches: kernels write there as
-/// fast as anywhere, and the host reads it without a copy.
+/// Whether there is memory that is device-local and cached by the host: kernels write it at full speed, and the host
+/// reads it without a copy.
 pub(crate) fn is_unified(memory: &vk::PhysicalDeviceMemoryProperties) -> bool {
     let cached = DIRECT | vk::MemoryPropertyFlags::HOST_CACHED;
     let types = memory.memory_types_as_slice().iter();
@@ -65,37 +65,37 @@ pub(crate) fn is_unified(memory: &vk::PhysicalDeviceMemoryProperties) -> bool {
     flags.any(|flags| flags.contains(cached) && !flags.intersects(SPECIAL))
 }
 
-/// How often kernels read what is uploaded.
+/// How often kernels read an upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum KernelReads {
-    /// About once: a copy beforehand would cost what it saves.
+    /// About once: a copy would take as long as it saves.
     Once,
-    /// Again and again.
+    /// Many times.
     Often,
 }
 
-/// Where the host writes what kernels read.
+/// The memory of uploads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum UploadMemory {
-    /// In the host's memory, where kernels read it.
+    /// Host memory, which kernels read directly.
     Host,
-    /// In the device's own.
+    /// Device memory, which the host writes.
     Direct,
-    /// In the host's memory, from where the device copies it into its own.
+    /// Host memory, from which the device copies to device memory.
     Staged,
 }
 
-/// The rule that places uploads.
+/// The rule for the memory of uploads.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placing {
     pub(crate) uploads: Uploads,
-    /// Whether results stay where kernels write them, in memory that the host reads.
+    /// Whether the host reads results where kernels write them.
     pub(crate) in_place: bool,
     pub(crate) direct: Option<DirectMemory>,
 }
 
 impl Placing {
-    /// Where an upload goes if there is room.
+    /// The memory of an upload, if there is room.
     pub(crate) fn memory_for(&self, bytes: u64, reads: KernelReads) -> UploadMemory {
         let fits = match self.uploads {
             Uploads::Staged => return UploadMemory::Staged,
@@ -108,7 +108,7 @@ impl Placing {
         }
     }
 
-    /// Where it goes if it cannot be written straight into the device's own memory.
+    /// The memory of an upload that the host cannot write directly to device memory.
     pub(crate) fn without_direct(&self, reads: KernelReads) -> UploadMemory {
         match self.in_place || reads == KernelReads::Once {
             true => UploadMemory::Host,

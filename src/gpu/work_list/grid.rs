@@ -1,5 +1,5 @@
-//! The grid of a window, for devices on which neighbouring invocations take neighbouring samples:
-//! blocks of samples say which item each of them belongs to, so that nothing is searched.
+//! The grid of a window, for devices on which neighbouring invocations evaluate neighbouring samples. Blocks of
+//! samples specify the item of each sample, so that no search is needed.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::shader::{
     BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY, SAMPLES_EACH, WORKGROUP,
 };
 
-/// The rows of a window: one where it is stored track by track, else one for each track.
+/// The rows of a window: one for a track-major window, otherwise one for each track.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GridRows {
     /// Distance in the result between neighbouring samples of a track.
@@ -19,8 +19,8 @@ pub(crate) struct GridRows {
 }
 
 impl GridRows {
-    /// `None` for a window that items suit better: frame by frame, with fewer tracks than a line of
-    /// memory has rotations.
+    /// `None` for a window for which items are better: frame by frame, with fewer tracks than a memory line has
+    /// rotations.
     pub(crate) fn new(window: &Window) -> Option<Self> {
         let stride = window.stride() as u32;
         (stride == 1 || stride >= LINE).then_some(Self {
@@ -37,8 +37,7 @@ impl GridRows {
         }
     }
 
-    /// The grids of all groups, whose blocks follow each other. `None` as in
-    /// [`GridRows::of_group`].
+    /// The grids of all groups, whose blocks are consecutive. `None` as in [`GridRows::of_group`].
     pub(crate) fn of_groups(self, lists: &[GroupWork]) -> Option<Vec<GroupGrid>> {
         let mut first_block = 0;
         let grids = lists.iter().map(|list| {
@@ -49,8 +48,8 @@ impl GridRows {
         grids.collect()
     }
 
-    /// Rows and positions of a group, in which its blocks begin at the `first_block`th of all.
-    /// `None` where items overlap, or do not lie in the order of their rows and positions.
+    /// The rows and positions of a group, whose first block has the index `first_block`. `None` if items overlap, or
+    /// are not in the order of their rows and positions.
     fn of_group(self, list: &GroupWork, first_block: u32) -> Option<GroupGrid> {
         let (mut first, mut row, mut end) = (None, 0, 0);
         for item in items(list) {
@@ -86,8 +85,7 @@ impl GridRows {
     }
 }
 
-/// Writes the blocks of all groups; `nothing` is the index of an item without samples, which follows
-/// the items of all.
+/// Writes the blocks of all groups; `nothing` is the index of an item without samples, after the items of all groups.
 pub(crate) fn write_blocks(
     lists: &[GroupWork],
     grids: &[GroupGrid],
@@ -115,9 +113,9 @@ fn count(item: &Item) -> u32 {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupGrid {
     all: GridRows,
-    /// The window's row that is the group's first.
+    /// The index in the window of the group's first row.
     first_row: u32,
-    /// What comes with its dispatch, without the detail.
+    /// The push constants of its dispatch, without the detail.
     pub(crate) arguments: Grid,
 }
 
@@ -126,8 +124,8 @@ impl GroupGrid {
         self.arguments.samples.div_ceil(BLOCK_SAMPLES) * self.arguments.rows
     }
 
-    /// Writes its blocks; `first_item` is the index of its first item in the list of all, and
-    /// `nothing` that of an item without samples.
+    /// Writes the blocks of the group. `first_item` is the index of its first item in the whole list, and `nothing`
+    /// the index of an item without samples.
     fn write(&self, list: &GroupWork, first_item: u32, nothing: u32, blocks: &mut [Block]) {
         blocks.fill(Block {
             first: nothing,
@@ -162,19 +160,19 @@ impl GroupGrid {
         self.go_on(row, next..end, last, blocks);
     }
 
-    /// Blocks of a row in which an item from before goes on.
+    /// Blocks of a row in which an earlier item continues.
     fn go_on(&self, row: u32, written_blocks: Range<u32>, item: u32, blocks: &mut [Block]) {
         for block in written_blocks {
             blocks[self.block_index(row, block)].first = item;
         }
     }
 
-    /// Where a block of a row lies among all.
+    /// The index of a row's block among all blocks.
     fn block_index(&self, row: u32, block: u32) -> usize {
         (block * self.arguments.rows + row) as usize
     }
 
-    /// The workgroups of its dispatch; `most` is the limit along x.
+    /// The workgroups of its dispatch; `max_x` is the limit along x.
     pub(crate) fn workgroups(&self, max_x: u32) -> [u32; 3] {
         let samples = WORKGROUP * SAMPLES_EACH;
         let (tiles, z) = match self.all.stride {

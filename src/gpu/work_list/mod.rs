@@ -1,4 +1,4 @@
-//! The work list of one window of the output: items, each some consecutive samples of one segment.
+//! The work list of one window of the output: items, each of which is some consecutive samples of one segment.
 
 pub(crate) mod grid;
 pub(crate) mod sample_list;
@@ -29,22 +29,22 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
 
-/// What the device and the host have to do in a window.
+/// The work of the device and of the host in a window.
 pub(crate) struct Work {
     pub(crate) list: List,
-    /// The groups, in the order in which their items lie in the list.
+    /// The groups, in the order of their items in the list.
     pub(crate) groups: Vec<GroupItems>,
     /// Rotations that the host computed.
     pub(crate) patches: Vec<Patch>,
 }
 
 impl Work {
-    /// The groups that the device has anything to do for.
+    /// The groups with work for the device.
     pub(crate) fn dispatched(&self) -> impl Iterator<Item = &GroupItems> {
         self.groups.iter().filter(|group| group.items > 0)
     }
 
-    /// Records what the host computed, behind the kernels, into a window that begins at `start` of a buffer.
+    /// Records the writing of the host's rotations after the kernels, to a window that starts at `start` of a buffer.
     pub(crate) fn patch(
         &self,
         commands: Commands<'_>,
@@ -74,34 +74,34 @@ impl Work {
     }
 }
 
-/// Bytes that are patched by one command, at most; it is a whole number of values of any encoding, and Vulkan allows
-/// 65 536.
+/// The maximum number of bytes that one command patches. It is a whole number of values in every encoding, and Vulkan
+/// allows 65 536.
 const PATCHED_BYTES: usize = 48 * 48;
 
-/// How much the device has to do for one group of a clip.
+/// The amount of the device's work for one group of a clip.
 pub(crate) struct GroupItems {
     pub(crate) group: usize,
-    /// Where they begin in the list.
+    /// The index of the group's first item in the list.
     pub(crate) first_item: u32,
-    /// How many items, or samples of a sample list.
+    /// The number of items, or of samples of a sample list.
     pub(crate) items: u32,
-    /// Where the first sample of a sample list is stored.
+    /// The offset of the first sample of a sample list.
     pub(crate) first_output: u32,
-    /// The samples of the group, where neighbouring invocations take neighbours.
+    /// The samples of the group, if neighbouring invocations evaluate neighbours.
     pub(crate) grid: Option<GroupGrid>,
 }
 
 /// An offset in the window, and the rotation there.
 pub(crate) type Patch = (usize, [f32; 4]);
 
-/// What one group of a clip has to do in a window.
+/// The work of one group of a clip in a window.
 pub(crate) struct GroupWork {
     pub(crate) group: usize,
     pub(crate) chunks: Vec<WorkChunk>,
 }
 
-/// A chunk of a work list, made by one thread. Where items take their distances from `distances`,
-/// their `first` is an index into those of the chunk.
+/// A chunk of a work list, made by one thread. If items use `distances`, their `first` is an index into the chunk's
+/// distances.
 #[derive(Default)]
 pub(crate) struct WorkChunk {
     pub(crate) items: Vec<Item>,
@@ -115,17 +115,18 @@ impl GroupWork {
     }
 }
 
-/// What is listed, and for which device.
+/// The samples to list, and properties of the device.
 #[derive(Clone, Copy)]
 pub(crate) struct ListRequest<'a> {
     pub(crate) device: &'a Arc<LogicalDevice>,
-    /// Whether neighbouring invocations take neighbouring samples where that can be; else each takes a run of them.
+    /// Whether neighbouring invocations evaluate neighbouring samples, if possible; otherwise each evaluates a run of
+    /// samples.
     pub(crate) maps_samples: bool,
     pub(crate) clip: &'a ClipData,
     pub(crate) timeline: &'a Timeline,
 }
 
-/// The lists of a window on their way to the device, in memory that is kept for the next window.
+/// The lists of a window for upload to the device, in memory that is kept for the next window.
 #[derive(Default)]
 pub(crate) struct WorkLists {
     /// Items, or the samples of a sample list.
@@ -140,9 +141,9 @@ pub(crate) struct WorkLists {
 }
 
 impl WorkLists {
-    /// Writes the work list of a window into its buffers, one group after another. Where the request
-    /// maps samples, neighbouring invocations take neighbouring samples if that can be. Called on one of
-    /// the engine's threads.
+    /// Writes the work list of a window to its buffers, one group after another. If the request maps samples,
+    /// neighbouring invocations evaluate neighbouring samples if possible. Must be called on one of the engine's
+    /// threads.
     pub(crate) fn list(
         &mut self,
         request: ListRequest<'_>,
@@ -219,7 +220,7 @@ impl WorkLists {
         })
     }
 
-    /// Keeps the memory of lists for the next ones; returns what they leave to the host.
+    /// Keeps the memory of lists for the next ones; returns the host's patches.
     fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
         let mut patches = Vec::new();
         for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
@@ -231,20 +232,20 @@ impl WorkLists {
         patches
     }
 
-    /// Frees what only the next list would use.
+    /// Frees memory that only the next list would use.
     pub(crate) fn forget_spare(&mut self) {
         self.spare = Vec::new();
         self.listed_blocks = Vec::new();
     }
 
-    /// Frees what was written for the device to copy, when it has copied it.
+    /// Frees the buffers that the device has copied.
     pub(crate) fn forget_written(&mut self) {
         for upload in [&mut self.items, &mut self.distances, &mut self.blocks] {
             upload.forget_written();
         }
     }
 
-    /// What kernels read of a list, in the order of their bindings.
+    /// The uploads of a list that kernels read, in the order of their bindings.
     pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
         let (items, blocks, distances) = (&self.items, &self.blocks, &self.distances);
         match list {
@@ -256,8 +257,8 @@ impl WorkLists {
     }
 }
 
-/// Parts of a group that one thread turns into items: at least this many, and more while they have
-/// fewer samples than `SAMPLES_PER_CHUNK`.
+/// The minimum number of parts of a group that one thread converts to items; more while they have fewer samples than
+/// `SAMPLES_PER_CHUNK`.
 const PARTS_PER_CHUNK: usize = 64;
 const SAMPLES_PER_CHUNK: usize = 4096;
 
@@ -274,17 +275,17 @@ pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [Trac
     &prepared.parts[from(window.tracks.start)..from(window.tracks.end)]
 }
 
-/// How runs become items.
+/// How runs are divided into items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
     /// An item for each invocation: at most `ITEM_SAMPLES` samples.
     Short,
-    /// A whole run, for a grid, with the bit `MAY_BE_TINY` where the run needs it.
+    /// The whole run, for a grid, with the bit `MAY_BE_TINY` if the run needs it.
     Whole,
 }
 
-/// The work lists of a window: one for each group that has any of its tracks. `spare` are emptied chunks to use again: fresh memory would cost
-/// more than listing.
+/// The work lists of a window: one for each group that has any of its tracks. `spare` are empty chunks for reuse,
+/// because fresh memory would take longer than listing.
 pub(crate) fn work(
     clip: &ClipData,
     timeline: &Timeline,
@@ -329,7 +330,7 @@ struct PartsList<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
     cut: Cut,
-    /// The track whose runs are met.
+    /// The track of the current runs.
     track: usize,
     chunk: WorkChunk,
     listed: Result<(), SampleTimesError>,
@@ -354,7 +355,7 @@ impl InLanes for PartsList<'_> {
 }
 
 impl Emit for PartsList<'_> {
-    /// Turns a run into items, and what the host evaluates into patches.
+    /// Converts a run to items, or to patches if the host evaluates it.
     #[inline(always)]
     fn run(&mut self, run: Run) {
         let (prepared, timeline, window) = (self.prepared, self.timeline, self.window);
@@ -411,9 +412,9 @@ impl Emit for PartsList<'_> {
     }
 }
 
-/// Writes the work lists of all groups, one after another; in `rows` of a grid, the position of an
-/// item replaces the offset at which it is stored. Each element is written once, in order, and none is
-/// read again: what is written to may be slow to read.
+/// Writes the work lists of all groups, one after another. In `rows` of a grid, the offset of an item is replaced by
+/// its position. Each element is written once, in order, and none is read again, because the memory may be slow to
+/// read.
 pub(crate) fn write(
     lists: &[GroupWork],
     rows: Option<GridRows>,

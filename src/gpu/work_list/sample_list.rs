@@ -1,6 +1,6 @@
-//! The sample list: work in which every sample of a window is listed by itself, in the order in
-//! which samples are stored. It serves dense keys (no more samples than spans) and sparse times (a
-//! few explicit times of each track, such as a crowd's poses); other windows are listed by runs.
+//! The sample list: a work list with an entry for every sample of a window, in the order of storage. It is used for
+//! dense keys (no more samples than spans) and for sparse times (a few explicit times of each track, such as a
+//! crowd's poses); other windows are listed by runs.
 
 use rayon::prelude::*;
 
@@ -19,11 +19,11 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
 
-/// A window whose samples are listed one by one.
+/// A window whose samples are listed separately.
 pub(crate) struct SampleList<'a> {
     timeline: &'a Timeline,
     window: &'a Window,
-    /// The parts of each group that has any in the window, in the order of their samples.
+    /// The parts of each group with samples in the window, in the order of their samples.
     groups: Vec<GroupParts<'a>>,
 }
 
@@ -31,12 +31,12 @@ struct GroupParts<'a> {
     group: usize,
     prepared: &'a Prepared,
     parts: &'a [TrackPart],
-    /// Where the samples of the first part begin in the window.
+    /// The offset of the first part's samples in the window.
     first: usize,
 }
 
 impl<'a> SampleList<'a> {
-    /// `None` for a window whose work is listed by runs.
+    /// `None` for a window that is listed by runs.
     pub(crate) fn new(
         clip: &'a ClipData,
         timeline: &'a Timeline,
@@ -83,7 +83,7 @@ impl<'a> SampleList<'a> {
         (are_listed && are_in_order).then_some(all)
     }
 
-    /// Where the samples of a part begin in the window; `before` is the part listed before it.
+    /// The offset of a part's samples in the window; `before` is the part listed before it.
     fn start(&self, prepared: &Prepared, part: &TrackPart, before: Option<&TrackPart>) -> usize {
         let samples = &self.window.samples;
         let row = (part.track as usize - self.window.tracks.start) * samples.len();
@@ -157,9 +157,9 @@ struct SampleChunk<'a> {
     /// The offset of its first sample in the window.
     first: usize,
     list: &'a mut [ListedSample],
-    /// The track whose runs are met.
+    /// The track of the current runs.
     track: usize,
-    /// How many of the samples are listed.
+    /// The number of samples that are listed already.
     listed: usize,
     patches: Vec<Patch>,
     result: Result<(), SampleTimesError>,

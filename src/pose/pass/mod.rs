@@ -1,4 +1,4 @@
-//! Passes over rotations that lie in buffers of an application's device: what is asked, and whether it fits.
+//! Passes over rotations in buffers of an application's device: their descriptions, and checks of them.
 
 mod application_device;
 
@@ -17,52 +17,54 @@ use crate::output::pose_error::{
 use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 
-/// A pass over rotations that lie in buffers of an application's device, each a range of four f32 a rotation, as
-/// [`Request::to_buffer`](crate::engine::clip::request::Request::to_buffer) and
-/// [`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record) leave them there. [`Engine::pass`] takes it.
+/// A pass over rotations in buffers of an application's device: a blend, a mix, an addition, or the evaluation of a
+/// skeleton. [`Engine::pass`] takes it.
 ///
-/// Ranges start at multiples of 256 bytes, layers of a blend at multiples of 16. Layers that lie one behind the other in
-/// one buffer, from a multiple of 256 bytes on, are read where they lie; others are copied together first.
+/// Each input is a range of a buffer with four f32 for each rotation, as
+/// [`Request::to_buffer`](crate::engine::clip::request::Request::to_buffer) and
+/// [`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record) write it. Ranges start at multiples of 256
+/// bytes, layers of a blend at multiples of 16. Layers of a blend that are contiguous in one buffer, from a multiple
+/// of 256 bytes on, are read directly; others are copied into one buffer first.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum PosePass<'a> {
-    /// Layers with their weights, as [`Engine::blend`].
+    /// The weighted sum of layers, as [`Engine::blend`].
     Blend {
         /// Each layer's range and weight.
         layers: &'a [(VulkanBuffer, f32)],
     },
-    /// Slerp from one to another, as [`Engine::mix`].
+    /// Slerp between two poses, as [`Engine::mix`].
     Mix {
-        /// At weight 0.
+        /// The rotations at weight 0.
         from: VulkanBuffer,
-        /// At weight 1.
+        /// The rotations at weight 1.
         to: VulkanBuffer,
-        /// From 0 to 1.
+        /// The weight, 0 to 1.
         weight: f32,
     },
-    /// A layer added to a base, as [`Engine::add`].
+    /// A base and the weighted difference of a layer from a reference, as [`Engine::add`].
     Add {
-        /// What is added to.
+        /// The rotations to which the difference is added.
         base: VulkanBuffer,
-        /// What is added.
+        /// The rotations whose difference from the reference is added.
         layer: VulkanBuffer,
-        /// A rotation for each track. Frame by frame they take up to a megabyte of the device's memory, or 16
-        /// frames; track by track as much as a layer.
+        /// A rotation for each track. Frame by frame, they take up to a mebibyte of the device's memory, or as much
+        /// as 16 frames if that is more; track by track, as much as a layer.
         reference: &'a [Quat],
-        /// From 0 to 1.
+        /// The weight, 0 to 1.
         weight: f32,
     },
-    /// Rotations and positions in the world, as [`Engine::world`]: of rotations that lie frame by frame.
+    /// Rotations and positions in the world, as [`Engine::world`]; the layout must be frame by frame.
     World {
-        /// Rotations in their parents' frames.
+        /// The rotations in the parents' frames.
         local: VulkanBuffer,
-        /// A link for each track.
+        /// The skeleton, with a joint for each track.
         skeleton: &'a Skeleton,
     },
 }
 
 impl PosePass<'_> {
-    /// What it reads.
+    /// The ranges that the pass reads.
     fn inputs(&self) -> Vec<VulkanBuffer> {
         match *self {
             Self::Blend { layers } => layers.iter().map(|&(layer, _)| layer).collect(),
@@ -81,7 +83,7 @@ impl PosePass<'_> {
     }
 }
 
-/// A pass over rotations in buffers ([`Engine::pass`]), and their shape.
+/// A pass over rotations in buffers ([`Engine::pass`]), and the shape of its inputs.
 #[derive(Debug, Clone, Copy)]
 #[must_use = "a pass does nothing until its result is sent somewhere"]
 pub struct PassRequest<'a> {
@@ -91,15 +93,17 @@ pub struct PassRequest<'a> {
 }
 
 impl Engine {
-    /// A pass over rotations that lie in buffers of the device that the engine was made from
-    /// ([`Engine::from_vulkan`]): layers are blended, mixed or added, or a skeleton is walked, from buffer to buffer,
-    /// with the bits of [`Engine::blend`], [`Engine::mix`], [`Engine::add`] and [`Engine::world`]. Nothing comes to
-    /// the host. `tracks`, `samples` and `layout` are those of every input.
+    /// Starts a pass over rotations in buffers of the device that the engine was made from ([`Engine::from_vulkan`]).
     ///
-    /// [`PassRequest::to_buffer`] runs it at once; [`PassRequest::target`] makes it ready to be recorded into the
-    /// application's commands, behind the samples of clips
-    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)) and before whatever draws.
-    /// `examples/application_device.rs` evaluates two clips, mixes them and walks their skeleton in one submission.
+    /// It blends, mixes or adds layers or evaluates a skeleton, from buffer to buffer, with the bits of
+    /// [`Engine::blend`], [`Engine::mix`], [`Engine::add`] and [`Engine::world`]. Nothing is copied to the host.
+    /// `tracks`, `samples` and `layout` are the shape of every input.
+    ///
+    /// [`PassRequest::to_buffer`] runs it at once. [`PassRequest::target`] prepares it for recording into the
+    /// application's commands, after the samples of clips
+    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)) and before the draw calls.
+    /// `examples/application_device.rs` evaluates two clips, mixes them and evaluates their skeleton in one
+    /// submission.
     pub fn pass<'a>(
         &'a self,
         pass: PosePass<'a>,
@@ -116,7 +120,7 @@ impl Engine {
 }
 
 impl<'a> PassRequest<'a> {
-    /// Bytes of each input.
+    /// The length of each input, bytes.
     #[must_use]
     pub fn input_bytes(&self) -> u64 {
         let (tracks, samples, _) = self.shape;
@@ -125,8 +129,8 @@ impl<'a> PassRequest<'a> {
             .saturating_mul(VALUE)
     }
 
-    /// Bytes of the result: those of an input, or twice as many in the world, where `[frame][track]` a rotation
-    /// `x y z w` and a position `x y z 0` lie.
+    /// The length of the result, bytes: that of an input, or twice as much for [`PosePass::World`], whose result is
+    /// `[frame][track]`, a rotation `x y z w` and a position `x y z 0` each.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         match self.pass {
@@ -135,7 +139,7 @@ impl<'a> PassRequest<'a> {
         }
     }
 
-    /// The device, the pass and its weights, where all fits.
+    /// The device, the pass and its weights, if everything fits.
     fn checked(&self, result: VulkanBuffer) -> Result<(&'a Opened, PassJob<'a>, Vec<f32>), Error> {
         let Backend::Vulkan(opened) = &*self.engine.backend else {
             return Err(Error::BufferOnCpu);
@@ -193,7 +197,7 @@ impl<'a> PassRequest<'a> {
     }
 }
 
-/// Refuses a range that starts where no kernel can bind it, or that is too short.
+/// Refuses a range that is too short or starts at an offset that a kernel cannot bind.
 fn check_range(
     operand: PassOperand,
     range: VulkanBuffer,

@@ -1,24 +1,23 @@
-//! Data that keys may carry beside their rotations, for the methods that use it: angular
-//! velocities, tangents, and tension, continuity and bias.
+//! Data of keys in addition to rotations, for the methods that use them: angular velocities, tangents, and tension,
+//! continuity and bias.
 
 use glam::{DVec3, Quat};
 
 use crate::tracks::error::TrackError;
 use crate::tracks::set::{TrackSet, check_finite, check_length};
 
-/// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 for none, mostly
-/// within -1 and 1.
+/// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 is neutral, and usual values are from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tcb {
-    /// 1 makes the curve stand still at the key, -1 doubles its speed there.
+    /// With 1 the velocity at the key is 0, with -1 it is doubled.
     pub tension: f64,
-    /// -1 makes a corner at the key, 1 a corner to the other side.
+    /// With -1 the curve has a corner at the key, with 1 a corner to the other side.
     pub continuity: f64,
-    /// 1 lets the curve follow the interval before the key, -1 the interval after it.
+    /// With 1 the tangent at the key follows the interval before it, with -1 the interval after it.
     pub bias: f64,
 }
 
-/// The largest magnitude of a tension, a continuity or a bias: their products stay rotations.
+/// The largest magnitude of a tension, a continuity or a bias. With it, computations do not overflow.
 pub(crate) const LARGEST_TCB: f64 = 1e6;
 
 /// The largest angular velocity at a key, radians per second.
@@ -33,15 +32,15 @@ impl Tcb {
         ]
     }
 
-    /// The name and the value of the first number that is not finite, or too large.
+    /// The name and the value of the first number that is not finite, or is too large.
     pub(crate) fn refused(&self) -> Option<(&'static str, f64)> {
         let is_refused = |(_, value): &(&str, f64)| value.is_nan() || value.abs() > LARGEST_TCB;
         self.named().into_iter().find(is_refused)
     }
 }
 
-/// One kind of data for a set: a track has a value for each of its keys, or none at all. The list
-/// may be shorter than the set.
+/// One kind of data for a set: a track has one value for each of its keys, or none. The list may be shorter than the
+/// set.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct KeyData<T>(Vec<Vec<T>>);
 
@@ -63,11 +62,12 @@ impl<T: Clone> KeyData<T> {
 }
 
 impl TrackSet {
-    /// Gives each key of a track an angular velocity, radians per second in the body
-    /// frame: for [`HERMITE`](crate::method::hermite::HERMITE).
+    /// Sets the angular velocity at each key of a track, radians per second in the body frame, for
+    /// [`HERMITE`](crate::method::hermite::HERMITE).
     ///
     /// # Errors
-    /// When there is no such track, or not one finite velocity for each of its keys.
+    /// When there is no such track, the number of velocities is not the number of keys, or a velocity is not finite
+    /// or is larger than 1e12 rad/s.
     pub fn set_velocities(&mut self, track: usize, velocities: &[DVec3]) -> Result<(), TrackError> {
         self.check_data(track, "velocity", velocities, FASTEST, |velocity| {
             largest(velocity.to_array().into_iter())
@@ -76,11 +76,11 @@ impl TrackSet {
         Ok(())
     }
 
-    /// Gives each key of a track the tangents with which the curve arrives and leaves,
-    /// `x y z w` a second: for [`GLTF_CUBIC`](crate::method::gltf_cubic::GLTF_CUBIC).
+    /// Sets the incoming and outgoing tangent of each key of a track, `x y z w` per second, for
+    /// [`GLTF_CUBIC`](crate::method::gltf_cubic::GLTF_CUBIC).
     ///
     /// # Errors
-    /// When there is no such track, or not one finite pair for each of its keys.
+    /// When there is no such track, the number of pairs is not the number of keys, or a tangent is not finite.
     pub fn set_tangents(&mut self, track: usize, tangents: &[[Quat; 2]]) -> Result<(), TrackError> {
         let largest = |both: &[Quat; 2]| {
             let numbers = both.iter().flat_map(Quat::to_array);
@@ -91,11 +91,12 @@ impl TrackSet {
         Ok(())
     }
 
-    /// Gives each key of a track its own tension, continuity and bias: for
+    /// Sets tension, continuity and bias at each key of a track, for
     /// [`KOCHANEK_BARTELS`](crate::method::kochanek_bartels::KOCHANEK_BARTELS).
     ///
     /// # Errors
-    /// When there is no such track, or not one finite triple for each of its keys.
+    /// When there is no such track, the number of values is not the number of keys, or a number is not finite or is
+    /// too large.
     pub fn set_tcb(&mut self, track: usize, tcb: &[Tcb]) -> Result<(), TrackError> {
         let quantity = "tension, continuity or bias";
         self.check_data(track, quantity, tcb, LARGEST_TCB, |tcb| {
@@ -130,7 +131,7 @@ impl TrackSet {
     }
 }
 
-/// The largest magnitude; infinite if one is no number.
+/// The largest magnitude; infinite if a number is NaN.
 fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
     let magnitude = |number: f64| {
         if number.is_nan() {

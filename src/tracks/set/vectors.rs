@@ -1,5 +1,4 @@
-//! Translations and scales: keys that tracks may carry beside their rotations, at times
-//! of their own.
+//! Translations and scales: keys of tracks in addition to rotations, at separate times.
 
 use std::sync::Arc;
 
@@ -14,25 +13,24 @@ use crate::tracks::set::{TrackSet, check_finite, check_length, check_times};
 pub(crate) struct VectorTrack {
     pub(crate) times: Vec<f64>,
     pub(crate) keys: Vec<Vec3>,
-    /// Tangents with which the curve arrives at each key and leaves it, units per second; empty if
-    /// none were given.
+    /// The incoming and outgoing tangent of each key, units per second; empty if none were set.
     pub(crate) tangents: Vec<[Vec3; 2]>,
-    /// Upward directions at the keys of a path; empty if none were given.
+    /// Upward directions at the keys of a path; empty if none were set.
     pub(crate) ups: Vec<Option<Vec3>>,
 }
 
-/// The largest magnitude of a number of a vector or of its tangent: curves between such stay finite.
+/// The largest magnitude of a component of a vector or of its tangent. With it, curves between keys are finite.
 const LARGEST_VECTOR: f64 = 1e30;
 
-/// The vectors of a set's tracks, `None` for a track without. The list may be shorter than the set.
+/// The vectors of a set's tracks, `None` for a track without vectors. The list may be shorter than the set.
 pub(crate) type VectorTracks = Vec<Option<Arc<VectorTrack>>>;
 
-/// Which of a track's vectors.
+/// A kind of a track's vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Channel {
-    /// Where the track's origin goes.
+    /// The translation of the track's origin.
     Translation,
-    /// Along the axes.
+    /// The scale along the axes.
     Scale,
 }
 
@@ -49,16 +47,16 @@ pub struct VectorKeys<'a> {
     pub times: &'a [f64],
     /// One vector for each time.
     pub keys: &'a [Vec3],
-    /// Tangents with which the curve arrives at each key and leaves it, units per second; empty
-    /// where none were given.
+    /// The incoming and outgoing tangent of each key, units per second; empty if none were set.
     pub tangents: &'a [[Vec3; 2]],
 }
 
 impl TrackSet {
-    /// Gives a track translation keys, [`Vec3`] or `[f32; 3]`. Their `times` are seconds, strictly
-    /// increasing, and may differ from the rotations' times. `tangents` (arriving, leaving; units per
-    /// second) are used by [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic)
-    /// and may be empty.
+    /// Sets the translation keys of a track, [`Vec3`] or `[f32; 3]`. `times` are seconds, strictly increasing, and
+    /// may differ from the times of rotations.
+    ///
+    /// `tangents` may be empty. They are pairs (incoming, outgoing) in units per second, for
+    /// [`VectorMethod::GltfCubic`](crate::method::vector_method::VectorMethod::GltfCubic).
     ///
     /// ```
     /// use tumble::glam::{Quat, Vec3};
@@ -75,7 +73,8 @@ impl TrackSet {
     /// ```
     ///
     /// # Errors
-    /// When there is no such track, the lengths differ, or a number is not finite or beyond 1e30.
+    /// When there is no such track, the lengths differ, the times are not strictly increasing, or a number is not
+    /// finite or exceeds 1e30 in magnitude.
     pub fn set_translations<V: Copy + Into<Vec3>>(
         &mut self,
         track: usize,
@@ -86,14 +85,15 @@ impl TrackSet {
         self.set_vectors(Channel::Translation, track, times, keys, tangents)
     }
 
-    /// Adds a track for a body that follows a path: translation keys, at times in seconds that are
-    /// strictly increasing, and no rotation of its own. `ups` are upward directions at some keys,
-    /// one entry for each point; it may be empty. [`Engine::follow`](crate::engine::Engine::follow)
-    /// evaluates it.
+    /// Appends a track for a body that follows a path ([`Engine::follow`](crate::engine::Engine::follow)), and
+    /// returns its index.
+    ///
+    /// The points are translation keys at `times`, seconds, strictly increasing; the track has no rotation keys
+    /// except an identity. `ups` are upward directions at some points: it is empty, or has one entry for each point.
     ///
     /// # Errors
-    /// When there is no point, the lengths differ, a number is not finite, or an upward direction
-    /// has no length.
+    /// When there are no points, the lengths differ, the times are not strictly increasing, a number is not finite or
+    /// exceeds 1e30 in magnitude, or an upward direction has no length.
     pub fn push_path<V: Copy + Into<Vec3>>(
         &mut self,
         name: &str,
@@ -124,10 +124,10 @@ impl TrackSet {
         Ok(track)
     }
 
-    /// Gives a track scale keys; otherwise as [`TrackSet::set_translations`].
+    /// Sets the scale keys of a track; otherwise as [`TrackSet::set_translations`].
     ///
     /// # Errors
-    /// As there.
+    /// As [`TrackSet::set_translations`].
     pub fn set_scales<V: Copy + Into<Vec3>>(
         &mut self,
         track: usize,
@@ -188,7 +188,7 @@ impl TrackSet {
         Ok(())
     }
 
-    /// The keys of a track's translation or scale; `None` for a track without.
+    /// The keys of a track's translation or scale; `None` if it has none.
     #[must_use]
     pub fn vector_keys(&self, channel: Channel, track: usize) -> Option<VectorKeys<'_>> {
         let vectors = self.vectors(channel, track)?;

@@ -1,5 +1,5 @@
-//! Results in buffers on an application's own Vulkan device. These functions are unsafe, because the compiler cannot
-//! check what the application promises of its buffers.
+//! Results in buffers on an application's Vulkan device. These functions are unsafe, because the compiler cannot
+//! check the application's promises about its buffers.
 #![allow(unsafe_code)]
 
 use crate::engine::clip::request::Request;
@@ -15,19 +15,19 @@ use crate::output::window::Window;
 use crate::time::frames::Timeline;
 
 impl Request<'_> {
-    /// Evaluates into a buffer of the application's own, on the device that the engine was made from
-    /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)): the result stays there, for a renderer or another kernel. Returns when it
-    /// is written; what is submitted to the queue afterwards sees it. From the second time on that the same is
-    /// asked of a clip, nothing is listed for the device any more.
+    /// Evaluates into a buffer of the application, on the device that the engine was made from
+    /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)), for a renderer or another kernel.
+    ///
+    /// Returns when the result is written; commands that are submitted to the queue afterwards see it. When the same
+    /// request of a clip is repeated, its work lists are already on the device.
     ///
     /// # Errors
-    /// When the engine is the CPU, the frames do not fit the clip, the range is not aligned or too
-    /// short, or the device fails.
+    /// As [`Request::size`]; also when the engine is the CPU, the range does not start at a multiple of a value's
+    /// size or is too short, or the device fails.
     ///
     /// # Safety
-    /// The buffer must belong to the engine's device, have memory, be made for use as
-    /// `STORAGE_BUFFER` and `TRANSFER_DST`, contain the given range, and not be used by anyone
-    /// else before this returns.
+    /// The buffer must belong to the engine's device, be bound to memory, have the usages `STORAGE_BUFFER` and
+    /// `TRANSFER_DST`, and contain the range. Nothing else may use the range until this returns.
     pub unsafe fn to_buffer(&self, buffer: VulkanBuffer) -> Result<(), Error> {
         let (opened, timeline, window) = self.for_buffer(buffer)?;
         (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
@@ -37,18 +37,18 @@ impl Request<'_> {
         })
     }
 
-    /// Makes ready what it takes to record this into commands of the application's own, into a buffer on the
-    /// device that the engine was made from ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)): the kernels are compiled, and what
-    /// they read of the samples is listed and brought to the device, here, once.
+    /// Prepares this request for recording into the application's commands, with its result in a buffer on the device
+    /// that the engine was made from ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)). The kernels are
+    /// compiled, and the work lists are made and uploaded here, once.
     ///
     /// # Errors
-    /// As [`Request::to_buffer`]; also when the range is longer than the device can bind, the clip's segments
-    /// are more than [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) allows, or the device is the engine's own, on which no
-    /// application has a buffer.
+    /// As [`Request::to_buffer`]; also when the range is longer than the device can bind, the clip's segments take
+    /// more than [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory), or the engine opened its
+    /// device itself.
     ///
     /// # Safety
-    /// As [`Request::to_buffer`]; the buffer must live as long as the target, and the target must be dropped
-    /// after all work that was recorded with it has ended, and before the device.
+    /// As [`Request::to_buffer`]; the buffer must live as long as the target, and the target must be dropped after
+    /// all work that was recorded with it has ended, and before the device is destroyed.
     pub unsafe fn target(&self, buffer: VulkanBuffer) -> Result<ClipTarget, Error> {
         let (opened, timeline, window) = self.for_buffer(buffer)?;
         let engine = opened.engine();
@@ -62,7 +62,7 @@ impl Request<'_> {
         })
     }
 
-    /// The device, the samples and the part of them, where the result fits a range of a buffer.
+    /// The device, the sample times and the window of the result, if the result fits the range of the buffer.
     fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(&Opened, Timeline, Window), Error> {
         let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::BufferOnCpu);

@@ -1,4 +1,4 @@
-//! Results in memory of the engine's device that others on the same card import.
+//! Results in memory of the engine's device that other interfaces on the same card, such as CUDA, can import.
 
 use std::sync::Arc;
 
@@ -14,12 +14,12 @@ use crate::memory::OutOfMemoryError;
 use crate::output::window::Window;
 
 impl Request<'_> {
-    /// Evaluates into memory of the engine's device that others on the same card, such as CUDA, import. Where they
-    /// can wait for the device, this returns while it still writes.
+    /// Evaluates into memory of the engine's device that other interfaces on the same card, such as CUDA, can import.
+    /// If they can wait for the device, this returns while the device is still writing.
     ///
     /// # Errors
-    /// When the engine is the CPU, the device exports no memory, the frames do not fit the clip, the encoding is for
-    /// rotations and the clip has none, or the device fails.
+    /// As [`Request::size`]; also when the engine is the CPU, the device cannot export memory, there is not enough
+    /// memory, or the device fails.
     pub fn export(&self) -> Result<ExportedResult, Error> {
         let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::ExportOnCpu);

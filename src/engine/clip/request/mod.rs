@@ -1,4 +1,4 @@
-//! A request: which samples of a clip or of a set, how they are stored, and where they go.
+//! A request: which samples of a clip or of a set are evaluated, in which layout and encoding, and into which memory.
 
 #[cfg(feature = "vulkan")]
 mod application_device;
@@ -36,9 +36,11 @@ use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// What is asked of a clip ([`Clip::request`]) or of a set ([`Engine::request`]): a layout, an encoding, some of
-/// the tracks, some of the samples, and a destination for the result. Of a set only what the samples need is
-/// prepared, a piece at a time where that takes less memory.
+/// A request for samples of a clip ([`Clip::request`]) or of a set ([`Engine::request`]).
+///
+/// It selects tracks and samples and sets the layout and the encoding; then one of its functions evaluates it into a
+/// destination. For a set, only the segments that the samples need are prepared, piece by piece if that takes less
+/// memory.
 ///
 /// ```
 /// use tumble::{Device, Encoding, Engine, SampleTimes, Layout, TrackSet, method};
@@ -69,7 +71,7 @@ pub struct Request<'a> {
     samples: Option<Range<usize>>,
 }
 
-/// What is evaluated.
+/// The clip or the set that is evaluated.
 #[derive(Debug, Clone, Copy)]
 #[allow(clippy::large_enum_variant)] // it lives on the stack of one call, and is copied
 enum RequestSource<'a> {
@@ -111,8 +113,8 @@ impl RequestSource<'_> {
         }
     }
 
-    /// Works on a window of the clip, or of what the window needs of the set, prepared for it: `work` gets the
-    /// samples and the window as they are there.
+    /// Calls `work` for a window of the clip, or for the segments of the set that the window needs, with the samples
+    /// and the window relative to them.
     #[cfg(feature = "vulkan")]
     fn with_uploaded<T>(
         &self,
@@ -182,64 +184,65 @@ impl<'a> Request<'a> {
 }
 
 impl Request<'_> {
-    /// The order of the result: `[track][sample]`, unless another is asked for.
+    /// Sets the order of the result; by default `[track][sample]`.
     pub fn layout(mut self, layout: Layout) -> Self {
         self.layout = layout;
         self
     }
 
-    /// How each value is stored.
+    /// Sets the encoding of each value; by default four f32.
     pub fn encoding(mut self, encoding: Encoding) -> Self {
         self.encoding = encoding;
         self
     }
 
-    /// Only these tracks, from 0: the result has no others.
+    /// Limits the result to these tracks; indices count from 0.
     pub fn tracks(mut self, tracks: Range<usize>) -> Self {
         self.tracks = Some(tracks);
         self
     }
 
-    /// Only these of the samples that the frames mean, from 0: the result has no others.
+    /// Limits the result to these samples of the request's times; indices count from 0.
     pub fn samples(mut self, samples: Range<usize>) -> Self {
         self.samples = Some(samples);
         self
     }
 
-    /// Values of the result, and bytes of each.
+    /// The number of values of the result, and the bytes of each.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, there are no such tracks or samples, or the encoding is for
-    /// rotations and the clip has none.
+    /// When the frames do not fit the clip, the tracks or samples are out of range, or the encoding is for rotations
+    /// and the quantity is a velocity or an acceleration.
     pub fn size(&self) -> Result<(usize, usize), Error> {
         let (_, window) = self.window()?;
         Ok((window.len(), self.encoding.bytes()))
     }
 
-    /// The rotations.
+    /// Evaluates rotations.
     ///
     /// # Errors
-    /// As [`Request::size`]; also when the quantity is a velocity or an acceleration, another encoding than f32
-    /// is asked for, there is not the memory for the result, or the device fails.
+    /// As [`Request::size`]; also when the quantity is a velocity or an acceleration, the encoding is not f32, there
+    /// is not enough memory for the result, or the device fails.
     pub fn evaluate(&self) -> Result<Rotations, Error> {
         check_rows::<Quat>(self.source.quantity())?;
         self.values()
     }
 
-    /// The velocities or accelerations
+    /// Evaluates velocities or accelerations
     /// ([`Interpolation::quantity`](crate::method::interpolation::Interpolation::quantity)).
     ///
     /// # Errors
-    /// As [`Request::evaluate`], but when the quantity is the rotation.
+    /// As [`Request::evaluate`], but the quantity must not be the rotation.
     pub fn rates(&self) -> Result<Vectors, Error> {
         check_rows::<Vec4>(self.source.quantity())?;
         self.values()
     }
 
-    /// The result's bytes, encoded where it is evaluated: those that [`Encoding::encode`] makes of the rotations.
+    /// Evaluates to bytes in the request's encoding, which the device applies; the same bytes as [`Encoding::encode`]
+    /// of the rotations.
     ///
     /// # Errors
-    /// As [`Request::size`]; also when there is not the memory for the result, or the device fails.
+    /// As [`Request::size`]; also when there is not enough memory for the result, or the device fails.
     pub fn evaluate_bytes(&self) -> Result<Vec<u8>, Error> {
         let (timeline, window) = self.window()?;
         let bytes = window.len().saturating_mul(self.encoding.bytes());
@@ -248,18 +251,18 @@ impl Request<'_> {
         Ok(output)
     }
 
-    /// Evaluates into the caller's memory, of whatever type: its bytes are those of
-    /// [`Request::evaluate_bytes`], in the order of the layout. Memory that is aligned to 16 bytes is filled
-    /// without a copy.
+    /// Evaluates into the caller's memory, of any type. Its bytes are those of [`Request::evaluate_bytes`], in the
+    /// order of the layout. Memory that is aligned to 16 bytes is filled without a copy.
     ///
     /// # Errors
-    /// As [`Request::size`]; also when `output` has not exactly the bytes of the result, or the device fails.
+    /// As [`Request::size`]; also when `output` is not exactly as many bytes as the result, there is not enough
+    /// memory, or the device fails.
     pub fn evaluate_into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
         let (timeline, window) = self.window()?;
         self.fill(&timeline, &window, bytemuck::cast_slice_mut(output))
     }
 
-    /// As [`Request::evaluate_into`], but into values of the result's type alone.
+    /// As [`Request::evaluate_into`], for values of the result's type only.
     pub(crate) fn evaluate_values_into<R: OutputValue>(
         &self,
         output: &mut [R],
@@ -271,12 +274,15 @@ impl Request<'_> {
         })
     }
 
-    /// Evaluates in chunks of about `chunk` values (at least one row of the layout is best); `sink` uses one while
-    /// others are evaluated. Memory is that of three chunks, and for a set that of the segments that a chunk
-    /// needs: track by track only the tracks of a chunk are prepared at a time; frame by frame, and where a chunk
-    /// is less than a track, all that the request's samples need are prepared at once if that takes no more than
-    /// [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory), or 256 MiB where that has no limit, else
-    /// those of a piece of a chunk at a time.
+    /// Evaluates in chunks of about `chunk` values, which should be at least one row of the layout. `sink` uses one
+    /// chunk while the next ones are evaluated.
+    ///
+    /// The memory is that of three chunks, and for a set also of segments:
+    ///
+    /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
+    /// * otherwise: all segments that the request's samples need, if they take no more than
+    ///   [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) (256 MiB if it has no limit), and else
+    ///   those of a part of a chunk at a time.
     ///
     /// ```
     /// # use glam::{Quat, Vec4};
@@ -294,8 +300,8 @@ impl Request<'_> {
     /// ```
     ///
     /// # Errors
-    /// The first error of `sink`; or as [`Request::size`], when another encoding than f32 is asked for, or the
-    /// device fails.
+    /// The first error of `sink`; as [`Request::size`]; and when the encoding is not f32, there is not enough memory,
+    /// or the device fails.
     pub fn stream<E: From<Error>>(
         &self,
         chunk: usize,
@@ -313,7 +319,7 @@ impl Request<'_> {
         }
     }
 
-    /// The stored values, whatever they are.
+    /// The values of any quantity.
     fn values<T>(&self) -> Result<Samples<T>, Error> {
         self.check_f32()?;
         let (timeline, window) = self.window()?;
@@ -333,7 +339,7 @@ impl Request<'_> {
         Ok(Samples::new(Box::new(quats), tracks, samples, self.layout))
     }
 
-    /// Evaluates a part of the result into `output`, encoded, if both fit.
+    /// Evaluates a window of the result into `output`, in the request's encoding; refuses what does not fit.
     fn fill(&self, timeline: &Timeline, window: &Window, output: &mut [u8]) -> Result<(), Error> {
         match self.source {
             RequestSource::Clip(clip) => {
@@ -350,7 +356,7 @@ impl Request<'_> {
         }
     }
 
-    /// Refuses an encoding where the result is of four f32 a value.
+    /// Refuses encodings other than f32.
     fn check_f32(&self) -> Result<(), Error> {
         match self.encoding {
             Encoding::F32 => Ok(()),
@@ -358,7 +364,7 @@ impl Request<'_> {
         }
     }
 
-    /// The samples that are meant, and which part of them the result is.
+    /// The sample times of the request, and the part of them that the result has.
     pub(crate) fn window(&self) -> Result<(Timeline, Window), Error> {
         check_encoding(self.encoding, self.source.quantity())?;
         let timeline = self.source.timeline(self.frames)?;
