@@ -1,6 +1,24 @@
-/* Tumble for C and C++: keyframe tracks of unit quaternions in, the rotation of every track at every
-   sample out, on the CPU or a Vulkan device, with the same bits from both. docs/c.md is the guide.
-   Written by cbindgen from capi/src: UPDATE_HEADER=1 cargo test -p tumble-capi */
+/* Tumble for C and C++: evaluates tracks of rotation keys (unit quaternions) at any times, on the CPU or
+   on a Vulkan device, with the same bits from both. docs/c.md is the guide, and docs/words.md defines the terms.
+   Written by cbindgen from capi/src: UPDATE_HEADER=1 cargo test -p tumble-capi
+
+   These rules apply to all functions, unless a comment says otherwise:
+
+   - Errors: a function that can fail returns a TumbleResult: TUMBLE_RESULT_OK (0) on success, otherwise the reason,
+     and tumble_last_error returns a message. Functions that return a number or a text return 0 or null on an error,
+     and the message is set too. Handles and numbers are written to output arguments on success only.
+   - Handles: pointers to TumbleEngine, TumbleSet, TumbleClip and other types without members are handles of objects
+     and cannot be dereferenced. A function that creates an object writes the handle to its last argument. The caller
+     frees every object, in any order, with the function of its type that ends with _free. An object stays valid when
+     the objects that it was made from are freed. A handle that was freed gives TUMBLE_RESULT_INVALID_HANDLE.
+   - Pointers: they must not be null, except those of arrays of length 0. Arrays, structures and texts that the caller
+     passes are used during the call only. Arrays and texts that a function returns must not be freed.
+   - Structures: the first member, size, must be sizeof of the structure. Set members that are not used to 0.
+   - Data: texts are UTF-8 and end with a zero byte. Quaternions are x y z w. Times are in seconds, except those of
+     crowds, which are in ticks. Indices count from 0.
+   - Threads: any thread may call any function at any time, with the same handles too. Calls on the same Vulkan device
+     or the same crowd run one after another. If a handle is freed during a call of another thread, that call still
+     ends normally. */
 
 #ifndef TUMBLE_H
 #define TUMBLE_H
@@ -654,8 +672,8 @@ typedef struct TumbleVulkan {
    */
   uint32_t shader_int64;
   /*
-   Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. It
-   requires the feature `timelineSemaphore` of the device, and only the library may use it.
+   Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. The
+   device must then have the feature `timelineSemaphore` enabled, and only the library may use this queue.
    */
   void *copy_queue;
   /*
@@ -665,8 +683,8 @@ typedef struct TumbleVulkan {
   /*
    A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
    `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
-   must not have it locked when it calls the library, which would wait forever. If it is null, `unlock_queue`
-   must be null too, and nothing else may use `queue` during a call that submits to it.
+   must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
+   `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
    */
   void (*lock_queue)(void *user);
   /*
@@ -986,8 +1004,9 @@ const char *tumble_file_track_method(const struct TumbleFile *file,
                                      size_t track);
 
 /*
- Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. It is not 0 if the
- file's times count from 1970, because f64 could not represent them exactly enough.
+ Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. Add it to the set's
+ times to get those of the file. It is not 0 if, for example, the file's times count from 1970: f64 is not accurate
+ enough for these.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
@@ -1789,8 +1808,8 @@ TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
 
  # Errors
  `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number: in both cases the result can still be taken. `TUMBLE_RESULT_DEVICE` if the
- device fails.
+ `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+ if the device fails.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -1805,8 +1824,8 @@ TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd, float *output, size_t 
 
  # Errors
  `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number: in both cases the result can still be taken. `TUMBLE_RESULT_DEVICE` if the
- device fails.
+ `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+ if the device fails.
 
  # Safety
  `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.

@@ -1,4 +1,4 @@
-//! Evaluating: a set in one go, or a clip that stays on a device.
+//! Evaluation of a set in one call, or of a clip that stays on a device.
 
 use tumble::{Clip, SampleTimes, Timeline, TrackSet};
 
@@ -15,7 +15,7 @@ use crate::vulkan::buffer_range;
 /// may use it at the same time.
 pub struct TumbleClip {
     pub(crate) inner: Clip,
-    /// Whether its engine is on the application's own Vulkan device.
+    /// Whether its engine is on the application's Vulkan device.
     pub(crate) is_on_application_device: bool,
 }
 
@@ -23,7 +23,7 @@ impl Object for TumbleClip {
     const NAME: &'static str = "clip";
 }
 
-/// How many floats a result has, four for each sample, of which `floats` must be exactly as many.
+/// Checks that `floats` is the number of floats of a result, four for each sample of each track.
 fn check_size(tracks: usize, timeline: &Timeline, floats: usize) -> Result<(), Failure> {
     let needed = tracks as u128 * timeline.len() as u128 * 4;
     if floats as u128 == needed {

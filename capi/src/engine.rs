@@ -1,4 +1,4 @@
-//! Engines: the devices that evaluate.
+//! Engines: open devices that evaluate.
 
 use std::ffi::{CString, c_char};
 
@@ -92,10 +92,10 @@ pub unsafe extern "C" fn tumble_engine_open(
 }
 
 impl TumbleEngineOptions {
-    /// What the structure says; null is all defaults.
+    /// The options of a structure; for null the defaults.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure.
+    /// The pointer must be null or point to such a structure.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
         // SAFETY: as the caller promises.
         let options = unsafe {
@@ -123,7 +123,7 @@ fn open(name: &str, options: &EngineOptions) -> Result<Engine, Failure> {
     }
 }
 
-/// The fastest device, with the options.
+/// An engine on the fastest device, with the options.
 fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
     let found = Engine::auto()?;
     let name = found.device_info().map(|info| info.name.clone());
@@ -140,7 +140,7 @@ fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
     }
 }
 
-/// The first Vulkan device that opens; else why the first one does not.
+/// An engine on the first Vulkan device that can be opened; otherwise the error of the first device.
 fn first_exact(options: &EngineOptions) -> Result<Engine, Failure> {
     let mut reason = None;
     for device in Device::list()? {

@@ -18,11 +18,11 @@ pub struct TumbleFile {
     messages: Vec<CString>,
 }
 
-/// A clip, with its names as text for C.
+/// A clip of a file, with its names as C strings.
 pub(crate) struct Clip {
     pub(crate) motion: Motion,
     name: CString,
-    /// Of each track, the name of the method by which the file interpolates its rotation.
+    /// For each track, the name of the method by which the file interpolates its rotations.
     methods: Vec<CString>,
 }
 
@@ -30,7 +30,7 @@ impl Object for TumbleFile {
     const NAME: &'static str = "file";
 }
 
-/// Text for C, which has no zeros inside.
+/// The text as a C string, without the zero bytes inside.
 pub(crate) fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
@@ -168,8 +168,9 @@ pub extern "C" fn tumble_file_track_method(
     name.unwrap_or(std::ptr::null())
 }
 
-/// Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. It is not 0 if the
-/// file's times count from 1970, because f64 could not represent them exactly enough.
+/// Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. Add it to the set's
+/// times to get those of the file. It is not 0 if, for example, the file's times count from 1970: f64 is not accurate
+/// enough for these.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.

@@ -1,4 +1,4 @@
-//! How tracks are interpolated.
+//! Interpolations: methods with their options.
 
 use std::ffi::{CString, c_char};
 use std::sync::LazyLock;
@@ -121,7 +121,7 @@ pub struct TumbleInterpolation {
 }
 
 impl TumbleInterpolation {
-    /// What the structure says; null is all defaults.
+    /// The interpolation of a structure; for null the default method with its defaults.
     ///
     /// # Safety
     /// As [`TumbleInterpolation::read_or`].
@@ -130,11 +130,11 @@ impl TumbleInterpolation {
         unsafe { Self::read_or(pointer, || Ok(method::BESSEL_OVERHAUSER)) }
     }
 
-    /// What the structure says; null is another method with all defaults.
+    /// The interpolation of a structure; for null the method `other` with its defaults.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose `method` is null or text that ends with
-    /// a zero.
+    /// The pointer must be null or point to such a structure, whose `method` is null or a text that ends with a zero
+    /// byte.
     pub(crate) unsafe fn read_or(
         pointer: *const Self,
         other: impl FnOnce() -> Result<Method, Failure>,

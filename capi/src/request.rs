@@ -1,5 +1,5 @@
-//! What is asked of a clip beside its samples: an encoding, some of the tracks and samples; and where the result goes:
-//! the caller's memory, or an application's command buffers.
+//! Requests of a clip: which tracks and samples are evaluated, their layout and encoding, and whether the result goes
+//! to the caller's memory or is recorded into an application's command buffers.
 
 use std::ffi::{CString, c_char, c_void};
 use std::sync::LazyLock;
@@ -54,10 +54,10 @@ pub struct TumbleRequest {
 }
 
 impl TumbleRequest {
-    /// Calls `work` with the request that the structure says.
+    /// Calls `work` with the request of a structure; null is an error.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose pointers are null or those of what is said there.
+    /// The pointer must be null or point to such a structure, whose pointers are null or as its members say.
     unsafe fn read<T>(
         pointer: *const Self,
         clip: &Clip,

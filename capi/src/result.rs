@@ -1,4 +1,4 @@
-//! Codes, the words of the last error, and the line that no panic crosses.
+//! Result codes, the message of the last error, and the conversion of panics to errors.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -151,8 +151,7 @@ impl From<CrowdError> for Failure {
     }
 }
 
-/// What is wrong with a crowd, in the words of this interface: its functions' names, and masks that count
-/// from 1.
+/// The message of a crowd's error, with the function names of this interface, and masks that are counted from 1.
 fn crowd_words(error: &CrowdError) -> String {
     match error {
         CrowdError::Missing {
@@ -222,7 +221,7 @@ fn remember(message: &str) {
     let _ = LAST.try_with(|last| last.replace(message));
 }
 
-/// Does some work; `None` and words for it where it fails or panics.
+/// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
     // What a panic leaves half done is dropped, or lies behind a lock that is then poisoned.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
@@ -232,7 +231,7 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T,
     })
 }
 
-/// The code of some work.
+/// The result code of some work; the message of an error is stored for this thread.
 pub(crate) fn code(work: impl FnOnce() -> Result<(), Failure>) -> TumbleResult {
     guarded(work).err().unwrap_or(TumbleResult::Ok)
 }

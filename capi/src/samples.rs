@@ -1,4 +1,4 @@
-//! Which samples are evaluated, and where they lie in memory.
+//! Sample times, and the layout of results.
 
 use tumble::{FrameRate, Layout, SampleTimes};
 
@@ -55,10 +55,10 @@ pub struct TumbleSamples {
 }
 
 impl TumbleSamples {
-    /// The samples that the structure says.
+    /// The sample times of a structure; null is an error.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose `times` has `time_count` numbers.
+    /// The pointer must be null or point to such a structure, whose `times` has `time_count` numbers.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<SampleTimes, Failure> {
         // SAFETY: as the caller promises.
         let structure = unsafe {
@@ -88,7 +88,7 @@ impl TumbleSamples {
     }
 }
 
-/// The layout of a constant.
+/// The layout of a C constant.
 pub(crate) fn layout(value: u32) -> Result<Layout, Failure> {
     option(value, &Layout::ALL, "layout")
 }

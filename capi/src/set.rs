@@ -28,7 +28,7 @@ impl TumbleSet {
         }
     }
 
-    /// The set: a track is pushed as a whole or not at all, after panics too.
+    /// The set, also if its lock is poisoned: a track is added completely or not at all, even if a call panics.
     pub(crate) fn read(&self) -> RwLockReadGuard<'_, TrackSet> {
         self.inner.read().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,4 +1,4 @@
-//! Translations and scales beside a set's rotations, as crowds use them.
+//! Translations and scales of a set's tracks, for crowds.
 
 use std::sync::PoisonError;
 
@@ -12,6 +12,8 @@ use crate::set::TumbleSet;
 
 type Set = fn(&mut TrackSet, usize, &[f64], &[[f32; 3]], &[[Vec3; 2]]) -> Result<(), TrackError>;
 
+/// Sets translation or scale keys of a track by the function `to`.
+///
 /// # Safety
 /// As `tumble_set_translations`.
 unsafe fn give(

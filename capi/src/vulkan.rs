@@ -1,4 +1,4 @@
-//! Engines on an application's own Vulkan device.
+//! Engines on an application's Vulkan device.
 
 use std::ffi::{CStr, c_void};
 
@@ -41,15 +41,15 @@ pub struct TumbleVulkan {
     pub shader_float_controls: u32,
     /// 1 if the feature `shaderInt64` is enabled, otherwise 0.
     pub shader_int64: u32,
-    /// Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. It
-    /// requires the feature `timelineSemaphore` of the device, and only the library may use it.
+    /// Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. The
+    /// device must then have the feature `timelineSemaphore` enabled, and only the library may use this queue.
     pub copy_queue: *mut c_void,
     /// The family of `copy_queue`; ignored if that is null.
     pub copy_queue_family: u32,
     /// A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
     /// `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
-    /// must not have it locked when it calls the library, which would wait forever. If it is null, `unlock_queue`
-    /// must be null too, and nothing else may use `queue` during a call that submits to it.
+    /// must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
+    /// `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
     pub lock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// The function that unlocks `queue`; the library calls it on the thread that called `lock_queue`.
     pub unlock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
@@ -58,7 +58,7 @@ pub struct TumbleVulkan {
     pub queue_user: *mut c_void,
 }
 
-/// What an application's functions get.
+/// The argument of the application's functions that lock and unlock the queue.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
@@ -78,7 +78,7 @@ fn refused(message: String) -> Failure {
 }
 
 impl TumbleVulkan {
-    /// The application's lock of the queue, if it has one.
+    /// The application's lock of the queue; `None` if both functions are null.
     fn queue_lock(&self) -> Result<Option<QueueLock>, Failure> {
         let user = User(self.queue_user);
         match (self.lock_queue, self.unlock_queue) {
@@ -100,7 +100,7 @@ impl TumbleVulkan {
     /// The functions of the loader, the instance and the device.
     ///
     /// # Safety
-    /// The handles are valid, and belong together.
+    /// The handles must be valid and belong together.
     unsafe fn handles(&self) -> Result<VulkanHandles, Failure> {
         let Some(get) = self.get_instance_proc_addr else {
             let message = "`vulkan->get_instance_proc_addr` is null";
@@ -175,7 +175,8 @@ impl TumbleVulkan {
         })
     }
 
-    /// What the instance can tell: the physical device is one of its own, and the family can compute.
+    /// Checks with the instance that it has the physical device, and that the queue families exist and `queue` can
+    /// compute.
     fn check_device(
         &self,
         instance: &ash::Instance,
@@ -218,7 +219,7 @@ impl TumbleVulkan {
     }
 }
 
-/// A range of an application's buffer, for what an engine on its own device left there.
+/// A range of an application's buffer, for results of an engine on the application's device.
 pub(crate) fn buffer_range(
     is_on_application_device: bool,
     buffer: u64,

@@ -1,4 +1,4 @@
-//! Weights of layers, set at once or faded by the clock.
+//! Weights of layers: set at once, or changed by the clock.
 
 use tumble::crowd::CrowdFade;
 

@@ -1,4 +1,4 @@
-//! Libraries of clips from motion files: joints are known by their names.
+//! Libraries of clips from motion files, whose joints are matched by name.
 
 use std::collections::HashMap;
 use std::ffi::c_char;
@@ -19,12 +19,12 @@ fn refused(message: String) -> Failure {
     Failure::new(TumbleResult::InvalidInput, message)
 }
 
-/// The name of a track as libraries have it.
+/// The name of a track, without zero bytes, as joints of libraries have it.
 fn name_of(motion: &Motion, track: usize) -> String {
     motion.set.track_name(track).replace('\0', "")
 }
 
-/// The tracks of a clip by their names, of which no two may be the same.
+/// The indices of a clip's tracks by name; an error if two tracks have the same name.
 fn tracks_by_name(motion: &Motion, clip: usize) -> Result<HashMap<String, usize>, Failure> {
     let mut tracks = HashMap::new();
     for track in 0..motion.set.track_count() {
@@ -108,8 +108,8 @@ pub unsafe extern "C" fn tumble_crowd_library_of_file(
     })
 }
 
-/// The tracks of a clip in the order of a library's joints. Joints that the clip does not have rest, and
-/// what it does not key is as it rests in the clip's own file.
+/// The tracks of a clip in the order of a library's joints. Joints that the clip does not have are at rest in the
+/// library's pose; channels that it has no keys for are at rest in the pose of the clip's file.
 fn matched(
     library: &TumbleCrowdLibrary,
     motion: &Motion,
@@ -158,7 +158,7 @@ fn matched(
     Ok(set.select(order)?)
 }
 
-/// The one method of all rotations that move.
+/// The method by which the file interpolates all rotations that change; an error if there are several.
 fn authored_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
     let moves = |&track: &usize| {
         let keys = motion

@@ -1,4 +1,4 @@
-//! What one layer of an instance plays.
+//! A layer of an instance: the clip that it plays, and its time, speed and weight.
 
 use tumble::WrapMode;
 use tumble::crowd::CrowdLayer;
@@ -37,7 +37,7 @@ pub struct TumbleCrowdLayer {
 }
 
 impl TumbleCrowdLayer {
-    /// The instance, the layer, and what it is to play; `index` is for messages.
+    /// The instance, the layer and its new state; `index` is the change's index for messages.
     pub(crate) fn change(&self, index: usize) -> Result<(usize, usize, CrowdLayer), Failure> {
         let size = size_of::<Self>();
         if self.size != size {
@@ -60,7 +60,7 @@ impl TumbleCrowdLayer {
         Ok((self.instance, self.layer, plays))
     }
 
-    /// The same for C.
+    /// The state of a layer as a structure for C.
     pub(crate) fn new(instance: usize, layer: usize, plays: CrowdLayer) -> Self {
         let wrap = WrapMode::ALL.iter().position(|&wrap| wrap == plays.wrap);
         Self {

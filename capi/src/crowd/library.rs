@@ -21,10 +21,10 @@ pub struct TumbleCrowdLibrary {
     pub(crate) joints: Vec<LibraryJoint>,
 }
 
-/// A joint, and where it is where no clip moves it.
+/// A joint, with its transform in clips that do not move it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LibraryJoint {
-    /// Empty in libraries that were made of arrays.
+    /// Empty in libraries that were made from arrays.
     pub(crate) name: CString,
     pub(crate) parent: Option<usize>,
     pub(crate) rest: Transform,
@@ -35,7 +35,7 @@ impl Object for TumbleCrowdLibrary {
 }
 
 impl TumbleCrowdLibrary {
-    /// An empty library; 0 ticks stand for the default.
+    /// An empty library; 0 ticks mean the default.
     pub(crate) fn new(joints: Vec<LibraryJoint>, ticks_per_second: u32) -> Result<Self, Failure> {
         let parents = joints.iter().map(|joint| joint.parent).collect();
         let offsets = joints.iter().map(|joint| joint.rest.translation).collect();
@@ -118,10 +118,10 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
     })
 }
 
-/// The method for translations and scales that a name says.
+/// The method for translations and scales with this name; `other` if `name` is null.
 ///
 /// # Safety
-/// `name` is null or text that ends with a zero.
+/// `name` must be null or a text that ends with a zero byte.
 pub(crate) unsafe fn vector_method(
     name: *const c_char,
     other: impl FnOnce() -> Result<VectorMethod, Failure>,

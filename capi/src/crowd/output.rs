@@ -1,4 +1,4 @@
-//! Evaluating crowds into the caller's memory.
+//! Evaluation of crowds into the caller's memory.
 
 use tumble::crowd::{Crowd, CrowdError, CrowdOutput, CrowdValues};
 
@@ -23,13 +23,13 @@ pub enum TumbleCrowdValues {
     Skinning = 3,
 }
 
-/// The values of a constant, in 32 or in 16 bits.
+/// The output for a C constant, in 32 or 16 bits.
 pub(crate) fn output(values: u32, is_half: bool) -> Result<CrowdOutput, Failure> {
     let values = option(values, &CrowdValues::ALL, "values")?;
     Ok(CrowdOutput { values, is_half })
 }
 
-/// Memory of the caller's that is exactly as large as a result.
+/// The caller's memory for a result; an error if `count` is not exactly the result's size.
 ///
 /// # Safety
 /// As [`list_mut`].
@@ -170,8 +170,8 @@ pub unsafe extern "C" fn tumble_crowd_poll(
     })
 }
 
-/// Waits for what was submitted in 32 or 16 bits, and takes its result. What has the other precision, or
-/// another size, stays.
+/// Waits for an evaluation that was submitted in 32 or 16 bits, and takes its result. If the precision or the size
+/// differs, the result can still be taken.
 ///
 /// # Safety
 /// As [`list_mut`].
@@ -201,8 +201,8 @@ unsafe fn wait<T: Number>(
 ///
 /// # Errors
 /// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
-/// `output_count` is another number: in both cases the result can still be taken. `TUMBLE_RESULT_DEVICE` if the
-/// device fails.
+/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+/// if the device fails.
 ///
 /// # Safety
 /// `output` must have `output_count` floats, which nothing else uses during the call.
@@ -223,8 +223,8 @@ pub unsafe extern "C" fn tumble_crowd_wait(
 ///
 /// # Errors
 /// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
-/// `output_count` is another number: in both cases the result can still be taken. `TUMBLE_RESULT_DEVICE` if the
-/// device fails.
+/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+/// if the device fails.
 ///
 /// # Safety
 /// `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.

@@ -1,4 +1,4 @@
-//! Crowds, and what their instances play.
+//! Crowds, the layers of their instances, and the clock.
 
 use std::sync::{Mutex, MutexGuard};
 
@@ -21,7 +21,7 @@ pub struct TumbleCrowd {
 
 pub(crate) struct State {
     pub(crate) inner: Crowd,
-    /// Memory for what is set, kept from call to call.
+    /// Memory for the changes of a call, reused by the next one.
     changes: Vec<(usize, usize, CrowdLayer)>,
 }
 

@@ -1,4 +1,4 @@
-//! Crowds on an application's own Vulkan device, recorded into its own command buffers.
+//! Crowds on an application's Vulkan device, recorded into the application's command buffers.
 
 use std::ffi::c_void;
 
