@@ -1,6 +1,24 @@
-/* Tumble for C and C++: keyframe tracks of unit quaternions in, the rotation of every track at every
-   sample out, on the CPU or a Vulkan device, with the same bits from both. docs/c.md is the guide.
-   Written by cbindgen from capi/src: UPDATE_HEADER=1 cargo test -p tumble-capi */
+/* Tumble for C and C++: evaluates tracks of rotation keys (unit quaternions) at any times, on the CPU or
+   on a Vulkan device, with the same bits from both. docs/c.md is the guide, and docs/words.md defines the terms.
+   Written by cbindgen from capi/src: UPDATE_HEADER=1 cargo test -p tumble-capi
+
+   These rules apply to all functions, unless a comment says otherwise:
+
+   - Errors: a function that can fail returns a TumbleResult: TUMBLE_RESULT_OK (0) on success, otherwise the reason,
+     and tumble_last_error returns a message. Functions that return a number or a text return 0 or null on an error,
+     and the message is set too. Handles and numbers are written to output arguments on success only.
+   - Handles: pointers to TumbleEngine, TumbleSet, TumbleClip and other types without members are handles of objects
+     and cannot be dereferenced. A function that creates an object writes the handle to its last argument. The caller
+     frees every object, in any order, with the function of its type that ends with _free. An object stays valid when
+     the objects that it was made from are freed. A handle that was freed gives TUMBLE_RESULT_INVALID_HANDLE.
+   - Pointers: they must not be null, except those of arrays of length 0. Arrays, structures and texts that the caller
+     passes are used during the call only. Arrays and texts that a function returns must not be freed.
+   - Structures: the first member, size, must be sizeof of the structure. Set members that are not used to 0.
+   - Data: texts are UTF-8 and end with a zero byte. Quaternions are x y z w. Times are in seconds, except those of
+     crowds, which are in ticks. Indices count from 0.
+   - Threads: any thread may call any function at any time, with the same handles too. Calls on the same Vulkan device
+     or the same crowd run one after another. If a handle is freed during a call of another thread, that call still
+     ends normally. */
 
 #ifndef TUMBLE_H
 #define TUMBLE_H
@@ -10,27 +28,27 @@
 #include <stdint.h>
 
 /*
- The version of this header: major, minor and patch, as `TUMBLE_VERSION_MAJOR` and the others say.
+ The version of this header as one number: 1 000 000 × major + 1 000 × minor + patch.
  */
 #define TUMBLE_VERSION 1000
 
 /*
- Versions with another major number are made for other headers.
+ The major version. Header and library must have the same one.
  */
 #define TUMBLE_VERSION_MAJOR 0
 
 /*
- Versions with a greater minor number have more functions; before 1.0 they may change some.
+ The minor version. A greater one has more functions; before version 1.0 it may also change functions.
  */
 #define TUMBLE_VERSION_MINOR 1
 
 /*
- Versions with another patch number have the same interface.
+ The patch version. It does not change the interface.
  */
 #define TUMBLE_VERSION_PATCH 0
 
 /*
- The result of a call.
+ The result code of a call. If it is not `TUMBLE_RESULT_OK`, `tumble_last_error` returns a message with the reason.
  */
 enum TumbleResult
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -42,45 +60,47 @@ enum TumbleResult
    */
   TUMBLE_RESULT_OK = 0,
   /*
-   A pointer is null, or not aligned for what it points to.
+   A pointer is null where null is not allowed, or is not aligned for its type.
    */
   TUMBLE_RESULT_INVALID_POINTER = 1,
   /*
-   A handle was freed, never existed, or has another type.
+   A handle is null, was freed, never existed, or belongs to an object of another type.
    */
   TUMBLE_RESULT_INVALID_HANDLE = 2,
   /*
-   An argument has a value that it cannot have: an unknown constant or name, a size that
-   overflows, a structure of another version, text that is not UTF-8.
+   An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
+   memory, a structure whose `size` is that of another version, text that is not UTF-8, or objects that do not
+   belong together.
    */
   TUMBLE_RESULT_INVALID_ARGUMENT = 3,
   /*
-   Memory for a result is not exactly as large as the result, or a buffer's range does not fit it.
+   The memory for a result does not have the required size, or a range of a buffer is too short or not aligned.
    */
   TUMBLE_RESULT_WRONG_SIZE = 4,
   /*
-   The index is out of range.
+   There is no track, sample, clip, joint, mask, instance, layer or message with this index.
    */
   TUMBLE_RESULT_OUT_OF_RANGE = 5,
   /*
-   Keys, times, samples or a file are refused; the message says where.
+   Keys, times, a skeleton, a mask, a request or a file are refused. The message says where the error is.
    */
   TUMBLE_RESULT_INVALID_INPUT = 6,
   /*
-   Not enough memory.
+   There is not enough memory.
    */
   TUMBLE_RESULT_OUT_OF_MEMORY = 7,
   /*
-   There is no such device, it cannot be opened, it is not exact, or it failed.
+   The device does not exist, cannot be opened, does not compute the CPU's bits, or failed; or the system refused
+   to start worker threads.
    */
   TUMBLE_RESULT_DEVICE = 8,
   /*
-   An internal error of the library; please report it.
+   An internal error of the library. Please report it, with the message.
    */
   TUMBLE_RESULT_INTERNAL = 9,
   /*
-   The call is not possible now: nothing was submitted, the result of a submission was not taken, or it
-   needs data that the object does not have.
+   The call is not possible in this state of the object: nothing was submitted, the result of a submission was
+   not taken, it has another precision, or the object lacks data, such as clips or inverse bind matrices.
    */
   TUMBLE_RESULT_WRONG_STATE = 10,
 };
@@ -93,7 +113,8 @@ typedef int32_t TumbleResult;
 #endif // __cplusplus
 
 /*
- The order of a result in memory, four numbers for each sample of each track.
+ The order of a result in memory. Each sample of a track has one value: four numbers, or in a request as many as
+ its encoding has.
  */
 enum TumbleLayout
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -101,11 +122,11 @@ enum TumbleLayout
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   `[track][sample]`: the samples of a track lie together.
+   `[track][sample]`: all samples of the first track, then those of the second, and so on.
    */
   TUMBLE_LAYOUT_TRACK_MAJOR = 0,
   /*
-   `[sample][track]`: the tracks of a sample lie together.
+   `[sample][track]`: all tracks at the first sample, then at the second, and so on.
    */
   TUMBLE_LAYOUT_FRAME_MAJOR = 1,
 };
@@ -118,7 +139,8 @@ typedef uint32_t TumbleLayout;
 #endif // __cplusplus
 
 /*
- Which of the two quaternions `q` and `-q` of each key is used.
+ Which sign of each key is used: `q` and `-q` are the same rotation. Methods whose definition prescribes the signs
+ ignore this option.
  */
 enum TumblePath
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -126,11 +148,12 @@ enum TumblePath
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The one nearer to the previous key, so that every rotation is the shorter one.
+   Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°.
    */
   TUMBLE_PATH_SHORTEST = 0,
   /*
-   The stored one. Methods that define the path themselves ignore this.
+   Keys keep their signs. Where the dot product of neighbouring keys is negative, the rotation between them is
+   more than 180°.
    */
   TUMBLE_PATH_AS_AUTHORED = 1,
 };
@@ -143,7 +166,7 @@ typedef uint32_t TumblePath;
 #endif // __cplusplus
 
 /*
- The speed along the curve of a track.
+ The speed on the curve of a track.
  */
 enum TumbleSpeed
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -151,11 +174,12 @@ enum TumbleSpeed
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   As the key times say.
+   According to the key times.
    */
   TUMBLE_SPEED_AS_KEYED = 0,
   /*
-   At one angular speed from the first key to the last.
+   The same angular speed from the first key to the last. The path is the same, but inner keys are reached at
+   other times.
    */
   TUMBLE_SPEED_CONSTANT = 1,
 };
@@ -168,7 +192,7 @@ typedef uint32_t TumbleSpeed;
 #endif // __cplusplus
 
 /*
- The values outside the keys.
+ The motion before the first key of a track, or after the last.
  */
 enum TumbleWrap
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -176,7 +200,7 @@ enum TumbleWrap
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The end value is held.
+   The value of the first or the last key stays.
    */
   TUMBLE_WRAP_HOLD = 0,
   /*
@@ -184,7 +208,7 @@ enum TumbleWrap
    */
   TUMBLE_WRAP_LOOP = 1,
   /*
-   The track runs backwards, then forwards again.
+   The track runs backwards, then forwards again, and so on. Quantities other than the rotation are refused.
    */
   TUMBLE_WRAP_MIRROR = 2,
   /*
@@ -201,7 +225,7 @@ typedef uint32_t TumbleWrap;
 #endif // __cplusplus
 
 /*
- The boundary condition: the curve in the first and the last segment.
+ The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
  */
 enum TumbleEnds
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -209,31 +233,31 @@ enum TumbleEnds
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   That of the method.
+   The default of the method.
    */
   TUMBLE_ENDS_OF_METHOD = 0,
   /*
-   The parabola through the last three keys.
+   The parabola through the last three keys at each end.
    */
   TUMBLE_ENDS_PARABOLIC = 1,
   /*
-   No angular acceleration.
+   The angular acceleration is 0 at the ends.
    */
   TUMBLE_ENDS_NATURAL = 2,
   /*
-   The angular velocities `start_velocity` and `end_velocity`.
+   The angular velocities at the ends are `start_velocity` and `end_velocity`.
    */
   TUMBLE_ENDS_CLAMPED = 3,
   /*
-   The angular velocity of slerp between the last two keys.
+   The angular velocity at an end is that of slerp between the last two keys there.
    */
   TUMBLE_ENDS_SECANT = 4,
   /*
-   A closed curve: the last key equals the first.
+   The curve is closed and smooth there. The last key must equal the first, within 0.002 rad.
    */
   TUMBLE_ENDS_LOOP = 5,
   /*
-   The first and the last segment hold their first key.
+   The first and the last segment are constant, with the value of their first key.
    */
   TUMBLE_ENDS_FROZEN = 6,
 };
@@ -246,7 +270,7 @@ typedef uint32_t TumbleEnds;
 #endif // __cplusplus
 
 /*
- What is evaluated: four numbers for each sample.
+ The quantity that is evaluated: four numbers for each sample.
  */
 enum TumbleQuantity
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -254,23 +278,23 @@ enum TumbleQuantity
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The rotation, a unit quaternion `x y z w`.
+   The rotation relative to the parent, a unit quaternion `x y z w`.
    */
   TUMBLE_QUANTITY_ROTATION = 0,
   /*
-   The angular velocity in the body's axes, rad/s, `x y z 0`.
+   The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_BODY = 1,
   /*
-   The angular velocity in the parent's axes, rad/s, `x y z 0`.
+   The angular velocity in the axes of the parent, rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_PARENT = 2,
   /*
-   The angular acceleration in the body's axes, rad/s², `x y z 0`.
+   The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_BODY = 3,
   /*
-   The angular acceleration in the parent's axes, rad/s², `x y z 0`.
+   The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_PARENT = 4,
 };
@@ -283,7 +307,7 @@ typedef uint32_t TumbleQuantity;
 #endif // __cplusplus
 
 /*
- Which samples.
+ How sample times are specified.
  */
 enum TumbleSampling
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -291,7 +315,7 @@ enum TumbleSampling
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Frames at a rate, from the first key of the set to its last.
+   Frames at a rate, from the first key time of the set to the last (`tumble_set_time_span`).
    */
   TUMBLE_SAMPLING_KEYS = 0,
   /*
@@ -299,12 +323,11 @@ enum TumbleSampling
    */
   TUMBLE_SAMPLING_RANGE = 1,
   /*
-   The listed times, the same for every track, in any order.
+   A list of times in any order, the same for every track.
    */
   TUMBLE_SAMPLING_TIMES = 2,
   /*
-   The listed times, different for each track: first those of the first track, then those of the
-   second, the same number for each.
+   A list of times for each track, in the order `[track][sample]`, with the same number of times for every track.
    */
   TUMBLE_SAMPLING_TIMES_OF_TRACKS = 3,
 };
@@ -317,7 +340,7 @@ typedef uint32_t TumbleSampling;
 #endif // __cplusplus
 
 /*
- What is written for every joint of every instance, in the order `[instance][joint]`.
+ The values that are stored for every joint of every visible instance, in the order `[instance][joint]`.
  */
 enum TumbleCrowdValues
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -325,21 +348,21 @@ enum TumbleCrowdValues
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   The rotation in the parent's frame, four numbers: `x y z w`.
+   The rotation in the parent's frame: four numbers `x y z w`.
    */
   TUMBLE_CROWD_VALUES_ROTATIONS = 0,
   /*
-   The transform in the parent's frame, twelve numbers: three rows of four, for column vectors, the
-   last column the translation.
+   The transform in the parent's frame: a matrix of twelve numbers, three rows of four, for column vectors. The
+   last column is the translation.
    */
   TUMBLE_CROWD_VALUES_LOCAL = 1,
   /*
-   The transform in the model, likewise.
+   The transform in the model's frame, as a matrix of the same form.
    */
   TUMBLE_CROWD_VALUES_MODEL = 2,
   /*
-   The transform in the model times the inverse bind matrix, likewise: what vertices are skinned
-   with.
+   The transform in the model's frame times the inverse bind matrix, as a matrix of the same form, for skinning
+   of vertices.
    */
   TUMBLE_CROWD_VALUES_SKINNING = 3,
 };
@@ -352,7 +375,7 @@ typedef uint32_t TumbleCrowdValues;
 #endif // __cplusplus
 
 /*
- How a matrix lies in memory.
+ The order of matrix elements in memory.
  */
 enum TumbleMatrixOrder
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -377,48 +400,54 @@ typedef uint32_t TumbleMatrixOrder;
 #endif // __cplusplus
 
 /*
- A set prepared for one method, on an engine's device. Any number of threads may use it at once.
+ A clip: a set that was prepared for one interpolation and uploaded to an engine's device. Any number of threads
+ may use it at the same time.
  */
 typedef struct TumbleClip TumbleClip;
 
 /*
- A range of an application's buffer that a request of a clip is evaluated into, with all that recording needs.
+ A clip target: a request of a clip, prepared for recording into command buffers, and the range of the
+ application's buffer that receives its result. Any number of threads may use it at the same time.
  */
 typedef struct TumbleClipTarget TumbleClipTarget;
 
 /*
- Many instances of a library's skeleton, each of which plays clips at a separate time and speed. Threads
- that use the same crowd at once wait for each other.
+ A crowd: many instances of a library's skeleton, each of which plays clips at its time and speed. Calls of several
+ threads on the same crowd run one after another.
  */
 typedef struct TumbleCrowd TumbleCrowd;
 
 /*
- Clips of one skeleton, prepared for crowds. Any number of threads may use it at once.
+ A library: the clips, masks and inverse bind matrices of one skeleton, prepared for crowds. Any number of threads
+ may use it at the same time.
  */
 typedef struct TumbleCrowdLibrary TumbleCrowdLibrary;
 
 /*
- A range of an application's buffer that a crowd is evaluated into, with all that recording needs.
+ A crowd target: everything that is needed to record evaluations of a crowd, and the range of the application's
+ buffer that receives their results.
  */
 typedef struct TumbleCrowdTarget TumbleCrowdTarget;
 
 /*
- An open device. Any number of threads may use it at once.
+ An engine: an open device, the CPU or a Vulkan device, that evaluates. Any number of threads may use it at the
+ same time.
  */
 typedef struct TumbleEngine TumbleEngine;
 
 /*
- A motion file that was read: its clips, and messages about them.
+ A motion file that was read: its clips, and messages about it. Any number of threads may use it at the same time.
  */
 typedef struct TumbleFile TumbleFile;
 
 /*
- Tracks of keys. Any number of threads may read a set at once.
+ A set: tracks of rotation keys that are evaluated together, each with optional translations and scales. Any number
+ of threads may use it at the same time.
  */
 typedef struct TumbleSet TumbleSet;
 
 /*
- How a device is opened. All zeros but `size` are the defaults.
+ Options for opening a device. If all members except `size` are 0, they have their defaults.
  */
 typedef struct TumbleEngineOptions {
   /*
@@ -426,21 +455,24 @@ typedef struct TumbleEngineOptions {
    */
   size_t size;
   /*
-   The bytes of a Vulkan device's memory that segments may use; 0: no limit.
+   The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+   set. Larger sets are prepared piece by piece. 0: no limit.
    */
   uint64_t memory;
   /*
-   Threads of the CPU; 0: one for each core, shared by all engines.
+   The number of worker threads of the CPU, up to 1024; ignored on a Vulkan device. 0: all engines share a pool
+   with one thread for each core, or as many as the environment variable `RAYON_NUM_THREADS` says.
    */
   uint32_t threads;
   /*
-   1: a device that fails its self-test is used all the same, and its bits may differ.
+   1: a Vulkan device is used although it fails the self-test; its bits may differ from the CPU's. 0: it is
+   refused.
    */
   uint32_t allow_inexact;
 } TumbleEngineOptions;
 
 /*
- The samples of an evaluation. Zeros stand for what is not used.
+ The sample times of an evaluation. Members that `sampling` does not use are ignored.
  */
 typedef struct TumbleSamples {
   /*
@@ -448,37 +480,39 @@ typedef struct TumbleSamples {
    */
   size_t size;
   /*
-   A `TumbleSampling`.
+   A `TumbleSampling`: which of the members below are used.
    */
   uint32_t sampling;
   /*
-   Frames per `rate_seconds`: 60, or 30000 in 1001 seconds.
+   The numerator of the frame rate: there are `rate_frames` frames in `rate_seconds` seconds, such as 60 in 1, or
+   30000 in 1001.
    */
   uint64_t rate_frames;
   /*
-   0 stands for 1.
+   The denominator of the frame rate, seconds; 0 means 1.
    */
   uint64_t rate_seconds;
   /*
-   Seconds, for `TUMBLE_SAMPLING_RANGE`.
+   The time of the first frame, seconds, for `TUMBLE_SAMPLING_RANGE`.
    */
   double start;
   /*
-   Seconds, for `TUMBLE_SAMPLING_RANGE`.
+   The time after which there are no frames, seconds, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
    */
   double end;
   /*
-   Seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`.
+   The sample times, seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
+   during the call.
    */
   const double *times;
   /*
-   How many times there are, of all tracks together.
+   The number of `times`, for all tracks together.
    */
   size_t time_count;
 } TumbleSamples;
 
 /*
- A method with its options. All zeros but `size` are the defaults.
+ A method with its options. If all members except `size` are 0, they have their defaults.
  */
 typedef struct TumbleInterpolation {
   /*
@@ -486,7 +520,7 @@ typedef struct TumbleInterpolation {
    */
   size_t size;
   /*
-   The method's name, such as "slerp" (`tumble_method_name`); null: "bessel-overhauser".
+   The name of the method, such as "slerp", from `tumble_method_name`; null: "bessel-overhauser".
    */
   const char *method;
   /*
@@ -506,37 +540,42 @@ typedef struct TumbleInterpolation {
    */
   uint32_t speed;
   /*
-   A `TumbleWrap`: before the first key.
+   The motion before the first key: a `TumbleWrap`.
    */
   uint32_t before;
   /*
-   A `TumbleWrap`: after the last key.
+   The motion after the last key: a `TumbleWrap`.
    */
   uint32_t after;
   /*
-   The angular velocity at the first key for `TUMBLE_ENDS_CLAMPED`, rad/s, in the body's axes.
+   The angular velocity at the first key of every track for `TUMBLE_ENDS_CLAMPED`: `x y z` in the body's axes,
+   rad/s.
    */
   double start_velocity[3];
   /*
-   The same at the last key.
+   The angular velocity at the last key of every track, likewise.
    */
   double end_velocity[3];
   /*
-   The tension of "kochanek-bartels".
+   The tension of "kochanek-bartels"; 0 is neutral, usual values are from -1 to 1. With 1 the velocity at a key
+   is 0, with -1 it is doubled.
    */
   double tension;
   /*
-   Its continuity.
+   The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
+   the other side.
    */
   double continuity;
   /*
-   Its bias.
+   The bias of "kochanek-bartels", likewise. With 1 the tangent at a key follows the interval before it, with -1
+   the interval after it.
    */
   double bias;
 } TumbleInterpolation;
 
 /*
- What is asked of a clip. All zeros but `size` and `samples` ask for all of it, as `x y z w` in f32, track by track.
+ A request: which tracks and samples of a clip are evaluated, and their layout and encoding. If all members except
+ `size` and `samples` are 0, it selects all tracks and samples, track by track, as `x y z w` in f32.
  */
 typedef struct TumbleRequest {
   /*
@@ -544,7 +583,7 @@ typedef struct TumbleRequest {
    */
   size_t size;
   /*
-   At which times.
+   The sample times, not null.
    */
   const struct TumbleSamples *samples;
   /*
@@ -552,41 +591,43 @@ typedef struct TumbleRequest {
    */
   uint32_t layout;
   /*
-   A `TumbleMatrixOrder`, for matrices.
+   A `TumbleMatrixOrder`, for the encodings "matrix" and "matrix-3x4".
    */
   uint32_t matrix_order;
   /*
-   The name of what each rotation is stored as, such as "f16" or "matrix-3x4" (`tumble_encoding_name`); null:
-   "f32".
+   The name of the encoding of each value, such as "f16" or "matrix-3x4", from `tumble_encoding_name`; null:
+   "f32". Angles are in degrees.
    */
   const char *encoding;
   /*
-   The axes of "euler": "ZXY" about turned axes, "zxy" about fixed ones; null: "XYZ".
+   The axes of the encoding "euler": uppercase, such as "ZXY", for axes that rotate with the body (intrinsic);
+   lowercase, such as "zxy", for fixed axes (extrinsic). Null: "XYZ".
    */
   const char *sequence;
   /*
-   The first track, from 0.
+   The index of the first track, from 0.
    */
   size_t first_track;
   /*
-   How many tracks; 0: all from the first one on.
+   The number of tracks; 0: all from `first_track` on.
    */
   size_t track_count;
   /*
-   The first of the samples, from 0.
+   The index of the first sample, from 0.
    */
   size_t first_sample;
   /*
-   How many of the samples; 0: all from the first one on.
+   The number of samples of each track; 0: all from `first_sample` on.
    */
   size_t sample_count;
 } TumbleRequest;
 
 /*
- An application's Vulkan instance, device and queue. They stay the application's.
+ An application's Vulkan instance, device and queue, for `tumble_engine_from_vulkan`. The library does not destroy
+ them.
 
- The device needs no features; a software device is faster with `shaderInt64`. Below Vulkan 1.2,
- enable `VK_KHR_shader_float_controls` where it is offered.
+ No features of the device are required, but software devices are faster with `shaderInt64`. Below Vulkan 1.2,
+ enable `VK_KHR_shader_float_controls` if the device has it.
  */
 typedef struct TumbleVulkan {
   /*
@@ -594,8 +635,8 @@ typedef struct TumbleVulkan {
    */
   size_t size;
   /*
-   `vkGetInstanceProcAddr` of the loader that the instance was made by, cast to `void (*)(void)`.
-   The loader stays loaded as long as the engine and all that was made with it.
+   `vkGetInstanceProcAddr` of the loader that created the instance, cast to `void (*)(void)`. The loader must
+   stay loaded until the engine and all objects that were made with it are freed.
    */
   void (*get_instance_proc_addr)(void);
   /*
@@ -603,7 +644,7 @@ typedef struct TumbleVulkan {
    */
   void *instance;
   /*
-   The `VkPhysicalDevice` of the device.
+   The `VkPhysicalDevice` of `device`.
    */
   void *physical_device;
   /*
@@ -611,52 +652,55 @@ typedef struct TumbleVulkan {
    */
   void *device;
   /*
-   A `VkQueue` of the device that can compute.
+   A `VkQueue` of the device, of a family that can compute.
    */
   void *queue;
   /*
-   The family of that queue.
+   The family of `queue`.
    */
   uint32_t queue_family;
   /*
-   The version that the instance was made for, `VkApplicationInfo.apiVersion`.
+   The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer.
    */
   uint32_t api_version;
   /*
-   1: `VK_KHR_shader_float_controls` is enabled; it does not count from Vulkan 1.2 on.
+   1 if `VK_KHR_shader_float_controls` is enabled, otherwise 0; ignored from Vulkan 1.2 on.
    */
   uint32_t shader_float_controls;
   /*
-   1: the feature `shaderInt64` is enabled.
+   1 if the feature `shaderInt64` is enabled, otherwise 0.
    */
   uint32_t shader_int64;
   /*
-   Another `VkQueue` of the device, which copies results to the host while the first one computes, or
-   null. The device must have the feature `timelineSemaphore` enabled then.
+   Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. The
+   device must then have the feature `timelineSemaphore` enabled, and only the library may use this queue.
    */
   void *copy_queue;
   /*
-   The family of that queue.
+   The family of `copy_queue`; ignored if that is null.
    */
   uint32_t copy_queue_family;
   /*
-   Locks `queue`, which the application uses too, maybe on another thread; called with `queue_user` before each
-   submission of the engine. With it goes `unlock_queue`. Null: nobody else may use the queue while the library
-   does. The application must not hold the lock while it calls the library.
+   A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
+   `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
+   must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
+   `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
    */
   void (*lock_queue)(void *user);
   /*
-   Unlocks it, called after each submission on the same thread.
+   The function that unlocks `queue`; the library calls it on the thread that called `lock_queue`.
    */
   void (*unlock_queue)(void *user);
   /*
-   What both get. It must stay valid as long as the engine and all that was made with it.
+   The argument of both functions. It must stay valid until the engine and all objects that were made with it are
+   freed.
    */
   void *queue_user;
 } TumbleVulkan;
 
 /*
- What a layer of an instance plays. If all is zero but `size`, it stands still at the start of the first clip.
+ What a layer of an instance plays: a clip, and its time, speed, wrap mode and weight. If all members except
+ `size`, `instance` and `layer` are 0, the layer stands still at the start of the first clip, with weight 0.
  */
 typedef struct TumbleCrowdLayer {
   /*
@@ -664,49 +708,49 @@ typedef struct TumbleCrowdLayer {
    */
   size_t size;
   /*
-   The instance, from 0.
+   The index of the instance, from 0.
    */
   size_t instance;
   /*
-   Its layer, from 0; higher ones are laid over lower ones.
+   The index of the layer in the instance, from 0. Each layer is blended over the layers with lower indices.
    */
   size_t layer;
   /*
-   The clip, by its number in the library.
+   The index of the clip in the library, from 0.
    */
   size_t clip;
   /*
-   The time in the clip, ticks; `wrap` says what happens outside of the clip.
+   The layer's current time in the clip, ticks. Outside the clip `wrap` applies.
    */
   int64_t time;
   /*
-   Ticks of the clip for a tick of the clock: 1 as keyed, 0 to stand still, negative to run
-   backwards; magnitudes below 128, kept in units of 2^-16.
+   The speed: ticks of the clip for each tick of the clock. 1: as keyed, 0: the layer stands still, negative:
+   backwards. Its magnitude is below 128; it is rounded to a multiple of 2^-16.
    */
   float speed;
   /*
-   The weight with which it is blended over the layers below, 0 to 1, stored in units of 2^-15. The first layer
-   has no weight.
+   The weight with which the layer is blended over the layers below, 0 to 1, rounded to a multiple of 2^-15. The
+   weight of layer 0 is ignored.
    */
   float weight;
   /*
-   A `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
+   The motion outside the clip: a `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
    */
   uint32_t wrap;
   /*
-   1: the clip's difference from its reference pose is added to the layers below; 0: it is blended
-   over them.
+   1: the clip's difference from its reference pose is added to the layers below. 0: the layers below are
+   interpolated towards the clip.
    */
   uint32_t additive;
   /*
-   0: all joints take part; or a mask, by the number that `tumble_crowd_library_push_mask` gave.
+   The number of a mask, from `tumble_crowd_library_push_mask`; 0: all joints take part.
    */
   size_t mask;
 } TumbleCrowdLayer;
 
 /*
- A layer's weight as a function of the clock: `from` before `start`, `to` from `ticks` later on, and between them in
- equal parts for equal ticks.
+ A fade: a layer's weight that changes linearly with the clock. The weight is `from` until the tick `start`,
+ reaches `to` after `ticks` ticks, and then stays.
  */
 typedef struct TumbleCrowdFade {
   /*
@@ -714,27 +758,27 @@ typedef struct TumbleCrowdFade {
    */
   size_t size;
   /*
-   The instance, from 0.
+   The index of the instance, from 0.
    */
   size_t instance;
   /*
-   Its layer, from 1: the first has no weight.
+   The index of the layer in the instance, from 1: layer 0 has no weight.
    */
   size_t layer;
   /*
-   When it starts, ticks of the clock; before now or later.
+   The clock's time at which the fade starts, ticks; in the past or in the future.
    */
   uint64_t start;
   /*
-   How many ticks it takes; 0 for a step.
+   The duration of the fade, ticks; with 0 the weight changes at once.
    */
   uint64_t ticks;
   /*
-   The weight before, 0 to 1, kept in units of 2^-15.
+   The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
    */
   float from;
   /*
-   The weight after, likewise.
+   The weight after the fade, 0 to 1, rounded to a multiple of 2^-15.
    */
   float to;
 } TumbleCrowdFade;
@@ -744,60 +788,79 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- The version of the library: 1 000 000 for each major, 1 000 for each minor and 1 for each patch
- version. It equals `TUMBLE_VERSION` where header and library belong together.
+ Returns the version of the library as one number: 1 000 000 × major + 1 000 × minor + patch. It equals
+ `TUMBLE_VERSION` if the library belongs to this header.
  */
 uint32_t tumble_version(void);
 
 /*
- The error message of the last failed call of this thread: UTF-8, empty before the
- first. It stays valid until another call of this thread fails.
+ Returns the message of the last failed call of this thread: UTF-8, never null, empty if no call has failed.
+
+ The text belongs to the library. It stays valid until another call of this thread fails, or the thread ends;
+ successful calls do not change it.
  */
 const char *tumble_last_error(void);
 
 /*
- Opens a device.
+ Opens a device and creates an engine on it.
 
- `device`: "auto" (or null), the device that is measured to be the fastest; "cpu"; "vulkan", the
- first Vulkan device that is exact; or a Vulkan device by its index or by a part of its name. All
- give the same bits. `options` may be null.
+ `device` selects the device by a name in upper or lower case:
+
+ - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest;
+ - "cpu": the CPU;
+ - "vulkan": the first Vulkan device that can be opened and passes the self-test;
+ - any other text: the Vulkan device with this index, counted from 0, or the first one whose name contains the
+   text.
+
+ All devices give the same bits. `options` may be null for the defaults. The caller frees the engine with
+ `tumble_engine_free`.
+
+ # Errors
+ `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 
  # Safety
- `device` is null or text that ends with a zero, `options` null or such a structure, and `engine`
- has room for a handle.
+ `device` must be null or a text that ends with a zero byte, `options` must be null or point to a
+ `TumbleEngineOptions`, and `engine` must point to memory for a handle.
  */
 TumbleResult tumble_engine_open(const char *device,
                                 const struct TumbleEngineOptions *options,
                                 struct TumbleEngine **engine);
 
 /*
- The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for an
- invalid handle.
+ Returns the name of the engine's device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null if the
+ handle is invalid.
  */
 const char *tumble_engine_device_name(const struct TumbleEngine *engine);
 
 /*
- Frees an engine; clips that were uploaded to it keep its device open. Null is allowed.
+ Frees an engine. Its clips and crowds stay valid and keep the device open. Does nothing if `engine` is null.
  */
 TumbleResult tumble_engine_free(struct TumbleEngine *engine);
 
 /*
- A set without tracks.
+ Creates a set without tracks. The caller frees it with `tumble_set_free`.
 
  # Safety
- `set` has room for a handle.
+ `set` must point to memory for a handle.
  */
 TumbleResult tumble_set_new(struct TumbleSet **set);
 
 /*
- Appends a track. `times` are seconds, strictly increasing; `keys` are unit quaternions, `x y z w`
- each, four numbers for each time. Keys that are unit to within rounding are kept bit for bit, others
- (norm within 0.1 of 1) are normalised. `name` may be null. If anything is refused, the set is as it
- was.
+ Appends a track of `key_count` rotation keys, at least one, to a set.
+
+ `times` are the key times in seconds, strictly increasing. `keys` are unit quaternions, `x y z w`, one for each
+ time. Keys whose norm is 1 within f32 rounding keep their bits; others, whose norm is within 0.1 of 1, are
+ normalised. `name` is the track's name in UTF-8, or null for none. Arrays and name are copied. Pointers that
+ `tumble_set_track` returned for this set become invalid.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a key's
+ norm is not within 0.1 of 1. After any error the set is unchanged.
 
  # Safety
- `name` is null or text that ends with a zero, `times` has `key_count` numbers, and `keys` four
- times as many.
+ `name` must be null or a text that ends with a zero byte; `times` must have `key_count` numbers, and `keys`
+ 4 × `key_count`.
  */
 TumbleResult tumble_set_push(struct TumbleSet *set,
                              const char *name,
@@ -806,11 +869,14 @@ TumbleResult tumble_set_push(struct TumbleSet *set,
                              size_t key_count);
 
 /*
- A set whose tracks all have the same key times: `keys` holds one track after another, `key_count`
- keys of four numbers each.
+ Creates a set of `track_count` tracks without names, which all have the same `key_count` key times.
+
+ `times` are the key times in seconds. `keys` are unit quaternions in the order `[track][key]`, four numbers
+ `x y z w` each. The conditions and errors are those of `tumble_set_push`. The arrays are copied. The caller frees
+ the set with `tumble_set_free`.
 
  # Safety
- `times` has `key_count` numbers, `keys` 4 × `key_count` × `track_count`, and `set` has room for a
+ `times` must have `key_count` numbers and `keys` 4 × `key_count` × `track_count`; `set` must point to memory for a
  handle.
  */
 TumbleResult tumble_set_with_shared_times(const double *times,
@@ -820,21 +886,27 @@ TumbleResult tumble_set_with_shared_times(const double *times,
                                           struct TumbleSet **set);
 
 /*
- The number of tracks; 0 for an invalid handle.
+ Returns the number of tracks; 0 if the handle is invalid.
  */
 size_t tumble_set_track_count(const struct TumbleSet *set);
 
 /*
- The number of keys of all tracks together; 0 for an invalid handle.
+ Returns the number of rotation keys of all tracks together; 0 if the handle is invalid.
  */
 size_t tumble_set_key_count(const struct TumbleSet *set);
 
 /*
- The times and the keys (`x y z w`) of a track, as they lie in the set. They stay there until a
- track is pushed to the set, or it is freed.
+ Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
+
+ `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
+ `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+ freed.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
 
  # Safety
- `times` and `keys` have room for a pointer and `key_count` for a number.
+ `times` and `keys` must each point to memory for a pointer, and `key_count` to memory for a number.
  */
 TumbleResult tumble_set_track(const struct TumbleSet *set,
                               size_t index,
@@ -843,12 +915,18 @@ TumbleResult tumble_set_track(const struct TumbleSet *set,
                               size_t *key_count);
 
 /*
- The name of a track, `box1`, `box2` … by its place where it has none: UTF-8, with a zero behind
- it. `length` is set to its bytes without that zero, also where `size`, the bytes of `buffer`, is
- not more than that: then nothing else is written, which is an error unless `buffer` is null.
+ Copies the name of the track `index`, counted from 0, into `buffer`: UTF-8, followed by a zero byte. Tracks
+ without a name are called `box1`, `box2` … in the order of the tracks.
+
+ `size` is the size of `buffer` in bytes. `length` receives the length of the name in bytes, without the zero byte.
+ If `buffer` is null, only `length` is written.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
+ `size` is less than the length + 1: then `length` is written, and `buffer` is not.
 
  # Safety
- `buffer` is null or has room for `size` bytes, and `length` for a number.
+ `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.
  */
 TumbleResult tumble_set_track_name(const struct TumbleSet *set,
                                    size_t index,
@@ -857,75 +935,99 @@ TumbleResult tumble_set_track_name(const struct TumbleSet *set,
                                    size_t *length);
 
 /*
- The first and the last key time over all tracks, seconds; an error for a set without tracks.
+ Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.
 
  # Safety
- `first` and `last` have room for a number.
+ `first` and `last` must each point to memory for a number.
  */
 TumbleResult tumble_set_time_span(const struct TumbleSet *set, double *first, double *last);
 
 /*
- Frees a set; clips that were made of it stay. Null is allowed.
+ Frees a set. Clips that were made from it stay valid. Does nothing if `set` is null.
  */
 TumbleResult tumble_set_free(struct TumbleSet *set);
 
 /*
- Reads a motion file of any format: glTF and GLB, BVH, NPZ and NPY, Parquet, Arrow, CSV, TUM,
- `.dat`, known by its first bytes and its name. `path` is UTF-8; on Unix any bytes.
+ Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
+ `.dat`.
+
+ The format is recognised by the first bytes of the file, otherwise by the extension of its name. `path` is UTF-8;
+ on Unix it may have any bytes. If some clips of the file are invalid, the others are read, and the messages of the
+ file say why (`tumble_file_message`). The caller frees the file with `tumble_file_free`.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if the file cannot be read; the message says why and where.
 
  # Safety
- `path` is text that ends with a zero, and `file` has room for a handle.
+ `path` must be a text that ends with a zero byte, and `file` must point to memory for a handle.
  */
 TumbleResult tumble_file_load(const char *path, struct TumbleFile **file);
 
 /*
- The number of clips that could be read; 0 for an invalid handle.
+ Returns the number of clips that could be read; 0 if the handle is invalid. Other functions take the index of a
+ clip among these, counted from 0.
  */
 size_t tumble_file_clip_count(const struct TumbleFile *file);
 
 /*
- The name of a clip, empty where it has none: UTF-8, valid until the file is freed; null where there
- is no such clip.
+ Returns the name of a clip, empty if it has none: UTF-8, valid until the file is freed; null if there is no such
+ clip.
  */
 const char *tumble_file_clip_name(const struct TumbleFile *file, size_t clip);
 
 /*
- A clip's tracks of rotations, with the translations and scales that crowds use, as a set of the
- caller's own, to be freed.
+ Creates a set with the rotations, translations and scales of all tracks of a clip. The set is a copy: it does not
+ need the file, and the caller frees it with `tumble_set_free`.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
 
  # Safety
- `set` has room for a handle.
+ `set` must point to memory for a handle.
  */
 TumbleResult tumble_file_clip_set(const struct TumbleFile *file,
                                   size_t clip,
                                   struct TumbleSet **set);
 
 /*
- The name of the method by which the file interpolates the rotations of a track, as
- `TumbleInterpolation.method` takes it ("slerp" for LINEAR in glTF, "bessel-overhauser" where the file
- says nothing): valid until the file is freed; null where there is no such track.
+ Returns the name of the method by which the file interpolates the rotations of a track, for
+ `TumbleInterpolation.method`: UTF-8, valid until the file is freed; null if there is no such clip or track.
+
+ For LINEAR in glTF it is "slerp". A track for which the file names no method has the most frequent method of the
+ clip's other tracks, or "bessel-overhauser" if the file names none at all.
  */
 const char *tumble_file_track_method(const struct TumbleFile *file,
                                      size_t clip,
                                      size_t track);
 
 /*
- Whole seconds that were taken from all times of a clip, so that clocks which count from 1970 lose
- no digits; mostly 0.
+ Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. Add it to the set's
+ times to get those of the file. It is not 0 if, for example, the file's times count from 1970: f64 is not accurate
+ enough for these.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
 
  # Safety
- `seconds` has room for a number.
+ `seconds` must point to memory for a number.
  */
 TumbleResult tumble_file_clip_time_offset(const struct TumbleFile *file,
                                           size_t clip,
                                           int64_t *seconds);
 
 /*
- What was subtracted from the translations of a track of a clip, so that f32 is accurate enough for positions
- such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
+ Returns the position `x y z` that was subtracted from the translations of a track of a clip, usually 0 0 0. It is
+ not 0 for large coordinates, such as those of maps, for which f32 is not accurate enough. Add it, in doubles, to
+ translations that are evaluated.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip or track.
 
  # Safety
- `origin` has room for three numbers.
+ `origin` must point to memory for three numbers.
  */
 TumbleResult tumble_file_clip_origin(const struct TumbleFile *file,
                                      size_t clip,
@@ -933,49 +1035,64 @@ TumbleResult tumble_file_clip_origin(const struct TumbleFile *file,
                                      double *origin);
 
 /*
- How many messages there are about the file: warnings, and why clips could not be read; 0 for an
- invalid handle.
+ Returns the number of messages about the file: first why clips could not be read, then warnings. It is 0 if the
+ handle is invalid.
  */
 size_t tumble_file_message_count(const struct TumbleFile *file);
 
 /*
- A message about the file: UTF-8, valid until the file is freed; null where there is none.
+ Returns the message `index`, counted from 0: UTF-8, valid until the file is freed; null if there is no such
+ message.
  */
 const char *tumble_file_message(const struct TumbleFile *file, size_t index);
 
 /*
- Frees a file; sets that were made of it stay. Null is allowed.
+ Frees a file. Sets and libraries that were made from it stay valid. Does nothing if `file` is null.
  */
 TumbleResult tumble_file_free(struct TumbleFile *file);
 
 /*
- The number of methods.
+ Returns the number of methods.
  */
 size_t tumble_method_count(void);
 
 /*
- The name of a method, from 0; null where there is none.
+ Returns the name of the method `index`, counted from 0: a text that is never freed; null, without an error
+ message, if there is no such method.
  */
 const char *tumble_method_name(size_t index);
 
 /*
- How many samples each track of a set has: a result has 4 × tracks × samples floats.
+ Returns the number of samples of each track of a set. A result has 4 × tracks × samples floats.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid or do not fit the set.
 
  # Safety
- `samples` is such a structure, and `count` has room for a number.
+ `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers, and `count` must point to memory
+ for a number.
  */
 TumbleResult tumble_set_sample_count(const struct TumbleSet *set,
                                      const struct TumbleSamples *samples,
                                      size_t *count);
 
 /*
- Prepares and evaluates a set in one call, into the caller's memory: `output_count` floats, exactly
- 4 × tracks × samples. Memory that is aligned to 16 bytes is filled without a copy. All arguments are
- checked before anything is written.
+ Prepares and evaluates a set in one call, into the caller's memory, and waits for the result.
+
+ `interpolation` may be null for the defaults. `layout` is a `TumbleLayout`. `output` receives four floats for each
+ sample of each track, according to the quantity of the interpolation. `output_count` is the number of floats,
+ exactly 4 × tracks × samples (`tumble_set_sample_count`). Memory that is aligned to 16 bytes is filled without a
+ copy.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_INVALID_INPUT` if the sample times
+ are invalid, or a track cannot be interpolated as requested; `TUMBLE_RESULT_DEVICE` if the device fails. All
+ arguments are checked before anything is written.
 
  # Safety
- `interpolation` is null (the defaults) or such a structure, `samples` is such a structure, and
- `output` has room for `output_count` floats, which nothing else uses during the call.
+ `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+ zero byte; `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers; and `output` must
+ have `output_count` floats, which nothing else uses during the call.
  */
 TumbleResult tumble_evaluate(const struct TumbleEngine *engine,
                              const struct TumbleSet *set,
@@ -986,10 +1103,18 @@ TumbleResult tumble_evaluate(const struct TumbleEngine *engine,
                              size_t output_count);
 
 /*
- Prepares a set for a method and uploads it to the engine's device, where it stays.
+ Prepares a set for an interpolation and uploads it to the engine's device as a clip, for repeated evaluation.
+
+ `interpolation` may be null for the defaults. The clip is independent of the set, and the engine may be freed
+ before it. The caller frees the clip with `tumble_clip_free`.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested; `TUMBLE_RESULT_OUT_OF_MEMORY` or
+ `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
 
  # Safety
- `interpolation` is null (the defaults) or such a structure, and `clip` has room for a handle.
+ `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+ zero byte, and `clip` must point to memory for a handle.
  */
 TumbleResult tumble_upload(const struct TumbleEngine *engine,
                            const struct TumbleSet *set,
@@ -997,17 +1122,23 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
                            struct TumbleClip **clip);
 
 /*
- How many samples each track of a clip has: a result has 4 × tracks × samples floats.
+ Returns the number of samples of each track of a clip. A result of `tumble_clip_evaluate` has 4 × tracks × samples
+ floats.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid or do not fit the clip.
 
  # Safety
- `samples` is such a structure, and `count` has room for a number.
+ `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers, and `count` must point to memory
+ for a number.
  */
 TumbleResult tumble_clip_sample_count(const struct TumbleClip *clip,
                                       const struct TumbleSamples *samples,
                                       size_t *count);
 
 /*
- Evaluates a clip into the caller's memory, as `tumble_evaluate` does a set.
+ Evaluates a clip into the caller's memory, and waits for the result. The arguments, the result and the errors are
+ those of `tumble_evaluate`; the number of samples is that of `tumble_clip_sample_count`.
 
  # Safety
  As `tumble_evaluate`.
@@ -1019,17 +1150,23 @@ TumbleResult tumble_clip_evaluate(const struct TumbleClip *clip,
                                   size_t output_count);
 
 /*
- Evaluates a clip of an engine of `tumble_engine_from_vulkan` into a range of a buffer on its device:
- four floats for each sample of each track, which stay there. Returns when they are written; what is
- submitted to the queue afterwards sees them. `buffer` is the `VkBuffer`, as a number:
- `(uint64_t)buffer`. The range starts at a multiple of 16 and has at least 16 × tracks × samples bytes.
+ Evaluates a clip into a range of the application's Vulkan buffer: four floats for each sample of each track.
 
- The buffer belongs to that device, has memory, and was made for use as
- `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`. Nobody else uses it, or
- the queue, during the call.
+ The clip's engine must have been created by `tumble_engine_from_vulkan`. `layout` is a `TumbleLayout`. `buffer` is
+ the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 16, and has `size`
+ bytes, at least 16 × tracks × samples. The buffer must belong to the engine's device, be bound to memory, and have
+ the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+
+ The call submits to the engine's queue (`tumble_engine_from_vulkan` says who may use the queue meanwhile) and
+ returns when the result is written. Commands that are submitted to the queue afterwards see it.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
+ `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; otherwise as `tumble_evaluate`.
 
  # Safety
- `samples` is such a structure, and the buffer is as said.
+ `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers. The buffer must be as described,
+ and nothing else may use the range during the call.
  */
 TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
                                             const struct TumbleSamples *samples,
@@ -1039,36 +1176,50 @@ TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
                                             uint64_t size);
 
 /*
- Frees a clip. Null is allowed.
+ Frees a clip. Targets that were made from it stay valid. Does nothing if `clip` is null.
  */
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
 
 /*
- The number of encodings.
+ Returns the number of encodings.
  */
 size_t tumble_encoding_count(void);
 
 /*
- The name of an encoding, from 0; null where there is none.
+ Returns the name of the encoding `index`, counted from 0: a text that is never freed; null, without an error
+ message, if there is no such encoding.
  */
 const char *tumble_encoding_name(size_t index);
 
 /*
- How many bytes the result of a request has.
+ Returns the size of a request's result in bytes.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown; `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does
+ not have these tracks or samples; `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding
+ is for rotations and the clip's quantity is a velocity or an acceleration.
 
  # Safety
- `request` is such a structure, and `bytes` has room for a number.
+ `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `bytes` must point to
+ memory for a number.
  */
 TumbleResult tumble_request_bytes(const struct TumbleClip *clip,
                                   const struct TumbleRequest *request,
                                   size_t *bytes);
 
 /*
- Evaluates what is asked of a clip into the caller's memory: exactly `tumble_request_bytes`, values of the encoding in
- the order of the layout. All arguments are checked before anything is written.
+ Evaluates a request of a clip into the caller's memory, and waits for the result.
+
+ `output` receives the values in the request's layout and encoding. `output_bytes` is its size, exactly that of
+ `tumble_request_bytes`. Memory that is aligned to 16 bytes is filled without a copy.
+
+ # Errors
+ As `tumble_request_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number, and
+ `TUMBLE_RESULT_DEVICE` if the device fails. All arguments are checked before anything is written.
 
  # Safety
- `request` is such a structure, and `output` has room for so many bytes, which nothing else uses during the call.
+ `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `output` must have
+ `output_bytes` bytes, which nothing else uses during the call.
  */
 TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
                                      const struct TumbleRequest *request,
@@ -1076,17 +1227,24 @@ TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
                                      size_t output_bytes);
 
 /*
- Makes ready what it takes to evaluate a request into a range of a buffer of the application's, on the device of
- `tumble_engine_from_vulkan`: kernels are compiled, and what they read of the samples is brought to the device, here,
- and not when a frame is recorded. `buffer` is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at
- a multiple of the bytes of a value (16 for "f32"), and has at least `tumble_request_bytes`.
+ Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 
- The buffer belongs to that device, has memory, and was made for use as `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and
- `VK_BUFFER_USAGE_TRANSFER_DST_BIT`; it stays the application's, and lives longer than the target. The target needs
- neither the clip nor the engine that it was made of. This call submits to the queue, as uploading does.
+ Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
+ been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
+ number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+ has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
+ bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+
+ The target needs neither the clip nor the engine afterwards. The application frees it with
+ `tumble_clip_target_free` before it destroys the buffer or the device.
+
+ # Errors
+ As `tumble_request_bytes`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by
+ `tumble_engine_from_vulkan`, and `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
 
  # Safety
- `request` is such a structure, the buffer is as said, and `target` has room for a handle.
+ `request` must point to a `TumbleRequest` whose pointers are null or as its members say; the buffer must be as
+ described; and `target` must point to memory for a handle.
  */
 TumbleResult tumble_clip_target_new(const struct TumbleClip *clip,
                                     const struct TumbleRequest *request,
@@ -1096,38 +1254,49 @@ TumbleResult tumble_clip_target_new(const struct TumbleClip *clip,
                                     struct TumbleClipTarget **target);
 
 /*
- Records an evaluation into the application's `VkCommandBuffer`, to `offset` bytes behind the beginning of the
- target's range, a multiple of the bytes of a value. Nothing is waited for, submitted or allocated. What is recorded
- waits for all that was recorded before it, and all that comes behind it sees the result; it may be submitted any
- number of times, to any queue of the family.
+ Records an evaluation into the application's command buffer `commands`, a `VkCommandBuffer`.
 
- The command buffer is of the engine's device and of a family that computes, in recording, outside of a render pass.
+ The result starts `offset` bytes after the start of the target's range, a multiple of the bytes of a value.
+ Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all commands that
+ were recorded before it, and all commands after it see the result. The commands may be submitted any number of
+ times, to any queue of the command buffer's family.
+
+ The command buffer must belong to the engine's device and to a queue family that can compute, and must be in the
+ recording state, outside a render pass.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if the result does not fit there or `offset` is not aligned; then nothing is recorded.
 
  # Safety
- The command buffer is as said, and nobody else uses it during the call.
+ The command buffer must be as described, and nothing else may use it during the call.
  */
 TumbleResult tumble_clip_record(const struct TumbleClipTarget *target,
                                 void *commands,
                                 uint64_t offset);
 
 /*
- Frees a target, after all work that was recorded with it has ended. Null is allowed.
+ Frees a clip target. Does nothing if `target` is null.
 
  # Safety
- No such work is in flight, and none will be submitted.
+ All work that was recorded with the target must have ended, and none may be submitted later.
  */
 TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
 
 /*
- Sets the translations of a track, replacing any it had. `times` are seconds, strictly increasing,
- and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
- `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
- curve arrives, then the one with which it leaves, units per second. If anything is refused, the set
- is as it was.
+ Sets the translation keys of the track `track`, counted from 0, and replaces earlier ones.
+
+ `times` are `key_count` key times in seconds, at least one, strictly increasing; they may differ from the times of
+ the rotations. `keys` are vectors `x y z`, one for each time. `tangents` are for the method "gltf-cubic" and may
+ be null: six numbers for each time, the incoming tangent `x y z` and the outgoing one, in units per second. The
+ arrays are copied.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite
+ and strictly increasing, or a number is not finite or exceeds 1e30 in magnitude. After any error the set is
+ unchanged.
 
  # Safety
- `times` has `key_count` numbers, `keys` three times as many, and `tangents` is null or has six times
- as many.
+ `times` must have `key_count` numbers and `keys` 3 × `key_count`; `tangents` must be null or have 6 × `key_count`.
  */
 TumbleResult tumble_set_translations(struct TumbleSet *set,
                                      size_t track,
@@ -1137,10 +1306,10 @@ TumbleResult tumble_set_translations(struct TumbleSet *set,
                                      size_t key_count);
 
 /*
- Sets the scales of a track along its axes; otherwise as `tumble_set_translations`.
+ Sets the scale keys of a track: factors `x y z` along its axes. Otherwise as `tumble_set_translations`.
 
  # Safety
- As there.
+ As `tumble_set_translations`.
  */
 TumbleResult tumble_set_scales(struct TumbleSet *set,
                                size_t track,
@@ -1150,31 +1319,49 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
                                size_t key_count);
 
 /*
- Creates an engine on an application's Vulkan device, for crowds that are recorded into its command buffers
- (`tumble_crowd_record`), and for all else that engines do.
+ Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds and
+ clips into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`).
 
- The handles stay the application's, which destroys them after it has freed the engine, its clips,
- crowds and targets, and no call with one of them is under way. Calls that submit work (uploading,
- evaluating, submitting; not recording) use the queue, so nobody else may at the same time: a queue
- of the library's own is the simplest where the device has several.
+ The Vulkan objects belong to the application. It may destroy them only after it has freed the engine, its clips,
+ crowds and targets, and after all calls with these have returned. The caller frees the engine with
+ `tumble_engine_free`. `options` may be null for the defaults.
+
+ These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
+ `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_crowd_new`,
+ `tumble_crowd_target_new`, `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
+ Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
+ queue that only the library uses, if the device has several.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
+ version is below 1.1, or the physical device or a queue family does not fit; `TUMBLE_RESULT_DEVICE` if the device
+ fails the self-test.
 
  # Safety
- `vulkan` is such a structure, whose handles are valid and belong together and live as said; `options` is
- null or such a structure, and `engine` has room for a handle.
+ `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;
+ `options` must be null or point to a `TumbleEngineOptions`; and `engine` must point to memory for a handle.
  */
 TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
                                        const struct TumbleEngineOptions *options,
                                        struct TumbleEngine **engine);
 
 /*
- Creates an empty library for a skeleton that is given by arrays. `parents` has the index of each joint's parent, -1 for a
- root; parents may come after their children. `offsets` has three numbers for each joint: where it
- is in its parent's frame if a clip has no translations for it; null: at the parent.
- `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
+ Creates an empty library for a skeleton of `joint_count` joints.
+
+ `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
+ are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
+ for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
+ 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+ `tumble_crowd_library_free`.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
+ `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+ offset is not finite.
 
  # Safety
- `parents` has `joint_count` numbers, `offsets` is null or has three times as many, and `library` has
- room for a handle.
+ `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
+ point to memory for a handle.
  */
 TumbleResult tumble_crowd_library_new(const int32_t *parents,
                                       const float *offsets,
@@ -1183,16 +1370,25 @@ TumbleResult tumble_crowd_library_new(const int32_t *parents,
                                       struct TumbleCrowdLibrary **library);
 
 /*
- Adds a clip: a track for each joint, in their order, the rotations by `interpolation` and the
- translations and scales by `vectors`: "step", "linear", "catmull-rom", "bessel-overhauser",
- "gltf-cubic", "c2" or "b-spline"; null is "linear". Joints without translations hang at their
- offsets. Instances say what happens outside the keys, so `before` and `after` do not count. The
- clip's reference pose, for additive layers, is its pose at its start. If anything is refused, the
- library is as it was.
+ Adds a clip to a library.
+
+ `set` has one track for each joint, in the same order. Rotations are interpolated by `interpolation`, or by the
+ defaults if it is null. Translations and scales are interpolated by the method `vectors`: "step", "linear",
+ "catmull-rom", "bessel-overhauser", "gltf-cubic", "c2" or "b-spline"; null: "linear". Joints without translations
+ stay at their offsets. `before` and `after` of `interpolation` are ignored, because each layer of an instance has
+ its wrap mode. The reference pose of the clip, for additive layers, is its pose at its start
+ (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track cannot be interpolated as
+ requested, the quantity is not the rotation, a curve rotates so fast that no polynomial fits it, the clip is too
+ long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown. After any error the library
+ is unchanged.
 
  # Safety
- `interpolation` is null (the defaults) or such a structure, `vectors` null or text that ends with a
- zero, and `clip`, where the clip's number goes, null or room for one.
+ `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+ zero byte; `vectors` must be null or a text that ends with a zero byte; and `clip` must be null or point to memory
+ for a number.
  */
 TumbleResult tumble_crowd_library_push(struct TumbleCrowdLibrary *library,
                                        const struct TumbleSet *set,
@@ -1201,11 +1397,17 @@ TumbleResult tumble_crowd_library_push(struct TumbleCrowdLibrary *library,
                                        size_t *clip);
 
 /*
- Adds a mask, a weight from 0 to 1 for each joint, which layers' weights are multiplied with. There
- can be 31. `mask` gets its number, from 1, as `TumbleCrowdLayer.mask` takes it.
+ Adds a mask: a weight from 0 to 1 for each joint, by which the weights of layers are multiplied.
+
+ `joint_count` must be the library's number of joints. A library has up to 31 masks. `mask` receives the number of
+ the mask for `TumbleCrowdLayer.mask`, counted from 1; it may be null.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if there is not one weight for each joint, a weight is outside 0 to 1, or the
+ library has 31 masks already.
 
  # Safety
- `weights` has `joint_count` numbers, and `mask` is null or has room for a number.
+ `weights` must have `joint_count` numbers, and `mask` must be null or point to memory for a number.
  */
 TumbleResult tumble_crowd_library_push_mask(struct TumbleCrowdLibrary *library,
                                             const float *weights,
@@ -1213,20 +1415,28 @@ TumbleResult tumble_crowd_library_push_mask(struct TumbleCrowdLibrary *library,
                                             size_t *mask);
 
 /*
- Sets the inverse bind matrix of every joint: the inverse of its model matrix in the bind pose,
- three rows of four numbers each, for column vectors, the last column the translation, as results are.
- (A matrix of 16 numbers in columns, as glTF has them, has `m[0] m[4] m[8] m[12]` in its first row.)
+ Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose.
+
+ `matrices` are 12 numbers for each joint, as in results: three rows of four, for column vectors; the last column
+ is the translation. (The 16 numbers `m` of a glTF matrix are in columns: its first row is `m[0] m[4] m[8] m[12]`.)
+ `joint_count` must be the library's number of joints.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if there is not one matrix for each joint, or a number is not finite.
 
  # Safety
- `matrices` has 12 × `joint_count` numbers.
+ `matrices` must have 12 × `joint_count` numbers.
  */
 TumbleResult tumble_crowd_library_set_inverse_bind(struct TumbleCrowdLibrary *library,
                                                    const float *matrices,
                                                    size_t joint_count);
 
 /*
- Makes the pose of the clip `from` at a tick, held at its ends, the reference pose of `clip`: what
- additive layers of it differ from.
+ Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
+ After the end of `from` it is its last pose.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.
  */
 TumbleResult tumble_crowd_library_set_reference(struct TumbleCrowdLibrary *library,
                                                 size_t clip,
@@ -1234,69 +1444,87 @@ TumbleResult tumble_crowd_library_set_reference(struct TumbleCrowdLibrary *libra
                                                 uint32_t tick);
 
 /*
- The number of joints; 0 for an invalid handle.
+ Returns the number of joints; 0 if the handle is invalid.
  */
 size_t tumble_crowd_library_joint_count(const struct TumbleCrowdLibrary *library);
 
 /*
- The number of clips; 0 for an invalid handle.
+ Returns the number of clips; 0 if the handle is invalid.
  */
 size_t tumble_crowd_library_clip_count(const struct TumbleCrowdLibrary *library);
 
 /*
- Ticks of a second; 0 for an invalid handle.
+ Returns the number of ticks in a second; 0 if the handle is invalid.
  */
 uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *library);
 
 /*
- The length of a clip, ticks: from the first key of any channel to the last, at least 1. 0 if there
- is no such clip.
+ Returns the length of a clip in ticks: from its first key (of a rotation, translation or scale) to its last, and
+ at least 1; 0 if there is no such clip.
  */
 uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library, size_t clip);
 
 /*
- The name of a joint, empty in libraries that were made of arrays: UTF-8, valid until the library is
- freed; null where there is no such joint.
+ Returns the name of a joint, empty in a library of `tumble_crowd_library_new`: UTF-8, valid until the library is
+ freed; null if there is no such joint.
  */
 const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library, size_t joint);
 
 /*
- The index of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
+ Copies the indices of the joints' parents into `parents`, -1 for a root. `joint_count` must be the number of
  joints.
 
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `joint_count` is another number.
+
  # Safety
- `parents` has room for `joint_count` numbers, which nothing else uses during the call.
+ `parents` must have memory for `joint_count` numbers, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_library_parents(const struct TumbleCrowdLibrary *library,
                                           int32_t *parents,
                                           size_t joint_count);
 
 /*
- Frees a library; crowds that were made of it stay. Null is allowed.
+ Frees a library. Crowds that were made from it stay valid. Does nothing if `library` is null.
  */
 TumbleResult tumble_crowd_library_free(struct TumbleCrowdLibrary *library);
 
 /*
- An empty library for the skeleton of a file: the joints of all of its clips, by name, with their
- parents and rest positions; all of them are roots if the file has no hierarchy. Its clips are then
- pushed by `tumble_crowd_library_push_clip`. `ticks_per_second` is as in `tumble_crowd_library_new`.
+ Creates an empty library for the skeleton of a file. `tumble_crowd_library_push_clip` adds clips to it.
+
+ Its joints are those of all clips of the file, matched by name, with their parents and rest positions; the joints
+ of the first clip come first. All of them are roots if the file has no hierarchy. `ticks_per_second` is as in
+ `tumble_crowd_library_new`. The caller frees the library with `tumble_crowd_library_free`.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if a clip has two joints of the same name, or a joint has another parent in another
+ clip.
 
  # Safety
- `library` has room for a handle.
+ `library` must point to memory for a handle.
  */
 TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
                                           uint32_t ticks_per_second,
                                           struct TumbleCrowdLibrary **library);
 
 /*
- Adds a clip of a file, whose joints are known by their names. Joints that the clip does not have stay
- where they rest, and it must have none that the library has not. `interpolation` and `vectors` are as
- in `tumble_crowd_library_push`; null is what the file says, which must then be one method for all
- rotations and one for all translations and scales.
+ Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
+ `tumble_crowd_library_of_file`.
+
+ Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
+ `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
+ `tumble_crowd_library_push`, but null stands for the methods of the file, which must be one method for all
+ rotations, and one for all translations and scales. `clip` receives the clip's index in the library, counted from
+ 0; it may be null.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
+ not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
 
  # Safety
- `interpolation` is null or such a structure, `vectors` null or text that ends with a zero, and
- `clip`, where the clip's number in the library goes, null or room for one.
+ `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+ zero byte; `vectors` must be null or a text that ends with a zero byte; and `clip` must be null or point to memory
+ for a number.
  */
 TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
                                             const struct TumbleFile *file,
@@ -1306,12 +1534,20 @@ TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
                                             size_t *clip);
 
 /*
- Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each. All of them stand still at the start of
- the library's first clip until they are set. The library is copied, to the device too: what is
- pushed to it later is not in this crowd.
+ Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each, on an engine's device.
+
+ All instances stand still at the start of the library's first clip until `tumble_crowd_set` changes them; the
+ layers above the first have weight 0. The clock starts at 0. The library is copied, also to the device: later
+ changes of it do not reach the crowd. The engine and the library may be freed before the crowd. The caller frees
+ the crowd with `tumble_crowd_free`.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
+ instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
+ enough memory or the device fails.
 
  # Safety
- `crowd` has room for a handle.
+ `crowd` must point to memory for a handle.
  */
 TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
                               const struct TumbleCrowdLibrary *library,
@@ -1320,31 +1556,45 @@ TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
                               struct TumbleCrowd **crowd);
 
 /*
- Sets what layers of instances play from now on: 16 bytes each that reach the device with the next
- evaluation. Of two for the same layer the later one counts. If one is refused, none is set.
+ Sets what layers of instances play from now on. `layers` is an array of `count` changes.
+
+ A fade of a layer that is set ends. If two changes are for one layer, the later one counts. The changes, at most
+ 20 bytes each, reach the device with the next evaluation.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
+ if another member is invalid. The message has the index of the first change that is refused. After any error
+ nothing changes.
 
  # Safety
- `layers` has `count` such structures.
+ `layers` must have `count` structures.
  */
 TumbleResult tumble_crowd_set(struct TumbleCrowd *crowd,
                               const struct TumbleCrowdLayer *layers,
                               size_t count);
 
 /*
- What a layer of an instance plays, and where it stands now; speed and weight are as they were rounded.
- `layer->size`, `layer->instance` and `layer->layer` say which, the rest is written.
+ Returns what a layer of an instance plays, with its current time. Speed and weight are the rounded ones.
+
+ The caller sets `layer->size`, `layer->instance` and `layer->layer`; the call writes the other members.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 
  # Safety
- `layer` is such a structure, which nothing else uses during the call.
+ `layer` must point to a `TumbleCrowdLayer`, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_get(const struct TumbleCrowd *crowd,
                               struct TumbleCrowdLayer *layer);
 
 /*
- The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
+ Returns the tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 
  # Safety
- `tick` has room for a number.
+ `tick` must point to memory for a number.
  */
 TumbleResult tumble_crowd_tick(const struct TumbleCrowd *crowd,
                                size_t instance,
@@ -1352,33 +1602,46 @@ TumbleResult tumble_crowd_tick(const struct TumbleCrowd *crowd,
                                uint32_t *tick);
 
 /*
- Advances the clock of all instances by the ticks nearest to a number of seconds. Where the sum must not
- drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
+ Moves the clock of all instances forward by `seconds`, rounded to ticks.
+
+ The rounding errors of many steps add up. If the clock must follow frames exactly, as in a film at 30000/1001
+ frames a second, use `tumble_crowd_set_clock` with each frame's time.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if `seconds` is negative or not finite, or the clock would reach 2^52 ticks.
  */
 TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
                                   double seconds);
 
 /*
- Sets the clock, ticks below 2^52; all instances move with it, forwards or backwards.
+ Sets the clock's time, ticks, forwards or backwards. All instances follow.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
  */
 TumbleResult tumble_crowd_set_clock(struct TumbleCrowd *crowd, uint64_t ticks);
 
 /*
- The clock, ticks.
+ Returns the clock's time, ticks.
 
  # Safety
- `ticks` has room for a number.
+ `ticks` must point to memory for a number.
  */
 TumbleResult tumble_crowd_clock(const struct TumbleCrowd *crowd, uint64_t *ticks);
 
 /*
- Frees a crowd, after waiting for what was submitted; its targets stay. Null is allowed.
+ Frees a crowd, after waiting for a submitted evaluation. Its targets stay valid until they are freed. Does nothing
+ if `crowd` is null.
  */
 TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
 
 /*
- Sets the weight of a layer above the first, 0 to 1, kept in units of 2^-15. The rest of what it plays goes on, and
- a fade of it ends.
+ Sets the weight of a layer above layer 0: 0 to 1, rounded to a multiple of 2^-15. The layer's clip, time and speed
+ stay, and its fade ends.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+ is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
  */
 TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
                                      size_t instance,
@@ -1386,9 +1649,15 @@ TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
                                      float weight);
 
 /*
- Lets the weight of a layer above the first go from what it is now to `weight`, in equal parts for equal ticks of
- the clock, within `ticks`; 0 is at once. From then on it stays. Another fade of the layer, `tumble_crowd_set` and
- `tumble_crowd_set_weight` end it.
+ Fades the weight of a layer above layer 0 from its current value to `weight`, linearly within `ticks` of the
+ clock. With 0 ticks it changes at once.
+
+ Afterwards the weight stays. `tumble_crowd_set`, `tumble_crowd_set_weight` and another fade of the layer end the
+ fade.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+ is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
  */
 TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
                                size_t instance,
@@ -1397,69 +1666,95 @@ TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
                                uint64_t ticks);
 
 /*
- Sets the weight of a layer above the first as a function of the clock: as `tumble_crowd_fade`, from any weight and
- any time. What `tumble_crowd_get_fade` reports, set in another crowd whose clock stands at the same time, gives
- the same weights at all times.
+ Sets the weight of a layer above layer 0 as a function of the clock. Unlike that of `tumble_crowd_fade`, this fade
+ starts at any weight and at any time, past or future.
+
+ The fade that `tumble_crowd_get_fade` returns, set in another crowd at the same time of the clock, gives the same
+ weights at all times.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+ is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
 
  # Safety
- `fade` is such a structure.
+ `fade` must point to a `TumbleCrowdFade`.
  */
 TumbleResult tumble_crowd_set_fade(struct TumbleCrowd *crowd,
                                    const struct TumbleCrowdFade *fade);
 
 /*
- The fade that the weight of a layer follows, with its weights as they were rounded; one that has ended too, for
- the clock may go back. `fade->size`, `fade->instance` and `fade->layer` say which. `fades`: whether there is one;
- where there is none, the structure stays as it is.
+ Returns the fade of a layer's weight, with its rounded weights; also a fade that has ended, because the clock may
+ go back.
+
+ The caller sets `fade->size`, `fade->instance` and `fade->layer`. `fades` receives whether the layer has a fade.
+ If it has, the call writes the other members of `fade`; otherwise `fade` is unchanged.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 
  # Safety
- `fade` is such a structure, which nothing else uses during the call, and `fades` has room for a truth value.
+ `fade` must point to a `TumbleCrowdFade`, which nothing else uses during the call, and `fades` must point to
+ memory for a `bool`.
  */
 TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
                                    struct TumbleCrowdFade *fade,
                                    bool *fades);
 
 /*
- From now on evaluates the instances of a list alone, as a camera sees them: a result has their rows and no others,
- in the list's order, with the bits that they have among all. The others go on meanwhile. The list is in any
- order, names no instance twice, and may be empty; it is copied. If it is refused, everything stays.
+ Limits evaluations to a list of `count` instances, for example those that a camera sees.
+
+ A result then has the rows of these instances only, in the list's order, with the same bits as among all
+ instances. The clips of the other instances continue. The list may be in any order and may be empty; no instance
+ may be in it twice. It is copied.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist; `TUMBLE_RESULT_INVALID_ARGUMENT` if it is in the list
+ twice. After any error nothing changes.
 
  # Safety
- `instances` has `count` numbers.
+ `instances` must have `count` numbers.
  */
 TumbleResult tumble_crowd_set_visible(struct TumbleCrowd *crowd,
                                       const uint32_t *instances,
                                       size_t count);
 
 /*
- From now on evaluates all instances again.
+ Makes all instances visible again, in the order of their indices.
  */
 TumbleResult tumble_crowd_set_all_visible(struct TumbleCrowd *crowd);
 
 /*
- How many instances are evaluated: as many as the list has, or all.
+ Returns the number of visible instances: the length of the list, or the number of all instances without a list.
 
  # Safety
- `count` has room for a number.
+ `count` must point to memory for a number.
  */
 TumbleResult tumble_crowd_visible_count(const struct TumbleCrowd *crowd, size_t *count);
 
 /*
- How many numbers a result has: 4 or 12 × joints × instances, those that are visible.
+ Returns the number of numbers of a result: 4 for rotations, or 12 for matrices, × joints × visible instances.
+ `values` is a `TumbleCrowdValues`.
 
  # Safety
- `count` has room for a number.
+ `count` must point to memory for a number.
  */
 TumbleResult tumble_crowd_output_count(const struct TumbleCrowd *crowd,
                                        uint32_t values,
                                        size_t *count);
 
 /*
- Evaluates all instances, or those that are visible, at the clock's time into the caller's memory, and waits until it is done.
- `values` is a `TumbleCrowdValues`; `output_count` is exactly as `tumble_crowd_output_count` says.
+ Evaluates all visible instances at the clock's time into the caller's memory, and waits for the result.
+
+ `values` is a `TumbleCrowdValues`. `output_count` is the number of floats of `output`, exactly that of
+ `tumble_crowd_output_count`.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_WRONG_STATE` if the result of
+ `tumble_crowd_submit` was not taken, or skinning matrices are requested but the library has no inverse bind
+ matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
- `output` has room for `output_count` floats, which nothing else uses during the call.
+ `output` must have `output_count` floats, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_evaluate(struct TumbleCrowd *crowd,
                                    uint32_t values,
@@ -1467,10 +1762,11 @@ TumbleResult tumble_crowd_evaluate(struct TumbleCrowd *crowd,
                                    size_t output_count);
 
 /*
- As `tumble_crowd_evaluate`, in 16 bits: the bits of halves (IEEE 754), rounded to nearest.
+ As `tumble_crowd_evaluate`, in 16 bits: each number is the bits of an IEEE 754 half-precision float, rounded to
+ nearest.
 
  # Safety
- `output` has room for `output_count` halves, which nothing else uses during the call.
+ `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_evaluate_half(struct TumbleCrowd *crowd,
                                         uint32_t values,
@@ -1478,56 +1774,87 @@ TumbleResult tumble_crowd_evaluate_half(struct TumbleCrowd *crowd,
                                         size_t output_count);
 
 /*
- Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it while
- instances and the clock are changed for the next one. The CPU evaluates before this returns. The
- result must be taken by `tumble_crowd_wait`, or by `tumble_crowd_wait_half` where `half` is 1, before
- anything else is evaluated or submitted.
+ Starts an evaluation of all visible instances at the clock's time and returns at once.
+
+ `values` is a `TumbleCrowdValues`. `half` is 0 for a result in 32 bits, 1 for 16 bits. A Vulkan device evaluates
+ while instances and the clock are changed for the next frame; the CPU evaluates before this function returns. The
+ caller takes the result with `tumble_crowd_wait`, or with `tumble_crowd_wait_half` if `half` is 1, before it
+ evaluates or submits again.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
+ requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
  */
 TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
                                  uint32_t values,
                                  uint32_t half);
 
 /*
- Whether what was submitted is done, so that `tumble_crowd_wait` does not wait.
+ Returns whether the submitted evaluation has ended, so that `tumble_crowd_wait` does not wait.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted; `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
- `done` has room for a truth value.
+ `done` must point to memory for a `bool`.
  */
 TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
 
 /*
- Waits for what was submitted with `half` 0, and takes its result. If an argument is refused, the
- result can still be taken.
+ Waits for an evaluation that was submitted with `half` 0, and takes its result.
+
+ `output_count` is the number of floats of `output`: exactly the `tumble_crowd_output_count` at the time of the
+ submission.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
+ `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+ if the device fails.
 
  # Safety
- `output` has room for `output_count` floats, which nothing else uses during the call.
+ `output` must have `output_count` floats, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd, float *output, size_t output_count);
 
 /*
- Waits for what was submitted with `half` 1, and takes its result. If an argument is refused, the
- result can still be taken.
+ Waits for an evaluation that was submitted with `half` 1, and takes its result.
+
+ `output_count` is the number of numbers of 16 bits of `output`: exactly the `tumble_crowd_output_count` at the
+ time of the submission.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
+ `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+ if the device fails.
 
  # Safety
- `output` has room for `output_count` halves, which nothing else uses during the call.
+ `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
  */
 TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
                                     uint16_t *output,
                                     size_t output_count);
 
 /*
- Prepares everything to evaluate into a range of an application's buffer, on the device of
- `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
- is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
- `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
- at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`: as many instances as have room there may be
- visible later.
+ Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 
- The buffer belongs to that device, has memory, and was made for use as
- `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; it stays the application's, and lives longer than the target.
+ Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
+ created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
+ `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
+ `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
+ `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
+ instances than are visible now, more may be visible later.
+
+ The buffer must belong to the engine's device, be bound to memory, and have the usage
+ `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it
+ destroys the buffer or the device.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
+ `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
+ matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
- The buffer is as said, and `target` has room for a handle.
+ The buffer must be as described, and `target` must point to memory for a handle.
  */
 TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
                                      uint32_t values,
@@ -1538,36 +1865,43 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
                                      struct TumbleCrowdTarget **target);
 
 /*
- Records an evaluation at the clock's time into the application's `VkCommandBuffer`: up to 20 bytes for each
- layer that changed since the last evaluation, 4 for each instance of a new list of visible ones, and the dispatches. Nothing is waited for, submitted or
- allocated. What is recorded behind it, or submitted to the same queue later, sees the result; it
- waits for all that was recorded before it.
+ Records an evaluation at the clock's time into the application's command buffer `commands`, a `VkCommandBuffer`.
 
- The command buffer is of the engine's device and of the family of its queue, in recording, outside of
- a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
- after a frame that is thrown away, call `tumble_crowd_forget_recorded`. The library submits to that
- queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
- `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
- application keeps these calls and its own submissions from one another.
+ The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
+ instance of a new list of visible instances, and dispatch the kernels. If no instance is visible, nothing is
+ recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
+ commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
+ see the result.
+
+ The command buffer must belong to the engine's device and to the family of the engine's queue, and must be in the
+ recording state, outside a render pass. Everything that is recorded must be submitted to the engine's queue, once
+ and in the order of the calls. If a recorded frame is discarded, call `tumble_crowd_forget_recorded`.
+ `tumble_engine_from_vulkan` says which calls of the library submit to that queue: the application must not submit
+ at the same time without a lock.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
+ instances are visible than it has room for. After any error nothing is recorded.
 
  # Safety
- The command buffer is as said, and its work is submitted as said.
+ The command buffer must be as described, nothing else may use it during the call, and its commands must be
+ submitted as described.
  */
 TumbleResult tumble_crowd_record(struct TumbleCrowd *crowd,
                                  const struct TumbleCrowdTarget *target,
                                  void *commands);
 
 /*
- Forgets what was recorded: the next evaluation writes all layers again.
- Call it if a recorded frame was discarded.
+ Marks all layers as unknown to the device, so that the next evaluation writes all of them. Call it if a recorded
+ frame was discarded.
  */
 TumbleResult tumble_crowd_forget_recorded(struct TumbleCrowd *crowd);
 
 /*
- Frees a target, after all work that was recorded with it has ended. Null is allowed.
+ Frees a crowd target. Does nothing if `target` is null.
 
  # Safety
- No such work is in flight.
+ All work that was recorded with the target must have ended, and none may be submitted later.
  */
 TumbleResult tumble_crowd_target_free(struct TumbleCrowdTarget *target);
 

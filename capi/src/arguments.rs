@@ -1,4 +1,4 @@
-//! Pointers and sizes of the caller's, checked before they are used.
+//! The caller's pointers and sizes, checked before they are used.
 
 use std::ffi::{CStr, c_char, c_void};
 
@@ -18,7 +18,7 @@ fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The product of `count` and `each`; an error where no memory can have so many numbers.
+/// The product of `count` and `each`; an error if no memory can contain so many numbers.
 pub(crate) fn product<T>(count: usize, each: usize, name: &str) -> Result<usize, Failure> {
     let bytes = count
         .checked_mul(each)
@@ -32,11 +32,11 @@ pub(crate) fn product<T>(count: usize, each: usize, name: &str) -> Result<usize,
     }
 }
 
-/// A list of the caller's; none where there is nothing in it, whatever the pointer is.
+/// The caller's list of `count` values; empty if `count` is 0, for any pointer.
 ///
 /// # Safety
-/// Where `count` is not 0 and `pointer` is neither null nor unaligned, `count` values are there and
-/// stay as they are during the call.
+/// If `count` is not 0 and `pointer` is neither null nor unaligned, it must point to `count` values, which do not
+/// change during the call.
 pub(crate) unsafe fn list<'a, T: Copy>(
     pointer: *const T,
     count: usize,
@@ -51,7 +51,7 @@ pub(crate) unsafe fn list<'a, T: Copy>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
-/// Numbers of which every pattern of bits is one.
+/// Number types for which every bit pattern is valid.
 pub(crate) trait Number: Copy {}
 
 impl Number for f32 {}
@@ -59,10 +59,10 @@ impl Number for u8 {}
 impl Number for u16 {}
 impl Number for i32 {}
 
-/// Memory of the caller's for numbers.
+/// The caller's memory for `count` numbers.
 ///
 /// # Safety
-/// As [`list`]; nothing else uses the memory during the call.
+/// As [`list`]; nothing else may use the memory during the call.
 pub(crate) unsafe fn list_mut<'a, T: Number>(
     pointer: *mut T,
     count: usize,
@@ -77,7 +77,7 @@ pub(crate) unsafe fn list_mut<'a, T: Number>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
 }
 
-/// A handle of Vulkan's that is not null.
+/// A Vulkan handle that is not null.
 pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, name: &str) -> Result<T, Failure> {
     if pointer.is_null() {
         let message = format!("`{name}` is null");
@@ -86,11 +86,11 @@ pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, name: &str) -> Result<T, F
     Ok(T::from_raw(pointer.expose_provenance() as u64))
 }
 
-/// A structure of the caller's that begins with its size; `None` where the pointer is null.
+/// The caller's structure, whose first member is its size; `None` if the pointer is null.
 ///
 /// # Safety
-/// The pointer is null, unaligned, or that of a structure whose first member is its size in bytes,
-/// with so many bytes behind it.
+/// The pointer must be null or unaligned, or point to a structure whose first member is its size in bytes and that has
+/// this size.
 pub(crate) unsafe fn sized<T: Copy>(
     pointer: *const T,
     size: impl FnOnce(*const T) -> *const usize,
@@ -113,7 +113,7 @@ pub(crate) unsafe fn sized<T: Copy>(
     Ok(Some(unsafe { pointer.read() }))
 }
 
-/// As [`sized`], and an error where the pointer is null.
+/// As [`sized`], but a null pointer is an error.
 ///
 /// # Safety
 /// As [`sized`].
@@ -130,10 +130,10 @@ pub(crate) unsafe fn needed<T: Copy>(
     })
 }
 
-/// Text of the caller's; `None` where the pointer is null.
+/// The caller's text; `None` if the pointer is null.
 ///
 /// # Safety
-/// The pointer is null, or that of bytes which end with a zero and stay as they are during the call.
+/// The pointer must be null, or point to bytes that end with a zero and do not change during the call.
 pub(crate) unsafe fn text<'a>(
     pointer: *const c_char,
     name: &str,
@@ -148,20 +148,20 @@ pub(crate) unsafe fn text<'a>(
         .map_err(|_| Failure::argument(format!("`{name}` is not UTF-8")))
 }
 
-/// The destination of a value.
+/// The caller's memory for a value that a call returns.
 pub(crate) struct Out<T> {
-    /// Null where the caller does not ask for the value.
+    /// Null if the caller does not need the value.
     pointer: *mut T,
 }
 
 impl<T> Out<T> {
-    /// Checked before the work, so that nothing is done that could not be given.
+    /// Checks the pointer. Call it before any work whose result goes there.
     pub(crate) fn new(pointer: *mut T, name: &str) -> Result<Self, Failure> {
         check(pointer, name)?;
         Ok(Self { pointer })
     }
 
-    /// As [`Out::new`]; null where the caller does not ask for the value.
+    /// As [`Out::new`], but null is allowed: the caller does not need the value.
     pub(crate) fn optional(pointer: *mut T, name: &str) -> Result<Self, Failure> {
         if pointer.is_null() {
             Ok(Self { pointer })
@@ -170,8 +170,10 @@ impl<T> Out<T> {
         }
     }
 
+    /// Writes the value, unless the pointer is null.
+    ///
     /// # Safety
-    /// The pointer is that of memory for such a value, which nothing else uses during the call.
+    /// The pointer must be null or point to memory for such a value, which nothing else uses during the call.
     pub(crate) unsafe fn set(self, value: T) {
         if self.pointer.is_null() {
             return;
@@ -182,7 +184,7 @@ impl<T> Out<T> {
     }
 }
 
-/// What a constant of C's stands for.
+/// The value of a C constant, from a list of all constants with their values.
 pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], name: &str) -> Result<T, Failure> {
     let found = known.iter().find(|&&(code, _)| code == value);
     found.map(|&(_, value)| value).ok_or_else(|| {
@@ -193,7 +195,7 @@ pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], name: &str) -> R
     })
 }
 
-/// The value of an option, whose constants count all its values from 0.
+/// The value of an option whose C constants are the indices of `all`.
 pub(crate) fn option<T: Copy>(value: u32, all: &[T], name: &str) -> Result<T, Failure> {
     let found = usize::try_from(value).ok().and_then(|index| all.get(index));
     found.copied().ok_or_else(|| {
@@ -204,7 +206,7 @@ pub(crate) fn option<T: Copy>(value: u32, all: &[T], name: &str) -> Result<T, Fa
     })
 }
 
-/// What 0 and 1 stand for.
+/// The truth value of 0 or 1; other numbers are an error.
 pub(crate) fn flag(value: u32, name: &str) -> Result<bool, Failure> {
     constant(value, &[(0, false), (1, true)], name)
 }

@@ -1,4 +1,4 @@
-//! Evaluating: a set in one go, or a clip that stays on a device.
+//! Evaluation of a set in one call, or of a clip that stays on a device.
 
 use tumble::{Clip, SampleTimes, Timeline, TrackSet};
 
@@ -11,10 +11,11 @@ use crate::samples::{TumbleSamples, layout};
 use crate::set::TumbleSet;
 use crate::vulkan::buffer_range;
 
-/// A set prepared for one method, on an engine's device. Any number of threads may use it at once.
+/// A clip: a set that was prepared for one interpolation and uploaded to an engine's device. Any number of threads
+/// may use it at the same time.
 pub struct TumbleClip {
     pub(crate) inner: Clip,
-    /// Whether its engine is on the application's own Vulkan device.
+    /// Whether its engine is on the application's Vulkan device.
     pub(crate) is_on_application_device: bool,
 }
 
@@ -22,7 +23,7 @@ impl Object for TumbleClip {
     const NAME: &'static str = "clip";
 }
 
-/// How many floats a result has, four for each sample, of which `floats` must be exactly as many.
+/// Checks that `floats` is the number of floats of a result, four for each sample of each track.
 fn check_size(tracks: usize, timeline: &Timeline, floats: usize) -> Result<(), Failure> {
     let needed = tracks as u128 * timeline.len() as u128 * 4;
     if floats as u128 == needed {
@@ -39,10 +40,14 @@ fn timeline(set: &TrackSet, frames: &SampleTimes) -> Result<Timeline, Failure> {
     Ok(frames.resolve(set.track_count(), set.time_span())?)
 }
 
-/// How many samples each track of a set has: a result has 4 × tracks × samples floats.
+/// Returns the number of samples of each track of a set. A result has 4 × tracks × samples floats.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid or do not fit the set.
 ///
 /// # Safety
-/// `samples` is such a structure, and `count` has room for a number.
+/// `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers, and `count` must point to memory
+/// for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_sample_count(
     set: *const TumbleSet,
@@ -61,13 +66,22 @@ pub unsafe extern "C" fn tumble_set_sample_count(
     })
 }
 
-/// Prepares and evaluates a set in one call, into the caller's memory: `output_count` floats, exactly
-/// 4 × tracks × samples. Memory that is aligned to 16 bytes is filled without a copy. All arguments are
-/// checked before anything is written.
+/// Prepares and evaluates a set in one call, into the caller's memory, and waits for the result.
+///
+/// `interpolation` may be null for the defaults. `layout` is a `TumbleLayout`. `output` receives four floats for each
+/// sample of each track, according to the quantity of the interpolation. `output_count` is the number of floats,
+/// exactly 4 × tracks × samples (`tumble_set_sample_count`). Memory that is aligned to 16 bytes is filled without a
+/// copy.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_INVALID_INPUT` if the sample times
+/// are invalid, or a track cannot be interpolated as requested; `TUMBLE_RESULT_DEVICE` if the device fails. All
+/// arguments are checked before anything is written.
 ///
 /// # Safety
-/// `interpolation` is null (the defaults) or such a structure, `samples` is such a structure, and
-/// `output` has room for `output_count` floats, which nothing else uses during the call.
+/// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+/// zero byte; `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers; and `output` must
+/// have `output_count` floats, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_evaluate(
     engine: *const TumbleEngine,
@@ -97,10 +111,18 @@ pub unsafe extern "C" fn tumble_evaluate(
     })
 }
 
-/// Prepares a set for a method and uploads it to the engine's device, where it stays.
+/// Prepares a set for an interpolation and uploads it to the engine's device as a clip, for repeated evaluation.
+///
+/// `interpolation` may be null for the defaults. The clip is independent of the set, and the engine may be freed
+/// before it. The caller frees the clip with `tumble_clip_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested; `TUMBLE_RESULT_OUT_OF_MEMORY` or
+/// `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
 ///
 /// # Safety
-/// `interpolation` is null (the defaults) or such a structure, and `clip` has room for a handle.
+/// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+/// zero byte, and `clip` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_upload(
     engine: *const TumbleEngine,
@@ -125,10 +147,15 @@ pub unsafe extern "C" fn tumble_upload(
     })
 }
 
-/// How many samples each track of a clip has: a result has 4 × tracks × samples floats.
+/// Returns the number of samples of each track of a clip. A result of `tumble_clip_evaluate` has 4 × tracks × samples
+/// floats.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid or do not fit the clip.
 ///
 /// # Safety
-/// `samples` is such a structure, and `count` has room for a number.
+/// `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers, and `count` must point to memory
+/// for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_clip_sample_count(
     clip: *const TumbleClip,
@@ -147,7 +174,8 @@ pub unsafe extern "C" fn tumble_clip_sample_count(
     })
 }
 
-/// Evaluates a clip into the caller's memory, as `tumble_evaluate` does a set.
+/// Evaluates a clip into the caller's memory, and waits for the result. The arguments, the result and the errors are
+/// those of `tumble_evaluate`; the number of samples is that of `tumble_clip_sample_count`.
 ///
 /// # Safety
 /// As `tumble_evaluate`.
@@ -173,17 +201,23 @@ pub unsafe extern "C" fn tumble_clip_evaluate(
     })
 }
 
-/// Evaluates a clip of an engine of `tumble_engine_from_vulkan` into a range of a buffer on its device:
-/// four floats for each sample of each track, which stay there. Returns when they are written; what is
-/// submitted to the queue afterwards sees them. `buffer` is the `VkBuffer`, as a number:
-/// `(uint64_t)buffer`. The range starts at a multiple of 16 and has at least 16 × tracks × samples bytes.
+/// Evaluates a clip into a range of the application's Vulkan buffer: four floats for each sample of each track.
 ///
-/// The buffer belongs to that device, has memory, and was made for use as
-/// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`. Nobody else uses it, or
-/// the queue, during the call.
+/// The clip's engine must have been created by `tumble_engine_from_vulkan`. `layout` is a `TumbleLayout`. `buffer` is
+/// the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 16, and has `size`
+/// bytes, at least 16 × tracks × samples. The buffer must belong to the engine's device, be bound to memory, and have
+/// the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+///
+/// The call submits to the engine's queue (`tumble_engine_from_vulkan` says who may use the queue meanwhile) and
+/// returns when the result is written. Commands that are submitted to the queue afterwards see it.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
+/// `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; otherwise as `tumble_evaluate`.
 ///
 /// # Safety
-/// `samples` is such a structure, and the buffer is as said.
+/// `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers. The buffer must be as described,
+/// and nothing else may use the range during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
     clip: *const TumbleClip,
@@ -205,7 +239,7 @@ pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
     })
 }
 
-/// Frees a clip. Null is allowed.
+/// Frees a clip. Targets that were made from it stay valid. Does nothing if `clip` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_clip_free(clip: *mut TumbleClip) -> TumbleResult {
     code(|| handle::free(clip))

@@ -1,4 +1,4 @@
-//! Engines: the devices that evaluate.
+//! Engines: open devices that evaluate.
 
 use std::ffi::{CString, c_char};
 
@@ -9,7 +9,8 @@ use crate::arguments::{Out, flag, sized, text};
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 
-/// An open device. Any number of threads may use it at once.
+/// An engine: an open device, the CPU or a Vulkan device, that evaluates. Any number of threads may use it at the
+/// same time.
 pub struct TumbleEngine {
     pub(crate) inner: Engine,
     /// Whether the Vulkan device is the application's.
@@ -33,29 +34,43 @@ impl Object for TumbleEngine {
     const NAME: &'static str = "engine";
 }
 
-/// How a device is opened. All zeros but `size` are the defaults.
+/// Options for opening a device. If all members except `size` are 0, they have their defaults.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleEngineOptions {
     /// `sizeof(TumbleEngineOptions)`.
     pub size: usize,
-    /// The bytes of a Vulkan device's memory that segments may use; 0: no limit.
+    /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+    /// set. Larger sets are prepared piece by piece. 0: no limit.
     pub memory: u64,
-    /// Threads of the CPU; 0: one for each core, shared by all engines.
+    /// The number of worker threads of the CPU, up to 1024; ignored on a Vulkan device. 0: all engines share a pool
+    /// with one thread for each core, or as many as the environment variable `RAYON_NUM_THREADS` says.
     pub threads: u32,
-    /// 1: a device that fails its self-test is used all the same, and its bits may differ.
+    /// 1: a Vulkan device is used although it fails the self-test; its bits may differ from the CPU's. 0: it is
+    /// refused.
     pub allow_inexact: u32,
 }
 
-/// Opens a device.
+/// Opens a device and creates an engine on it.
 ///
-/// `device`: "auto" (or null), the device that is measured to be the fastest; "cpu"; "vulkan", the
-/// first Vulkan device that is exact; or a Vulkan device by its index or by a part of its name. All
-/// give the same bits. `options` may be null.
+/// `device` selects the device by a name in upper or lower case:
+///
+/// - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest;
+/// - "cpu": the CPU;
+/// - "vulkan": the first Vulkan device that can be opened and passes the self-test;
+/// - any other text: the Vulkan device with this index, counted from 0, or the first one whose name contains the
+///   text.
+///
+/// All devices give the same bits. `options` may be null for the defaults. The caller frees the engine with
+/// `tumble_engine_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 ///
 /// # Safety
-/// `device` is null or text that ends with a zero, `options` null or such a structure, and `engine`
-/// has room for a handle.
+/// `device` must be null or a text that ends with a zero byte, `options` must be null or point to a
+/// `TumbleEngineOptions`, and `engine` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_engine_open(
     device: *const c_char,
@@ -77,10 +92,10 @@ pub unsafe extern "C" fn tumble_engine_open(
 }
 
 impl TumbleEngineOptions {
-    /// What the structure says; null is all defaults.
+    /// The options of a structure; for null the defaults.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure.
+    /// The pointer must be null or point to such a structure.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
         // SAFETY: as the caller promises.
         let options = unsafe {
@@ -108,7 +123,7 @@ fn open(name: &str, options: &EngineOptions) -> Result<Engine, Failure> {
     }
 }
 
-/// The fastest device, with the options.
+/// An engine on the fastest device, with the options.
 fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
     let found = Engine::auto()?;
     let name = found.device_info().map(|info| info.name.clone());
@@ -125,7 +140,7 @@ fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
     }
 }
 
-/// The first Vulkan device that opens; else why the first one does not.
+/// An engine on the first Vulkan device that can be opened; otherwise the error of the first device.
 fn first_exact(options: &EngineOptions) -> Result<Engine, Failure> {
     let mut reason = None;
     for device in Device::list()? {
@@ -163,15 +178,15 @@ fn named(name: &str) -> Result<Device, Failure> {
     })
 }
 
-/// The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for an
-/// invalid handle.
+/// Returns the name of the engine's device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null if the
+/// handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_engine_device_name(engine: *const TumbleEngine) -> *const c_char {
     let name = guarded(|| Ok(handle::get(engine)?.name.as_ptr()));
     name.unwrap_or(std::ptr::null())
 }
 
-/// Frees an engine; clips that were uploaded to it keep its device open. Null is allowed.
+/// Frees an engine. Its clips and crowds stay valid and keep the device open. Does nothing if `engine` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_engine_free(engine: *mut TumbleEngine) -> TumbleResult {
     code(|| handle::free(engine))

@@ -12,17 +12,17 @@ use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 use crate::set::TumbleSet;
 
-/// A motion file that was read: its clips, and messages about them.
+/// A motion file that was read: its clips, and messages about it. Any number of threads may use it at the same time.
 pub struct TumbleFile {
     pub(crate) clips: Vec<Clip>,
     messages: Vec<CString>,
 }
 
-/// A clip, with its names as text for C.
+/// A clip of a file, with its names as C strings.
 pub(crate) struct Clip {
     pub(crate) motion: Motion,
     name: CString,
-    /// Of each track, the name of the method by which the file interpolates its rotation.
+    /// For each track, the name of the method by which the file interpolates its rotations.
     methods: Vec<CString>,
 }
 
@@ -30,16 +30,23 @@ impl Object for TumbleFile {
     const NAME: &'static str = "file";
 }
 
-/// Text for C, which has no zeros inside.
+/// The text as a C string, without the zero bytes inside.
 pub(crate) fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
-/// Reads a motion file of any format: glTF and GLB, BVH, NPZ and NPY, Parquet, Arrow, CSV, TUM,
-/// `.dat`, known by its first bytes and its name. `path` is UTF-8; on Unix any bytes.
+/// Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
+/// `.dat`.
+///
+/// The format is recognised by the first bytes of the file, otherwise by the extension of its name. `path` is UTF-8;
+/// on Unix it may have any bytes. If some clips of the file are invalid, the others are read, and the messages of the
+/// file say why (`tumble_file_message`). The caller frees the file with `tumble_file_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if the file cannot be read; the message says why and where.
 ///
 /// # Safety
-/// `path` is text that ends with a zero, and `file` has room for a handle.
+/// `path` must be a text that ends with a zero byte, and `file` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_file_load(
     path: *const c_char,
@@ -90,7 +97,8 @@ fn system_path(path: &CStr) -> Result<&OsStr, Failure> {
     text.map_err(|_| Failure::argument("`path` is not UTF-8"))
 }
 
-/// The number of clips that could be read; 0 for an invalid handle.
+/// Returns the number of clips that could be read; 0 if the handle is invalid. Other functions take the index of a
+/// clip among these, counted from 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_clip_count(file: *const TumbleFile) -> usize {
     guarded(|| Ok(handle::get(file)?.clips.len())).unwrap_or(0)
@@ -106,19 +114,22 @@ impl TumbleFile {
     }
 }
 
-/// The name of a clip, empty where it has none: UTF-8, valid until the file is freed; null where there
-/// is no such clip.
+/// Returns the name of a clip, empty if it has none: UTF-8, valid until the file is freed; null if there is no such
+/// clip.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_clip_name(file: *const TumbleFile, clip: usize) -> *const c_char {
     let name = guarded(|| Ok(handle::get(file)?.clip(clip)?.name.as_ptr()));
     name.unwrap_or(std::ptr::null())
 }
 
-/// A clip's tracks of rotations, with the translations and scales that crowds use, as a set of the
-/// caller's own, to be freed.
+/// Creates a set with the rotations, translations and scales of all tracks of a clip. The set is a copy: it does not
+/// need the file, and the caller frees it with `tumble_set_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
 ///
 /// # Safety
-/// `set` has room for a handle.
+/// `set` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_file_clip_set(
     file: *const TumbleFile,
@@ -134,9 +145,11 @@ pub unsafe extern "C" fn tumble_file_clip_set(
     })
 }
 
-/// The name of the method by which the file interpolates the rotations of a track, as
-/// `TumbleInterpolation.method` takes it ("slerp" for LINEAR in glTF, "bessel-overhauser" where the file
-/// says nothing): valid until the file is freed; null where there is no such track.
+/// Returns the name of the method by which the file interpolates the rotations of a track, for
+/// `TumbleInterpolation.method`: UTF-8, valid until the file is freed; null if there is no such clip or track.
+///
+/// For LINEAR in glTF it is "slerp". A track for which the file names no method has the most frequent method of the
+/// clip's other tracks, or "bessel-overhauser" if the file names none at all.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_track_method(
     file: *const TumbleFile,
@@ -155,11 +168,15 @@ pub extern "C" fn tumble_file_track_method(
     name.unwrap_or(std::ptr::null())
 }
 
-/// Whole seconds that were taken from all times of a clip, so that clocks which count from 1970 lose
-/// no digits; mostly 0.
+/// Returns the whole number of seconds that was subtracted from all times of a clip, usually 0. Add it to the set's
+/// times to get those of the file. It is not 0 if, for example, the file's times count from 1970: f64 is not accurate
+/// enough for these.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
 ///
 /// # Safety
-/// `seconds` has room for a number.
+/// `seconds` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_file_clip_time_offset(
     file: *const TumbleFile,
@@ -175,11 +192,15 @@ pub unsafe extern "C" fn tumble_file_clip_time_offset(
     })
 }
 
-/// What was subtracted from the translations of a track of a clip, so that f32 is accurate enough for positions
-/// such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
+/// Returns the position `x y z` that was subtracted from the translations of a track of a clip, usually 0 0 0. It is
+/// not 0 for large coordinates, such as those of maps, for which f32 is not accurate enough. Add it, in doubles, to
+/// translations that are evaluated.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip or track.
 ///
 /// # Safety
-/// `origin` has room for three numbers.
+/// `origin` must point to memory for three numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_file_clip_origin(
     file: *const TumbleFile,
@@ -202,14 +223,15 @@ pub unsafe extern "C" fn tumble_file_clip_origin(
     })
 }
 
-/// How many messages there are about the file: warnings, and why clips could not be read; 0 for an
-/// invalid handle.
+/// Returns the number of messages about the file: first why clips could not be read, then warnings. It is 0 if the
+/// handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_message_count(file: *const TumbleFile) -> usize {
     guarded(|| Ok(handle::get(file)?.messages.len())).unwrap_or(0)
 }
 
-/// A message about the file: UTF-8, valid until the file is freed; null where there is none.
+/// Returns the message `index`, counted from 0: UTF-8, valid until the file is freed; null if there is no such
+/// message.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_message(file: *const TumbleFile, index: usize) -> *const c_char {
     let message = guarded(|| {
@@ -224,7 +246,7 @@ pub extern "C" fn tumble_file_message(file: *const TumbleFile, index: usize) -> 
     message.unwrap_or(std::ptr::null())
 }
 
-/// Frees a file; sets that were made of it stay. Null is allowed.
+/// Frees a file. Sets and libraries that were made from it stay valid. Does nothing if `file` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_free(file: *mut TumbleFile) -> TumbleResult {
     code(|| handle::free(file))

@@ -1,7 +1,7 @@
-//! Handles: the numbers of objects in a table, given to C as pointers that nothing dereferences.
+//! Handles: keys of a table of objects, which C receives as pointers that are never dereferenced.
 //!
-//! A number is given once. A handle that was freed, or is of another kind, is not found; one that is
-//! freed while another thread works with it keeps its object until that call is over.
+//! Each key is used once. A handle that was freed or has another type is not found. If a handle is freed during a call
+//! of another thread, its object exists until that call returns.
 
 use std::any::Any;
 use std::collections::HashMap;
@@ -11,9 +11,9 @@ use std::sync::{
 
 use crate::result::{Failure, TumbleResult};
 
-/// An object that has handles.
+/// A type of objects that have handles.
 pub(crate) trait Object: Any + Send + Sync {
-    /// What messages call it.
+    /// The type's name in messages.
     const NAME: &'static str;
 }
 
@@ -29,10 +29,10 @@ static TABLE: LazyLock<RwLock<Table>> = LazyLock::new(|| {
     })
 });
 
-/// Handles look like pointers to something that is aligned, and are far from null.
+/// The difference of consecutive handles: they look like aligned pointers that are not null.
 const STEP: usize = 16;
 
-/// The table. Nothing panics between two changes that belong together.
+/// The table, also if its lock is poisoned: no panic can occur between changes that belong together.
 fn read() -> RwLockReadGuard<'static, Table> {
     TABLE.read().unwrap_or_else(PoisonError::into_inner)
 }
@@ -41,7 +41,7 @@ fn write() -> RwLockWriteGuard<'static, Table> {
     TABLE.write().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A handle of an object, which keeps it.
+/// Adds an object to the table and returns its handle.
 pub(crate) fn give<T: Object>(object: T) -> *mut T {
     let mut table = write();
     table.next += STEP;
@@ -68,7 +68,7 @@ pub(crate) fn get<T: Object>(handle: *const T) -> Result<Arc<T>, Failure> {
     })
 }
 
-/// Forgets a handle; null is none.
+/// Removes a handle from the table; does nothing for null.
 pub(crate) fn free<T: Object>(handle: *mut T) -> Result<(), Failure> {
     if handle.is_null() {
         return Ok(());
@@ -80,7 +80,8 @@ pub(crate) fn free<T: Object>(handle: *mut T) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a lock guards, unless a call that held it ended in a panic: what it left may be half changed.
+/// The guard of a lock; an error if the lock is poisoned, because a call that panicked may have changed only a part of
+/// the object.
 pub(crate) fn locked<T: Object, G>(lock: LockResult<G>) -> Result<G, Failure> {
     lock.map_err(|_| {
         let name = T::NAME;

@@ -1,4 +1,4 @@
-//! How tracks are interpolated.
+//! Interpolations: methods with their options.
 
 use std::ffi::{CString, c_char};
 use std::sync::LazyLock;
@@ -11,83 +11,86 @@ use tumble::{
 use crate::arguments::{option, sized, text};
 use crate::result::Failure;
 
-/// Which of the two quaternions `q` and `-q` of each key is used.
+/// Which sign of each key is used: `q` and `-q` are the same rotation. Methods whose definition prescribes the signs
+/// ignore this option.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumblePath {
-    /// The one nearer to the previous key, so that every rotation is the shorter one.
+    /// Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°.
     Shortest = 0,
-    /// The stored one. Methods that define the path themselves ignore this.
+    /// Keys keep their signs. Where the dot product of neighbouring keys is negative, the rotation between them is
+    /// more than 180°.
     AsAuthored = 1,
 }
 
-/// The boundary condition: the curve in the first and the last segment.
+/// The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleEnds {
-    /// That of the method.
+    /// The default of the method.
     OfMethod = 0,
-    /// The parabola through the last three keys.
+    /// The parabola through the last three keys at each end.
     Parabolic = 1,
-    /// No angular acceleration.
+    /// The angular acceleration is 0 at the ends.
     Natural = 2,
-    /// The angular velocities `start_velocity` and `end_velocity`.
+    /// The angular velocities at the ends are `start_velocity` and `end_velocity`.
     Clamped = 3,
-    /// The angular velocity of slerp between the last two keys.
+    /// The angular velocity at an end is that of slerp between the last two keys there.
     Secant = 4,
-    /// A closed curve: the last key equals the first.
+    /// The curve is closed and smooth there. The last key must equal the first, within 0.002 rad.
     Loop = 5,
-    /// The first and the last segment hold their first key.
+    /// The first and the last segment are constant, with the value of their first key.
     Frozen = 6,
 }
 
-/// What is evaluated: four numbers for each sample.
+/// The quantity that is evaluated: four numbers for each sample.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleQuantity {
-    /// The rotation, a unit quaternion `x y z w`.
+    /// The rotation relative to the parent, a unit quaternion `x y z w`.
     Rotation = 0,
-    /// The angular velocity in the body's axes, rad/s, `x y z 0`.
+    /// The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
     VelocityInBody = 1,
-    /// The angular velocity in the parent's axes, rad/s, `x y z 0`.
+    /// The angular velocity in the axes of the parent, rad/s: `x y z 0`.
     VelocityInParent = 2,
-    /// The angular acceleration in the body's axes, rad/s², `x y z 0`.
+    /// The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
     AccelerationInBody = 3,
-    /// The angular acceleration in the parent's axes, rad/s², `x y z 0`.
+    /// The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
     AccelerationInParent = 4,
 }
 
-/// The speed along the curve of a track.
+/// The speed on the curve of a track.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleSpeed {
-    /// As the key times say.
+    /// According to the key times.
     AsKeyed = 0,
-    /// At one angular speed from the first key to the last.
+    /// The same angular speed from the first key to the last. The path is the same, but inner keys are reached at
+    /// other times.
     Constant = 1,
 }
 
-/// The values outside the keys.
+/// The motion before the first key of a track, or after the last.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleWrap {
-    /// The end value is held.
+    /// The value of the first or the last key stays.
     Hold = 0,
     /// The track repeats.
     Loop = 1,
-    /// The track runs backwards, then forwards again.
+    /// The track runs backwards, then forwards again, and so on. Quantities other than the rotation are refused.
     Mirror = 2,
     /// The rotation continues at the angular velocity at that end.
     Extrapolate = 3,
 }
 
-/// A method with its options. All zeros but `size` are the defaults.
+/// A method with its options. If all members except `size` are 0, they have their defaults.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleInterpolation {
     /// `sizeof(TumbleInterpolation)`.
     pub size: usize,
-    /// The method's name, such as "slerp" (`tumble_method_name`); null: "bessel-overhauser".
+    /// The name of the method, such as "slerp", from `tumble_method_name`; null: "bessel-overhauser".
     pub method: *const c_char,
     /// A `TumblePath`.
     pub path: u32,
@@ -97,24 +100,28 @@ pub struct TumbleInterpolation {
     pub quantity: u32,
     /// A `TumbleSpeed`.
     pub speed: u32,
-    /// A `TumbleWrap`: before the first key.
+    /// The motion before the first key: a `TumbleWrap`.
     pub before: u32,
-    /// A `TumbleWrap`: after the last key.
+    /// The motion after the last key: a `TumbleWrap`.
     pub after: u32,
-    /// The angular velocity at the first key for `TUMBLE_ENDS_CLAMPED`, rad/s, in the body's axes.
+    /// The angular velocity at the first key of every track for `TUMBLE_ENDS_CLAMPED`: `x y z` in the body's axes,
+    /// rad/s.
     pub start_velocity: [f64; 3],
-    /// The same at the last key.
+    /// The angular velocity at the last key of every track, likewise.
     pub end_velocity: [f64; 3],
-    /// The tension of "kochanek-bartels".
+    /// The tension of "kochanek-bartels"; 0 is neutral, usual values are from -1 to 1. With 1 the velocity at a key
+    /// is 0, with -1 it is doubled.
     pub tension: f64,
-    /// Its continuity.
+    /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
+    /// the other side.
     pub continuity: f64,
-    /// Its bias.
+    /// The bias of "kochanek-bartels", likewise. With 1 the tangent at a key follows the interval before it, with -1
+    /// the interval after it.
     pub bias: f64,
 }
 
 impl TumbleInterpolation {
-    /// What the structure says; null is all defaults.
+    /// The interpolation of a structure; for null the default method with its defaults.
     ///
     /// # Safety
     /// As [`TumbleInterpolation::read_or`].
@@ -123,11 +130,11 @@ impl TumbleInterpolation {
         unsafe { Self::read_or(pointer, || Ok(method::BESSEL_OVERHAUSER)) }
     }
 
-    /// What the structure says; null is another method with all defaults.
+    /// The interpolation of a structure; for null the method `other` with its defaults.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose `method` is null or text that ends with
-    /// a zero.
+    /// The pointer must be null or point to such a structure, whose `method` is null or a text that ends with a zero
+    /// byte.
     pub(crate) unsafe fn read_or(
         pointer: *const Self,
         other: impl FnOnce() -> Result<Method, Failure>,
@@ -184,13 +191,14 @@ static METHOD_NAMES: LazyLock<Vec<CString>> = LazyLock::new(|| {
     names.map(Result::unwrap_or_default).collect()
 });
 
-/// The number of methods.
+/// Returns the number of methods.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_method_count() -> usize {
     METHODS.len()
 }
 
-/// The name of a method, from 0; null where there is none.
+/// Returns the name of the method `index`, counted from 0: a text that is never freed; null, without an error
+/// message, if there is no such method.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_method_name(index: usize) -> *const c_char {
     let name = METHOD_NAMES.get(index);

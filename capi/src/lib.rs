@@ -1,9 +1,9 @@
 //! Tumble for C and C++: the interface that `include/tumble.h` declares.
 //!
-//! Handles are indices into a table of this library and are never dereferenced, so that one that was
-//! freed, or is of another kind, is an error (`handle`). Every function that can fail gives a
-//! [`TumbleResult`](result::TumbleResult), with words for it in [`result::tumble_last_error`]; a
-//! panic, which is a mistake of ours, ends in the code `INTERNAL` and not in the caller.
+//! Handles are keys of a table in this library and are never dereferenced, so a handle that was freed or has another
+//! type is an error (module `handle`). Every function that can fail returns a [`TumbleResult`](result::TumbleResult),
+//! and [`result::tumble_last_error`] returns its message. A panic, which is an error of this library, does not reach
+//! the caller: the call returns the code `INTERNAL`.
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 #![allow(unsafe_code)] // pointers of the caller's, and names that C links

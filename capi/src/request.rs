@@ -1,5 +1,5 @@
-//! What is asked of a clip beside its samples: an encoding, some of the tracks and samples; and where the result goes:
-//! the caller's memory, or an application's command buffers.
+//! Requests of a clip: which tracks and samples are evaluated, their layout and encoding, and whether the result goes
+//! to the caller's memory or is recorded into an application's command buffers.
 
 use std::ffi::{CString, c_char, c_void};
 use std::sync::LazyLock;
@@ -14,7 +14,7 @@ use crate::result::{Failure, TumbleResult, code};
 use crate::samples::{TumbleSamples, layout};
 use crate::vulkan::buffer_range;
 
-/// How a matrix lies in memory.
+/// The order of matrix elements in memory.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleMatrixOrder {
@@ -24,38 +24,40 @@ pub enum TumbleMatrixOrder {
     ColumnMajor = 1,
 }
 
-/// What is asked of a clip. All zeros but `size` and `samples` ask for all of it, as `x y z w` in f32, track by track.
+/// A request: which tracks and samples of a clip are evaluated, and their layout and encoding. If all members except
+/// `size` and `samples` are 0, it selects all tracks and samples, track by track, as `x y z w` in f32.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleRequest {
     /// `sizeof(TumbleRequest)`.
     pub size: usize,
-    /// At which times.
+    /// The sample times, not null.
     pub samples: *const TumbleSamples,
     /// A `TumbleLayout`.
     pub layout: u32,
-    /// A `TumbleMatrixOrder`, for matrices.
+    /// A `TumbleMatrixOrder`, for the encodings "matrix" and "matrix-3x4".
     pub matrix_order: u32,
-    /// The name of what each rotation is stored as, such as "f16" or "matrix-3x4" (`tumble_encoding_name`); null:
-    /// "f32".
+    /// The name of the encoding of each value, such as "f16" or "matrix-3x4", from `tumble_encoding_name`; null:
+    /// "f32". Angles are in degrees.
     pub encoding: *const c_char,
-    /// The axes of "euler": "ZXY" about turned axes, "zxy" about fixed ones; null: "XYZ".
+    /// The axes of the encoding "euler": uppercase, such as "ZXY", for axes that rotate with the body (intrinsic);
+    /// lowercase, such as "zxy", for fixed axes (extrinsic). Null: "XYZ".
     pub sequence: *const c_char,
-    /// The first track, from 0.
+    /// The index of the first track, from 0.
     pub first_track: usize,
-    /// How many tracks; 0: all from the first one on.
+    /// The number of tracks; 0: all from `first_track` on.
     pub track_count: usize,
-    /// The first of the samples, from 0.
+    /// The index of the first sample, from 0.
     pub first_sample: usize,
-    /// How many of the samples; 0: all from the first one on.
+    /// The number of samples of each track; 0: all from `first_sample` on.
     pub sample_count: usize,
 }
 
 impl TumbleRequest {
-    /// Calls `work` with the request that the structure says.
+    /// Calls `work` with the request of a structure; null is an error.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose pointers are null or those of what is said there.
+    /// The pointer must be null or point to such a structure, whose pointers are null or as its members say.
     unsafe fn read<T>(
         pointer: *const Self,
         clip: &Clip,
@@ -111,23 +113,30 @@ static ENCODING_NAMES: LazyLock<Vec<CString>> = LazyLock::new(|| {
     names.map(Result::unwrap_or_default).collect()
 });
 
-/// The number of encodings.
+/// Returns the number of encodings.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_encoding_count() -> usize {
     ENCODING_NAMES.len()
 }
 
-/// The name of an encoding, from 0; null where there is none.
+/// Returns the name of the encoding `index`, counted from 0: a text that is never freed; null, without an error
+/// message, if there is no such encoding.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_encoding_name(index: usize) -> *const c_char {
     let name = ENCODING_NAMES.get(index);
     name.map_or(std::ptr::null(), |name| name.as_ptr())
 }
 
-/// How many bytes the result of a request has.
+/// Returns the size of a request's result in bytes.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown; `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does
+/// not have these tracks or samples; `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding
+/// is for rotations and the clip's quantity is a velocity or an acceleration.
 ///
 /// # Safety
-/// `request` is such a structure, and `bytes` has room for a number.
+/// `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `bytes` must point to
+/// memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_request_bytes(
     clip: *const TumbleClip,
@@ -146,11 +155,18 @@ pub unsafe extern "C" fn tumble_request_bytes(
     })
 }
 
-/// Evaluates what is asked of a clip into the caller's memory: exactly `tumble_request_bytes`, values of the encoding in
-/// the order of the layout. All arguments are checked before anything is written.
+/// Evaluates a request of a clip into the caller's memory, and waits for the result.
+///
+/// `output` receives the values in the request's layout and encoding. `output_bytes` is its size, exactly that of
+/// `tumble_request_bytes`. Memory that is aligned to 16 bytes is filled without a copy.
+///
+/// # Errors
+/// As `tumble_request_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number, and
+/// `TUMBLE_RESULT_DEVICE` if the device fails. All arguments are checked before anything is written.
 ///
 /// # Safety
-/// `request` is such a structure, and `output` has room for so many bytes, which nothing else uses during the call.
+/// `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `output` must have
+/// `output_bytes` bytes, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_request_evaluate(
     clip: *const TumbleClip,
@@ -170,7 +186,8 @@ pub unsafe extern "C" fn tumble_request_evaluate(
     })
 }
 
-/// A range of an application's buffer that a request of a clip is evaluated into, with all that recording needs.
+/// A clip target: a request of a clip, prepared for recording into command buffers, and the range of the
+/// application's buffer that receives its result. Any number of threads may use it at the same time.
 pub struct TumbleClipTarget {
     inner: ClipTarget,
 }
@@ -179,17 +196,24 @@ impl Object for TumbleClipTarget {
     const NAME: &'static str = "clip target";
 }
 
-/// Makes ready what it takes to evaluate a request into a range of a buffer of the application's, on the device of
-/// `tumble_engine_from_vulkan`: kernels are compiled, and what they read of the samples is brought to the device, here,
-/// and not when a frame is recorded. `buffer` is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at
-/// a multiple of the bytes of a value (16 for "f32"), and has at least `tumble_request_bytes`.
+/// Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 ///
-/// The buffer belongs to that device, has memory, and was made for use as `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and
-/// `VK_BUFFER_USAGE_TRANSFER_DST_BIT`; it stays the application's, and lives longer than the target. The target needs
-/// neither the clip nor the engine that it was made of. This call submits to the queue, as uploading does.
+/// Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
+/// been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
+/// number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+/// has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
+/// bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+///
+/// The target needs neither the clip nor the engine afterwards. The application frees it with
+/// `tumble_clip_target_free` before it destroys the buffer or the device.
+///
+/// # Errors
+/// As `tumble_request_bytes`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by
+/// `tumble_engine_from_vulkan`, and `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
 ///
 /// # Safety
-/// `request` is such a structure, the buffer is as said, and `target` has room for a handle.
+/// `request` must point to a `TumbleRequest` whose pointers are null or as its members say; the buffer must be as
+/// described; and `target` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_clip_target_new(
     clip: *const TumbleClip,
@@ -213,15 +237,21 @@ pub unsafe extern "C" fn tumble_clip_target_new(
     })
 }
 
-/// Records an evaluation into the application's `VkCommandBuffer`, to `offset` bytes behind the beginning of the
-/// target's range, a multiple of the bytes of a value. Nothing is waited for, submitted or allocated. What is recorded
-/// waits for all that was recorded before it, and all that comes behind it sees the result; it may be submitted any
-/// number of times, to any queue of the family.
+/// Records an evaluation into the application's command buffer `commands`, a `VkCommandBuffer`.
 ///
-/// The command buffer is of the engine's device and of a family that computes, in recording, outside of a render pass.
+/// The result starts `offset` bytes after the start of the target's range, a multiple of the bytes of a value.
+/// Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all commands that
+/// were recorded before it, and all commands after it see the result. The commands may be submitted any number of
+/// times, to any queue of the command buffer's family.
+///
+/// The command buffer must belong to the engine's device and to a queue family that can compute, and must be in the
+/// recording state, outside a render pass.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_SIZE` if the result does not fit there or `offset` is not aligned; then nothing is recorded.
 ///
 /// # Safety
-/// The command buffer is as said, and nobody else uses it during the call.
+/// The command buffer must be as described, and nothing else may use it during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_clip_record(
     target: *const TumbleClipTarget,
@@ -237,10 +267,10 @@ pub unsafe extern "C" fn tumble_clip_record(
     })
 }
 
-/// Frees a target, after all work that was recorded with it has ended. Null is allowed.
+/// Frees a clip target. Does nothing if `target` is null.
 ///
 /// # Safety
-/// No such work is in flight, and none will be submitted.
+/// All work that was recorded with the target must have ended, and none may be submitted later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_clip_target_free(target: *mut TumbleClipTarget) -> TumbleResult {
     code(|| handle::free(target))

@@ -1,4 +1,4 @@
-//! Codes, the words of the last error, and the line that no panic crosses.
+//! Result codes, the message of the last error, and the conversion of panics to errors.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -10,33 +10,35 @@ use tumble::vulkan::VulkanError;
 use tumble::{Error, SkeletonError, TrackError};
 use tumble_formats::Diagnostic;
 
-/// The result of a call.
+/// The result code of a call. If it is not `TUMBLE_RESULT_OK`, `tumble_last_error` returns a message with the reason.
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TumbleResult {
     /// Success.
     Ok = 0,
-    /// A pointer is null, or not aligned for what it points to.
+    /// A pointer is null where null is not allowed, or is not aligned for its type.
     InvalidPointer = 1,
-    /// A handle was freed, never existed, or has another type.
+    /// A handle is null, was freed, never existed, or belongs to an object of another type.
     InvalidHandle = 2,
-    /// An argument has a value that it cannot have: an unknown constant or name, a size that
-    /// overflows, a structure of another version, text that is not UTF-8.
+    /// An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
+    /// memory, a structure whose `size` is that of another version, text that is not UTF-8, or objects that do not
+    /// belong together.
     InvalidArgument = 3,
-    /// Memory for a result is not exactly as large as the result, or a buffer's range does not fit it.
+    /// The memory for a result does not have the required size, or a range of a buffer is too short or not aligned.
     WrongSize = 4,
-    /// The index is out of range.
+    /// There is no track, sample, clip, joint, mask, instance, layer or message with this index.
     OutOfRange = 5,
-    /// Keys, times, samples or a file are refused; the message says where.
+    /// Keys, times, a skeleton, a mask, a request or a file are refused. The message says where the error is.
     InvalidInput = 6,
-    /// Not enough memory.
+    /// There is not enough memory.
     OutOfMemory = 7,
-    /// There is no such device, it cannot be opened, it is not exact, or it failed.
+    /// The device does not exist, cannot be opened, does not compute the CPU's bits, or failed; or the system refused
+    /// to start worker threads.
     Device = 8,
-    /// An internal error of the library; please report it.
+    /// An internal error of the library. Please report it, with the message.
     Internal = 9,
-    /// The call is not possible now: nothing was submitted, the result of a submission was not taken, or it
-    /// needs data that the object does not have.
+    /// The call is not possible in this state of the object: nothing was submitted, the result of a submission was
+    /// not taken, it has another precision, or the object lacks data, such as clips or inverse bind matrices.
     WrongState = 10,
 }
 
@@ -149,8 +151,7 @@ impl From<CrowdError> for Failure {
     }
 }
 
-/// What is wrong with a crowd, in the words of this interface: its functions' names, and masks that count
-/// from 1.
+/// The message of a crowd's error, with the function names of this interface, and masks that are counted from 1.
 fn crowd_words(error: &CrowdError) -> String {
     match error {
         CrowdError::Missing {
@@ -203,8 +204,10 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::default();
 }
 
-/// The error message of the last failed call of this thread: UTF-8, empty before the
-/// first. It stays valid until another call of this thread fails.
+/// Returns the message of the last failed call of this thread: UTF-8, never null, empty if no call has failed.
+///
+/// The text belongs to the library. It stays valid until another call of this thread fails, or the thread ends;
+/// successful calls do not change it.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_last_error() -> *const c_char {
     // A thread that ends has no message any more.
@@ -218,7 +221,7 @@ fn remember(message: &str) {
     let _ = LAST.try_with(|last| last.replace(message));
 }
 
-/// Does some work; `None` and words for it where it fails or panics.
+/// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
     // What a panic leaves half done is dropped, or lies behind a lock that is then poisoned.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
@@ -228,7 +231,7 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T,
     })
 }
 
-/// The code of some work.
+/// The result code of some work; the message of an error is stored for this thread.
 pub(crate) fn code(work: impl FnOnce() -> Result<(), Failure>) -> TumbleResult {
     guarded(work).err().unwrap_or(TumbleResult::Ok)
 }

@@ -1,62 +1,64 @@
-//! Which samples are evaluated, and where they lie in memory.
+//! Sample times, and the layout of results.
 
 use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::arguments::{constant, list, needed, option};
 use crate::result::Failure;
 
-/// The order of a result in memory, four numbers for each sample of each track.
+/// The order of a result in memory. Each sample of a track has one value: four numbers, or in a request as many as
+/// its encoding has.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleLayout {
-    /// `[track][sample]`: the samples of a track lie together.
+    /// `[track][sample]`: all samples of the first track, then those of the second, and so on.
     TrackMajor = 0,
-    /// `[sample][track]`: the tracks of a sample lie together.
+    /// `[sample][track]`: all tracks at the first sample, then at the second, and so on.
     FrameMajor = 1,
 }
 
-/// Which samples.
+/// How sample times are specified.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleSampling {
-    /// Frames at a rate, from the first key of the set to its last.
+    /// Frames at a rate, from the first key time of the set to the last (`tumble_set_time_span`).
     Keys = 0,
     /// Frames at a rate, from `start` to `end`.
     Range = 1,
-    /// The listed times, the same for every track, in any order.
+    /// A list of times in any order, the same for every track.
     Times = 2,
-    /// The listed times, different for each track: first those of the first track, then those of the
-    /// second, the same number for each.
+    /// A list of times for each track, in the order `[track][sample]`, with the same number of times for every track.
     TimesOfTracks = 3,
 }
 
-/// The samples of an evaluation. Zeros stand for what is not used.
+/// The sample times of an evaluation. Members that `sampling` does not use are ignored.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleSamples {
     /// `sizeof(TumbleSamples)`.
     pub size: usize,
-    /// A `TumbleSampling`.
+    /// A `TumbleSampling`: which of the members below are used.
     pub sampling: u32,
-    /// Frames per `rate_seconds`: 60, or 30000 in 1001 seconds.
+    /// The numerator of the frame rate: there are `rate_frames` frames in `rate_seconds` seconds, such as 60 in 1, or
+    /// 30000 in 1001.
     pub rate_frames: u64,
-    /// 0 stands for 1.
+    /// The denominator of the frame rate, seconds; 0 means 1.
     pub rate_seconds: u64,
-    /// Seconds, for `TUMBLE_SAMPLING_RANGE`.
+    /// The time of the first frame, seconds, for `TUMBLE_SAMPLING_RANGE`.
     pub start: f64,
-    /// Seconds, for `TUMBLE_SAMPLING_RANGE`.
+    /// The time after which there are no frames, seconds, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
     pub end: f64,
-    /// Seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`.
+    /// The sample times, seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
+    /// during the call.
     pub times: *const f64,
-    /// How many times there are, of all tracks together.
+    /// The number of `times`, for all tracks together.
     pub time_count: usize,
 }
 
 impl TumbleSamples {
-    /// The samples that the structure says.
+    /// The sample times of a structure; null is an error.
     ///
     /// # Safety
-    /// The pointer is null or that of such a structure, whose `times` has `time_count` numbers.
+    /// The pointer must be null or point to such a structure, whose `times` has `time_count` numbers.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<SampleTimes, Failure> {
         // SAFETY: as the caller promises.
         let structure = unsafe {
@@ -86,7 +88,7 @@ impl TumbleSamples {
     }
 }
 
-/// The layout of a constant.
+/// The layout of a C constant.
 pub(crate) fn layout(value: u32) -> Result<Layout, Failure> {
     option(value, &Layout::ALL, "layout")
 }

@@ -10,7 +10,8 @@ use crate::arguments::{Out, list, product, text};
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 
-/// Tracks of keys. Any number of threads may read a set at once.
+/// A set: tracks of rotation keys that are evaluated together, each with optional translations and scales. Any number
+/// of threads may use it at the same time.
 #[derive(Default)]
 pub struct TumbleSet {
     pub(crate) inner: RwLock<TrackSet>,
@@ -27,16 +28,16 @@ impl TumbleSet {
         }
     }
 
-    /// The set: a track is pushed as a whole or not at all, after panics too.
+    /// The set, also if its lock is poisoned: a track is added completely or not at all, even if a call panics.
     pub(crate) fn read(&self) -> RwLockReadGuard<'_, TrackSet> {
         self.inner.read().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A set without tracks.
+/// Creates a set without tracks. The caller frees it with `tumble_set_free`.
 ///
 /// # Safety
-/// `set` has room for a handle.
+/// `set` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_new(set: *mut *mut TumbleSet) -> TumbleResult {
     code(|| {
@@ -47,14 +48,20 @@ pub unsafe extern "C" fn tumble_set_new(set: *mut *mut TumbleSet) -> TumbleResul
     })
 }
 
-/// Appends a track. `times` are seconds, strictly increasing; `keys` are unit quaternions, `x y z w`
-/// each, four numbers for each time. Keys that are unit to within rounding are kept bit for bit, others
-/// (norm within 0.1 of 1) are normalised. `name` may be null. If anything is refused, the set is as it
-/// was.
+/// Appends a track of `key_count` rotation keys, at least one, to a set.
+///
+/// `times` are the key times in seconds, strictly increasing. `keys` are unit quaternions, `x y z w`, one for each
+/// time. Keys whose norm is 1 within f32 rounding keep their bits; others, whose norm is within 0.1 of 1, are
+/// normalised. `name` is the track's name in UTF-8, or null for none. Arrays and name are copied. Pointers that
+/// `tumble_set_track` returned for this set become invalid.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a key's
+/// norm is not within 0.1 of 1. After any error the set is unchanged.
 ///
 /// # Safety
-/// `name` is null or text that ends with a zero, `times` has `key_count` numbers, and `keys` four
-/// times as many.
+/// `name` must be null or a text that ends with a zero byte; `times` must have `key_count` numbers, and `keys`
+/// 4 × `key_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_push(
     set: *mut TumbleSet,
@@ -81,11 +88,14 @@ pub unsafe extern "C" fn tumble_set_push(
     })
 }
 
-/// A set whose tracks all have the same key times: `keys` holds one track after another, `key_count`
-/// keys of four numbers each.
+/// Creates a set of `track_count` tracks without names, which all have the same `key_count` key times.
+///
+/// `times` are the key times in seconds. `keys` are unit quaternions in the order `[track][key]`, four numbers
+/// `x y z w` each. The conditions and errors are those of `tumble_set_push`. The arrays are copied. The caller frees
+/// the set with `tumble_set_free`.
 ///
 /// # Safety
-/// `times` has `key_count` numbers, `keys` 4 × `key_count` × `track_count`, and `set` has room for a
+/// `times` must have `key_count` numbers and `keys` 4 × `key_count` × `track_count`; `set` must point to memory for a
 /// handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_with_shared_times(
@@ -114,13 +124,13 @@ pub unsafe extern "C" fn tumble_set_with_shared_times(
     })
 }
 
-/// The number of tracks; 0 for an invalid handle.
+/// Returns the number of tracks; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_track_count(set: *const TumbleSet) -> usize {
     guarded(|| Ok(handle::get(set)?.read().track_count())).unwrap_or(0)
 }
 
-/// The number of keys of all tracks together; 0 for an invalid handle.
+/// Returns the number of rotation keys of all tracks together; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_key_count(set: *const TumbleSet) -> usize {
     guarded(|| Ok(handle::get(set)?.read().key_count())).unwrap_or(0)
@@ -133,11 +143,17 @@ fn track(set: &TrackSet, index: usize) -> Result<Track<'_>, Failure> {
     found.ok_or_else(|| TrackError::NoSuchTrack { track, tracks }.into())
 }
 
-/// The times and the keys (`x y z w`) of a track, as they lie in the set. They stay there until a
-/// track is pushed to the set, or it is freed.
+/// Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
+///
+/// `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
+/// `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+/// freed.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
 ///
 /// # Safety
-/// `times` and `keys` have room for a pointer and `key_count` for a number.
+/// `times` and `keys` must each point to memory for a pointer, and `key_count` to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_track(
     set: *const TumbleSet,
@@ -167,12 +183,18 @@ pub unsafe extern "C" fn tumble_set_track(
 
 const _: () = assert!(size_of::<Quat>() == size_of::<[f32; 4]>());
 
-/// The name of a track, `box1`, `box2` … by its place where it has none: UTF-8, with a zero behind
-/// it. `length` is set to its bytes without that zero, also where `size`, the bytes of `buffer`, is
-/// not more than that: then nothing else is written, which is an error unless `buffer` is null.
+/// Copies the name of the track `index`, counted from 0, into `buffer`: UTF-8, followed by a zero byte. Tracks
+/// without a name are called `box1`, `box2` … in the order of the tracks.
+///
+/// `size` is the size of `buffer` in bytes. `length` receives the length of the name in bytes, without the zero byte.
+/// If `buffer` is null, only `length` is written.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
+/// `size` is less than the length + 1: then `length` is written, and `buffer` is not.
 ///
 /// # Safety
-/// `buffer` is null or has room for `size` bytes, and `length` for a number.
+/// `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_track_name(
     set: *const TumbleSet,
@@ -209,10 +231,13 @@ pub unsafe extern "C" fn tumble_set_track_name(
     })
 }
 
-/// The first and the last key time over all tracks, seconds; an error for a set without tracks.
+/// Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.
 ///
 /// # Safety
-/// `first` and `last` have room for a number.
+/// `first` and `last` must each point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_time_span(
     set: *const TumbleSet,
@@ -238,7 +263,7 @@ pub unsafe extern "C" fn tumble_set_time_span(
     })
 }
 
-/// Frees a set; clips that were made of it stay. Null is allowed.
+/// Frees a set. Clips that were made from it stay valid. Does nothing if `set` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_free(set: *mut TumbleSet) -> TumbleResult {
     code(|| handle::free(set))

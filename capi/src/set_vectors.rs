@@ -1,4 +1,4 @@
-//! Translations and scales beside a set's rotations, as crowds use them.
+//! Translations and scales of a set's tracks, for crowds.
 
 use std::sync::PoisonError;
 
@@ -12,6 +12,8 @@ use crate::set::TumbleSet;
 
 type Set = fn(&mut TrackSet, usize, &[f64], &[[f32; 3]], &[[Vec3; 2]]) -> Result<(), TrackError>;
 
+/// Sets translation or scale keys of a track by the function `to`.
+///
 /// # Safety
 /// As `tumble_set_translations`.
 unsafe fn give(
@@ -45,15 +47,20 @@ unsafe fn give(
     Ok(to(&mut tracks, track, times, keys, &tangents)?)
 }
 
-/// Sets the translations of a track, replacing any it had. `times` are seconds, strictly increasing,
-/// and may differ from those of its rotations; `keys` are vectors, three numbers for each time;
-/// `tangents`, for "gltf-cubic", may be null or has six numbers for each time: the tangent with which the
-/// curve arrives, then the one with which it leaves, units per second. If anything is refused, the set
-/// is as it was.
+/// Sets the translation keys of the track `track`, counted from 0, and replaces earlier ones.
+///
+/// `times` are `key_count` key times in seconds, at least one, strictly increasing; they may differ from the times of
+/// the rotations. `keys` are vectors `x y z`, one for each time. `tangents` are for the method "gltf-cubic" and may
+/// be null: six numbers for each time, the incoming tangent `x y z` and the outgoing one, in units per second. The
+/// arrays are copied.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite
+/// and strictly increasing, or a number is not finite or exceeds 1e30 in magnitude. After any error the set is
+/// unchanged.
 ///
 /// # Safety
-/// `times` has `key_count` numbers, `keys` three times as many, and `tangents` is null or has six times
-/// as many.
+/// `times` must have `key_count` numbers and `keys` 3 × `key_count`; `tangents` must be null or have 6 × `key_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_translations(
     set: *mut TumbleSet,
@@ -77,10 +84,10 @@ pub unsafe extern "C" fn tumble_set_translations(
     })
 }
 
-/// Sets the scales of a track along its axes; otherwise as `tumble_set_translations`.
+/// Sets the scale keys of a track: factors `x y z` along its axes. Otherwise as `tumble_set_translations`.
 ///
 /// # Safety
-/// As there.
+/// As `tumble_set_translations`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_set_scales(
     set: *mut TumbleSet,

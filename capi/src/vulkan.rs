@@ -1,4 +1,4 @@
-//! Engines on an application's own Vulkan device.
+//! Engines on an application's Vulkan device.
 
 use std::ffi::{CStr, c_void};
 
@@ -12,50 +12,53 @@ use crate::engine::{TumbleEngine, TumbleEngineOptions};
 use crate::handle;
 use crate::result::{Failure, TumbleResult, code};
 
-/// An application's Vulkan instance, device and queue. They stay the application's.
+/// An application's Vulkan instance, device and queue, for `tumble_engine_from_vulkan`. The library does not destroy
+/// them.
 ///
-/// The device needs no features; a software device is faster with `shaderInt64`. Below Vulkan 1.2,
-/// enable `VK_KHR_shader_float_controls` where it is offered.
+/// No features of the device are required, but software devices are faster with `shaderInt64`. Below Vulkan 1.2,
+/// enable `VK_KHR_shader_float_controls` if the device has it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleVulkan {
     /// `sizeof(TumbleVulkan)`.
     pub size: usize,
-    /// `vkGetInstanceProcAddr` of the loader that the instance was made by, cast to `void (*)(void)`.
-    /// The loader stays loaded as long as the engine and all that was made with it.
+    /// `vkGetInstanceProcAddr` of the loader that created the instance, cast to `void (*)(void)`. The loader must
+    /// stay loaded until the engine and all objects that were made with it are freed.
     pub get_instance_proc_addr: Option<unsafe extern "C" fn()>,
     /// The `VkInstance`, of Vulkan 1.1 or newer.
     pub instance: *mut c_void,
-    /// The `VkPhysicalDevice` of the device.
+    /// The `VkPhysicalDevice` of `device`.
     pub physical_device: *mut c_void,
     /// The `VkDevice`.
     pub device: *mut c_void,
-    /// A `VkQueue` of the device that can compute.
+    /// A `VkQueue` of the device, of a family that can compute.
     pub queue: *mut c_void,
-    /// The family of that queue.
+    /// The family of `queue`.
     pub queue_family: u32,
-    /// The version that the instance was made for, `VkApplicationInfo.apiVersion`.
+    /// The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer.
     pub api_version: u32,
-    /// 1: `VK_KHR_shader_float_controls` is enabled; it does not count from Vulkan 1.2 on.
+    /// 1 if `VK_KHR_shader_float_controls` is enabled, otherwise 0; ignored from Vulkan 1.2 on.
     pub shader_float_controls: u32,
-    /// 1: the feature `shaderInt64` is enabled.
+    /// 1 if the feature `shaderInt64` is enabled, otherwise 0.
     pub shader_int64: u32,
-    /// Another `VkQueue` of the device, which copies results to the host while the first one computes, or
-    /// null. The device must have the feature `timelineSemaphore` enabled then.
+    /// Another `VkQueue` of the device, on which results are copied to the host while `queue` computes, or null. The
+    /// device must then have the feature `timelineSemaphore` enabled, and only the library may use this queue.
     pub copy_queue: *mut c_void,
-    /// The family of that queue.
+    /// The family of `copy_queue`; ignored if that is null.
     pub copy_queue_family: u32,
-    /// Locks `queue`, which the application uses too, maybe on another thread; called with `queue_user` before each
-    /// submission of the engine. With it goes `unlock_queue`. Null: nobody else may use the queue while the library
-    /// does. The application must not hold the lock while it calls the library.
+    /// A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
+    /// `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
+    /// must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
+    /// `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
     pub lock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
-    /// Unlocks it, called after each submission on the same thread.
+    /// The function that unlocks `queue`; the library calls it on the thread that called `lock_queue`.
     pub unlock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
-    /// What both get. It must stay valid as long as the engine and all that was made with it.
+    /// The argument of both functions. It must stay valid until the engine and all objects that were made with it are
+    /// freed.
     pub queue_user: *mut c_void,
 }
 
-/// What an application's functions get.
+/// The argument of the application's functions that lock and unlock the queue.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
@@ -75,7 +78,7 @@ fn refused(message: String) -> Failure {
 }
 
 impl TumbleVulkan {
-    /// The application's lock of the queue, if it has one.
+    /// The application's lock of the queue; `None` if both functions are null.
     fn queue_lock(&self) -> Result<Option<QueueLock>, Failure> {
         let user = User(self.queue_user);
         match (self.lock_queue, self.unlock_queue) {
@@ -97,7 +100,7 @@ impl TumbleVulkan {
     /// The functions of the loader, the instance and the device.
     ///
     /// # Safety
-    /// The handles are valid, and belong together.
+    /// The handles must be valid and belong together.
     unsafe fn handles(&self) -> Result<VulkanHandles, Failure> {
         let Some(get) = self.get_instance_proc_addr else {
             let message = "`vulkan->get_instance_proc_addr` is null";
@@ -172,7 +175,8 @@ impl TumbleVulkan {
         })
     }
 
-    /// What the instance can tell: the physical device is one of its own, and the family can compute.
+    /// Checks with the instance that it has the physical device, and that the queue families exist and `queue` can
+    /// compute.
     fn check_device(
         &self,
         instance: &ash::Instance,
@@ -215,7 +219,7 @@ impl TumbleVulkan {
     }
 }
 
-/// A range of an application's buffer, for what an engine on its own device left there.
+/// A range of an application's buffer, for results of an engine on the application's device.
 pub(crate) fn buffer_range(
     is_on_application_device: bool,
     buffer: u64,
@@ -238,17 +242,27 @@ pub(crate) fn buffer_range(
     })
 }
 
-/// Creates an engine on an application's Vulkan device, for crowds that are recorded into its command buffers
-/// (`tumble_crowd_record`), and for all else that engines do.
+/// Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds and
+/// clips into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`).
 ///
-/// The handles stay the application's, which destroys them after it has freed the engine, its clips,
-/// crowds and targets, and no call with one of them is under way. Calls that submit work (uploading,
-/// evaluating, submitting; not recording) use the queue, so nobody else may at the same time: a queue
-/// of the library's own is the simplest where the device has several.
+/// The Vulkan objects belong to the application. It may destroy them only after it has freed the engine, its clips,
+/// crowds and targets, and after all calls with these have returned. The caller frees the engine with
+/// `tumble_engine_free`. `options` may be null for the defaults.
+///
+/// These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
+/// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_crowd_new`,
+/// `tumble_crowd_target_new`, `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
+/// Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
+/// queue that only the library uses, if the device has several.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
+/// version is below 1.1, or the physical device or a queue family does not fit; `TUMBLE_RESULT_DEVICE` if the device
+/// fails the self-test.
 ///
 /// # Safety
-/// `vulkan` is such a structure, whose handles are valid and belong together and live as said; `options` is
-/// null or such a structure, and `engine` has room for a handle.
+/// `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;
+/// `options` must be null or point to a `TumbleEngineOptions`; and `engine` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_engine_from_vulkan(
     vulkan: *const TumbleVulkan,

@@ -1,4 +1,4 @@
-//! Weights of layers, set at once or faded by the clock.
+//! Weights of layers: set at once, or changed by the clock.
 
 use tumble::crowd::CrowdFade;
 
@@ -7,29 +7,33 @@ use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{TumbleResult, code};
 
-/// A layer's weight as a function of the clock: `from` before `start`, `to` from `ticks` later on, and between them in
-/// equal parts for equal ticks.
+/// A fade: a layer's weight that changes linearly with the clock. The weight is `from` until the tick `start`,
+/// reaches `to` after `ticks` ticks, and then stays.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleCrowdFade {
     /// `sizeof(TumbleCrowdFade)`.
     pub size: usize,
-    /// The instance, from 0.
+    /// The index of the instance, from 0.
     pub instance: usize,
-    /// Its layer, from 1: the first has no weight.
+    /// The index of the layer in the instance, from 1: layer 0 has no weight.
     pub layer: usize,
-    /// When it starts, ticks of the clock; before now or later.
+    /// The clock's time at which the fade starts, ticks; in the past or in the future.
     pub start: u64,
-    /// How many ticks it takes; 0 for a step.
+    /// The duration of the fade, ticks; with 0 the weight changes at once.
     pub ticks: u64,
-    /// The weight before, 0 to 1, kept in units of 2^-15.
+    /// The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub from: f32,
-    /// The weight after, likewise.
+    /// The weight after the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub to: f32,
 }
 
-/// Sets the weight of a layer above the first, 0 to 1, kept in units of 2^-15. The rest of what it plays goes on, and
-/// a fade of it ends.
+/// Sets the weight of a layer above layer 0: 0 to 1, rounded to a multiple of 2^-15. The layer's clip, time and speed
+/// stay, and its fade ends.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_set_weight(
     crowd: *mut TumbleCrowd,
@@ -43,9 +47,15 @@ pub extern "C" fn tumble_crowd_set_weight(
     })
 }
 
-/// Lets the weight of a layer above the first go from what it is now to `weight`, in equal parts for equal ticks of
-/// the clock, within `ticks`; 0 is at once. From then on it stays. Another fade of the layer, `tumble_crowd_set` and
-/// `tumble_crowd_set_weight` end it.
+/// Fades the weight of a layer above layer 0 from its current value to `weight`, linearly within `ticks` of the
+/// clock. With 0 ticks it changes at once.
+///
+/// Afterwards the weight stays. `tumble_crowd_set`, `tumble_crowd_set_weight` and another fade of the layer end the
+/// fade.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_fade(
     crowd: *mut TumbleCrowd,
@@ -60,12 +70,18 @@ pub extern "C" fn tumble_crowd_fade(
     })
 }
 
-/// Sets the weight of a layer above the first as a function of the clock: as `tumble_crowd_fade`, from any weight and
-/// any time. What `tumble_crowd_get_fade` reports, set in another crowd whose clock stands at the same time, gives
-/// the same weights at all times.
+/// Sets the weight of a layer above layer 0 as a function of the clock. Unlike that of `tumble_crowd_fade`, this fade
+/// starts at any weight and at any time, past or future.
+///
+/// The fade that `tumble_crowd_get_fade` returns, set in another crowd at the same time of the clock, gives the same
+/// weights at all times.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
+/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
 ///
 /// # Safety
-/// `fade` is such a structure.
+/// `fade` must point to a `TumbleCrowdFade`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_set_fade(
     crowd: *mut TumbleCrowd,
@@ -88,12 +104,18 @@ pub unsafe extern "C" fn tumble_crowd_set_fade(
     })
 }
 
-/// The fade that the weight of a layer follows, with its weights as they were rounded; one that has ended too, for
-/// the clock may go back. `fade->size`, `fade->instance` and `fade->layer` say which. `fades`: whether there is one;
-/// where there is none, the structure stays as it is.
+/// Returns the fade of a layer's weight, with its rounded weights; also a fade that has ended, because the clock may
+/// go back.
+///
+/// The caller sets `fade->size`, `fade->instance` and `fade->layer`. `fades` receives whether the layer has a fade.
+/// If it has, the call writes the other members of `fade`; otherwise `fade` is unchanged.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 ///
 /// # Safety
-/// `fade` is such a structure, which nothing else uses during the call, and `fades` has room for a truth value.
+/// `fade` must point to a `TumbleCrowdFade`, which nothing else uses during the call, and `fades` must point to
+/// memory for a `bool`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_get_fade(
     crowd: *const TumbleCrowd,

@@ -1,4 +1,4 @@
-//! Libraries of clips from motion files: joints are known by their names.
+//! Libraries of clips from motion files, whose joints are matched by name.
 
 use std::collections::HashMap;
 use std::ffi::c_char;
@@ -19,12 +19,12 @@ fn refused(message: String) -> Failure {
     Failure::new(TumbleResult::InvalidInput, message)
 }
 
-/// The name of a track as libraries have it.
+/// The name of a track, without zero bytes, as joints of libraries have it.
 fn name_of(motion: &Motion, track: usize) -> String {
     motion.set.track_name(track).replace('\0', "")
 }
 
-/// The tracks of a clip by their names, of which no two may be the same.
+/// The indices of a clip's tracks by name; an error if two tracks have the same name.
 fn tracks_by_name(motion: &Motion, clip: usize) -> Result<HashMap<String, usize>, Failure> {
     let mut tracks = HashMap::new();
     for track in 0..motion.set.track_count() {
@@ -80,12 +80,18 @@ fn joints(file: &TumbleFile) -> Result<Vec<LibraryJoint>, Failure> {
     Ok(joints)
 }
 
-/// An empty library for the skeleton of a file: the joints of all of its clips, by name, with their
-/// parents and rest positions; all of them are roots if the file has no hierarchy. Its clips are then
-/// pushed by `tumble_crowd_library_push_clip`. `ticks_per_second` is as in `tumble_crowd_library_new`.
+/// Creates an empty library for the skeleton of a file. `tumble_crowd_library_push_clip` adds clips to it.
+///
+/// Its joints are those of all clips of the file, matched by name, with their parents and rest positions; the joints
+/// of the first clip come first. All of them are roots if the file has no hierarchy. `ticks_per_second` is as in
+/// `tumble_crowd_library_new`. The caller frees the library with `tumble_crowd_library_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if a clip has two joints of the same name, or a joint has another parent in another
+/// clip.
 ///
 /// # Safety
-/// `library` has room for a handle.
+/// `library` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_of_file(
     file: *const TumbleFile,
@@ -102,8 +108,8 @@ pub unsafe extern "C" fn tumble_crowd_library_of_file(
     })
 }
 
-/// The tracks of a clip in the order of a library's joints. Joints that the clip does not have rest, and
-/// what it does not key is as it rests in the clip's own file.
+/// The tracks of a clip in the order of a library's joints. Joints that the clip does not have are at rest in the
+/// library's pose; channels that it has no keys for are at rest in the pose of the clip's file.
 fn matched(
     library: &TumbleCrowdLibrary,
     motion: &Motion,
@@ -152,7 +158,7 @@ fn matched(
     Ok(set.select(order)?)
 }
 
-/// The one method of all rotations that move.
+/// The method by which the file interpolates all rotations that change; an error if there are several.
 fn authored_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
     let moves = |&track: &usize| {
         let keys = motion
@@ -183,14 +189,23 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
     })
 }
 
-/// Adds a clip of a file, whose joints are known by their names. Joints that the clip does not have stay
-/// where they rest, and it must have none that the library has not. `interpolation` and `vectors` are as
-/// in `tumble_crowd_library_push`; null is what the file says, which must then be one method for all
-/// rotations and one for all translations and scales.
+/// Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
+/// `tumble_crowd_library_of_file`.
+///
+/// Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
+/// `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
+/// `tumble_crowd_library_push`, but null stands for the methods of the file, which must be one method for all
+/// rotations, and one for all translations and scales. `clip` receives the clip's index in the library, counted from
+/// 0; it may be null.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
+/// not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
 ///
 /// # Safety
-/// `interpolation` is null or such a structure, `vectors` null or text that ends with a zero, and
-/// `clip`, where the clip's number in the library goes, null or room for one.
+/// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+/// zero byte; `vectors` must be null or a text that ends with a zero byte; and `clip` must be null or point to memory
+/// for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_push_clip(
     library: *mut TumbleCrowdLibrary,

@@ -1,4 +1,4 @@
-//! What one layer of an instance plays.
+//! A layer of an instance: the clip that it plays, and its time, speed and weight.
 
 use tumble::WrapMode;
 use tumble::crowd::CrowdLayer;
@@ -6,37 +6,38 @@ use tumble::crowd::CrowdLayer;
 use crate::arguments::{flag, option};
 use crate::result::Failure;
 
-/// What a layer of an instance plays. If all is zero but `size`, it stands still at the start of the first clip.
+/// What a layer of an instance plays: a clip, and its time, speed, wrap mode and weight. If all members except
+/// `size`, `instance` and `layer` are 0, the layer stands still at the start of the first clip, with weight 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct TumbleCrowdLayer {
     /// `sizeof(TumbleCrowdLayer)`.
     pub size: usize,
-    /// The instance, from 0.
+    /// The index of the instance, from 0.
     pub instance: usize,
-    /// Its layer, from 0; higher ones are laid over lower ones.
+    /// The index of the layer in the instance, from 0. Each layer is blended over the layers with lower indices.
     pub layer: usize,
-    /// The clip, by its number in the library.
+    /// The index of the clip in the library, from 0.
     pub clip: usize,
-    /// The time in the clip, ticks; `wrap` says what happens outside of the clip.
+    /// The layer's current time in the clip, ticks. Outside the clip `wrap` applies.
     pub time: i64,
-    /// Ticks of the clip for a tick of the clock: 1 as keyed, 0 to stand still, negative to run
-    /// backwards; magnitudes below 128, kept in units of 2^-16.
+    /// The speed: ticks of the clip for each tick of the clock. 1: as keyed, 0: the layer stands still, negative:
+    /// backwards. Its magnitude is below 128; it is rounded to a multiple of 2^-16.
     pub speed: f32,
-    /// The weight with which it is blended over the layers below, 0 to 1, stored in units of 2^-15. The first layer
-    /// has no weight.
+    /// The weight with which the layer is blended over the layers below, 0 to 1, rounded to a multiple of 2^-15. The
+    /// weight of layer 0 is ignored.
     pub weight: f32,
-    /// A `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
+    /// The motion outside the clip: a `TumbleWrap`, but not `TUMBLE_WRAP_EXTRAPOLATE`.
     pub wrap: u32,
-    /// 1: the clip's difference from its reference pose is added to the layers below; 0: it is blended
-    /// over them.
+    /// 1: the clip's difference from its reference pose is added to the layers below. 0: the layers below are
+    /// interpolated towards the clip.
     pub additive: u32,
-    /// 0: all joints take part; or a mask, by the number that `tumble_crowd_library_push_mask` gave.
+    /// The number of a mask, from `tumble_crowd_library_push_mask`; 0: all joints take part.
     pub mask: usize,
 }
 
 impl TumbleCrowdLayer {
-    /// The instance, the layer, and what it is to play; `index` is for messages.
+    /// The instance, the layer and its new state; `index` is the change's index for messages.
     pub(crate) fn change(&self, index: usize) -> Result<(usize, usize, CrowdLayer), Failure> {
         let size = size_of::<Self>();
         if self.size != size {
@@ -59,7 +60,7 @@ impl TumbleCrowdLayer {
         Ok((self.instance, self.layer, plays))
     }
 
-    /// The same for C.
+    /// The state of a layer as a structure for C.
     pub(crate) fn new(instance: usize, layer: usize, plays: CrowdLayer) -> Self {
         let wrap = WrapMode::ALL.iter().position(|&wrap| wrap == plays.wrap);
         Self {

@@ -14,16 +14,17 @@ use crate::interpolation::TumbleInterpolation;
 use crate::result::{Failure, TumbleResult, code, guarded};
 use crate::set::TumbleSet;
 
-/// Clips of one skeleton, prepared for crowds. Any number of threads may use it at once.
+/// A library: the clips, masks and inverse bind matrices of one skeleton, prepared for crowds. Any number of threads
+/// may use it at the same time.
 pub struct TumbleCrowdLibrary {
     inner: RwLock<CrowdLibrary>,
     pub(crate) joints: Vec<LibraryJoint>,
 }
 
-/// A joint, and where it is where no clip moves it.
+/// A joint, with its transform in clips that do not move it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LibraryJoint {
-    /// Empty in libraries that were made of arrays.
+    /// Empty in libraries that were made from arrays.
     pub(crate) name: CString,
     pub(crate) parent: Option<usize>,
     pub(crate) rest: Transform,
@@ -34,7 +35,7 @@ impl Object for TumbleCrowdLibrary {
 }
 
 impl TumbleCrowdLibrary {
-    /// An empty library; 0 ticks stand for the default.
+    /// An empty library; 0 ticks mean the default.
     pub(crate) fn new(joints: Vec<LibraryJoint>, ticks_per_second: u32) -> Result<Self, Failure> {
         let parents = joints.iter().map(|joint| joint.parent).collect();
         let offsets = joints.iter().map(|joint| joint.rest.translation).collect();
@@ -56,14 +57,22 @@ impl TumbleCrowdLibrary {
     }
 }
 
-/// Creates an empty library for a skeleton that is given by arrays. `parents` has the index of each joint's parent, -1 for a
-/// root; parents may come after their children. `offsets` has three numbers for each joint: where it
-/// is in its parent's frame if a clip has no translations for it; null: at the parent.
-/// `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
+/// Creates an empty library for a skeleton of `joint_count` joints.
+///
+/// `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
+/// are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
+/// for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
+/// 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+/// `tumble_crowd_library_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
+/// `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+/// offset is not finite.
 ///
 /// # Safety
-/// `parents` has `joint_count` numbers, `offsets` is null or has three times as many, and `library` has
-/// room for a handle.
+/// `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
+/// point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_new(
     parents: *const i32,
@@ -109,10 +118,10 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
     })
 }
 
-/// The method for translations and scales that a name says.
+/// The method for translations and scales with this name; `other` if `name` is null.
 ///
 /// # Safety
-/// `name` is null or text that ends with a zero.
+/// `name` must be null or a text that ends with a zero byte.
 pub(crate) unsafe fn vector_method(
     name: *const c_char,
     other: impl FnOnce() -> Result<VectorMethod, Failure>,
@@ -127,16 +136,25 @@ pub(crate) unsafe fn vector_method(
     }
 }
 
-/// Adds a clip: a track for each joint, in their order, the rotations by `interpolation` and the
-/// translations and scales by `vectors`: "step", "linear", "catmull-rom", "bessel-overhauser",
-/// "gltf-cubic", "c2" or "b-spline"; null is "linear". Joints without translations hang at their
-/// offsets. Instances say what happens outside the keys, so `before` and `after` do not count. The
-/// clip's reference pose, for additive layers, is its pose at its start. If anything is refused, the
-/// library is as it was.
+/// Adds a clip to a library.
+///
+/// `set` has one track for each joint, in the same order. Rotations are interpolated by `interpolation`, or by the
+/// defaults if it is null. Translations and scales are interpolated by the method `vectors`: "step", "linear",
+/// "catmull-rom", "bessel-overhauser", "gltf-cubic", "c2" or "b-spline"; null: "linear". Joints without translations
+/// stay at their offsets. `before` and `after` of `interpolation` are ignored, because each layer of an instance has
+/// its wrap mode. The reference pose of the clip, for additive layers, is its pose at its start
+/// (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track cannot be interpolated as
+/// requested, the quantity is not the rotation, a curve rotates so fast that no polynomial fits it, the clip is too
+/// long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown. After any error the library
+/// is unchanged.
 ///
 /// # Safety
-/// `interpolation` is null (the defaults) or such a structure, `vectors` null or text that ends with a
-/// zero, and `clip`, where the clip's number goes, null or room for one.
+/// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
+/// zero byte; `vectors` must be null or a text that ends with a zero byte; and `clip` must be null or point to memory
+/// for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_push(
     library: *mut TumbleCrowdLibrary,
@@ -163,11 +181,17 @@ pub unsafe extern "C" fn tumble_crowd_library_push(
     })
 }
 
-/// Adds a mask, a weight from 0 to 1 for each joint, which layers' weights are multiplied with. There
-/// can be 31. `mask` gets its number, from 1, as `TumbleCrowdLayer.mask` takes it.
+/// Adds a mask: a weight from 0 to 1 for each joint, by which the weights of layers are multiplied.
+///
+/// `joint_count` must be the library's number of joints. A library has up to 31 masks. `mask` receives the number of
+/// the mask for `TumbleCrowdLayer.mask`, counted from 1; it may be null.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if there is not one weight for each joint, a weight is outside 0 to 1, or the
+/// library has 31 masks already.
 ///
 /// # Safety
-/// `weights` has `joint_count` numbers, and `mask` is null or has room for a number.
+/// `weights` must have `joint_count` numbers, and `mask` must be null or point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_push_mask(
     library: *mut TumbleCrowdLibrary,
@@ -187,12 +211,17 @@ pub unsafe extern "C" fn tumble_crowd_library_push_mask(
     })
 }
 
-/// Sets the inverse bind matrix of every joint: the inverse of its model matrix in the bind pose,
-/// three rows of four numbers each, for column vectors, the last column the translation, as results are.
-/// (A matrix of 16 numbers in columns, as glTF has them, has `m[0] m[4] m[8] m[12]` in its first row.)
+/// Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose.
+///
+/// `matrices` are 12 numbers for each joint, as in results: three rows of four, for column vectors; the last column
+/// is the translation. (The 16 numbers `m` of a glTF matrix are in columns: its first row is `m[0] m[4] m[8] m[12]`.)
+/// `joint_count` must be the library's number of joints.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_INPUT` if there is not one matrix for each joint, or a number is not finite.
 ///
 /// # Safety
-/// `matrices` has 12 × `joint_count` numbers.
+/// `matrices` must have 12 × `joint_count` numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_set_inverse_bind(
     library: *mut TumbleCrowdLibrary,
@@ -218,8 +247,11 @@ pub unsafe extern "C" fn tumble_crowd_library_set_inverse_bind(
     })
 }
 
-/// Makes the pose of the clip `from` at a tick, held at its ends, the reference pose of `clip`: what
-/// additive layers of it differ from.
+/// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
+/// After the end of `from` it is its last pose.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_set_reference(
     library: *mut TumbleCrowdLibrary,
@@ -233,26 +265,26 @@ pub extern "C" fn tumble_crowd_library_set_reference(
     })
 }
 
-/// The number of joints; 0 for an invalid handle.
+/// Returns the number of joints; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_count(library: *const TumbleCrowdLibrary) -> usize {
     guarded(|| Ok(handle::get(library)?.joints.len())).unwrap_or(0)
 }
 
-/// The number of clips; 0 for an invalid handle.
+/// Returns the number of clips; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_clip_count(library: *const TumbleCrowdLibrary) -> usize {
     guarded(|| Ok(handle::get(library)?.read()?.clip_count())).unwrap_or(0)
 }
 
-/// Ticks of a second; 0 for an invalid handle.
+/// Returns the number of ticks in a second; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_ticks_per_second(library: *const TumbleCrowdLibrary) -> u32 {
     guarded(|| Ok(handle::get(library)?.read()?.ticks_per_second())).unwrap_or(0)
 }
 
-/// The length of a clip, ticks: from the first key of any channel to the last, at least 1. 0 if there
-/// is no such clip.
+/// Returns the length of a clip in ticks: from its first key (of a rotation, translation or scale) to its last, and
+/// at least 1; 0 if there is no such clip.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_clip_ticks(
     library: *const TumbleCrowdLibrary,
@@ -270,8 +302,8 @@ pub extern "C" fn tumble_crowd_library_clip_ticks(
     ticks.unwrap_or(0)
 }
 
-/// The name of a joint, empty in libraries that were made of arrays: UTF-8, valid until the library is
-/// freed; null where there is no such joint.
+/// Returns the name of a joint, empty in a library of `tumble_crowd_library_new`: UTF-8, valid until the library is
+/// freed; null if there is no such joint.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_name(
     library: *const TumbleCrowdLibrary,
@@ -289,11 +321,14 @@ pub extern "C" fn tumble_crowd_library_joint_name(
     name.unwrap_or(std::ptr::null())
 }
 
-/// The index of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
+/// Copies the indices of the joints' parents into `parents`, -1 for a root. `joint_count` must be the number of
 /// joints.
 ///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_SIZE` if `joint_count` is another number.
+///
 /// # Safety
-/// `parents` has room for `joint_count` numbers, which nothing else uses during the call.
+/// `parents` must have memory for `joint_count` numbers, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_library_parents(
     library: *const TumbleCrowdLibrary,
@@ -318,7 +353,7 @@ pub unsafe extern "C" fn tumble_crowd_library_parents(
     })
 }
 
-/// Frees a library; crowds that were made of it stay. Null is allowed.
+/// Frees a library. Crowds that were made from it stay valid. Does nothing if `library` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_free(library: *mut TumbleCrowdLibrary) -> TumbleResult {
     code(|| handle::free(library))

@@ -1,4 +1,4 @@
-//! Crowds: many instances of one skeleton, each at its own time in clips of its own.
+//! Crowds: many instances of one skeleton, each of which plays clips at its time and speed.
 
 pub mod fade;
 pub mod file;

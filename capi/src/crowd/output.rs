@@ -1,4 +1,4 @@
-//! Evaluating crowds into the caller's memory.
+//! Evaluation of crowds into the caller's memory.
 
 use tumble::crowd::{Crowd, CrowdError, CrowdOutput, CrowdValues};
 
@@ -7,29 +7,29 @@ use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{Failure, TumbleResult, code};
 
-/// What is written for every joint of every instance, in the order `[instance][joint]`.
+/// The values that are stored for every joint of every visible instance, in the order `[instance][joint]`.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleCrowdValues {
-    /// The rotation in the parent's frame, four numbers: `x y z w`.
+    /// The rotation in the parent's frame: four numbers `x y z w`.
     Rotations = 0,
-    /// The transform in the parent's frame, twelve numbers: three rows of four, for column vectors, the
-    /// last column the translation.
+    /// The transform in the parent's frame: a matrix of twelve numbers, three rows of four, for column vectors. The
+    /// last column is the translation.
     Local = 1,
-    /// The transform in the model, likewise.
+    /// The transform in the model's frame, as a matrix of the same form.
     Model = 2,
-    /// The transform in the model times the inverse bind matrix, likewise: what vertices are skinned
-    /// with.
+    /// The transform in the model's frame times the inverse bind matrix, as a matrix of the same form, for skinning
+    /// of vertices.
     Skinning = 3,
 }
 
-/// The values of a constant, in 32 or in 16 bits.
+/// The output for a C constant, in 32 or 16 bits.
 pub(crate) fn output(values: u32, is_half: bool) -> Result<CrowdOutput, Failure> {
     let values = option(values, &CrowdValues::ALL, "values")?;
     Ok(CrowdOutput { values, is_half })
 }
 
-/// Memory of the caller's that is exactly as large as a result.
+/// The caller's memory for a result; an error if `count` is not exactly the result's size.
 ///
 /// # Safety
 /// As [`list_mut`].
@@ -54,10 +54,11 @@ unsafe fn vectors<'a, T: Number>(
     Ok(output.as_chunks_mut::<4>().0)
 }
 
-/// How many numbers a result has: 4 or 12 × joints × instances, those that are visible.
+/// Returns the number of numbers of a result: 4 for rotations, or 12 for matrices, × joints × visible instances.
+/// `values` is a `TumbleCrowdValues`.
 ///
 /// # Safety
-/// `count` has room for a number.
+/// `count` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_output_count(
     crowd: *const TumbleCrowd,
@@ -74,11 +75,18 @@ pub unsafe extern "C" fn tumble_crowd_output_count(
     })
 }
 
-/// Evaluates all instances, or those that are visible, at the clock's time into the caller's memory, and waits until it is done.
-/// `values` is a `TumbleCrowdValues`; `output_count` is exactly as `tumble_crowd_output_count` says.
+/// Evaluates all visible instances at the clock's time into the caller's memory, and waits for the result.
+///
+/// `values` is a `TumbleCrowdValues`. `output_count` is the number of floats of `output`, exactly that of
+/// `tumble_crowd_output_count`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_WRONG_STATE` if the result of
+/// `tumble_crowd_submit` was not taken, or skinning matrices are requested but the library has no inverse bind
+/// matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
-/// `output` has room for `output_count` floats, which nothing else uses during the call.
+/// `output` must have `output_count` floats, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_evaluate(
     crowd: *mut TumbleCrowd,
@@ -96,10 +104,11 @@ pub unsafe extern "C" fn tumble_crowd_evaluate(
     })
 }
 
-/// As `tumble_crowd_evaluate`, in 16 bits: the bits of halves (IEEE 754), rounded to nearest.
+/// As `tumble_crowd_evaluate`, in 16 bits: each number is the bits of an IEEE 754 half-precision float, rounded to
+/// nearest.
 ///
 /// # Safety
-/// `output` has room for `output_count` halves, which nothing else uses during the call.
+/// `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_evaluate_half(
     crowd: *mut TumbleCrowd,
@@ -117,10 +126,16 @@ pub unsafe extern "C" fn tumble_crowd_evaluate_half(
     })
 }
 
-/// Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it while
-/// instances and the clock are changed for the next one. The CPU evaluates before this returns. The
-/// result must be taken by `tumble_crowd_wait`, or by `tumble_crowd_wait_half` where `half` is 1, before
-/// anything else is evaluated or submitted.
+/// Starts an evaluation of all visible instances at the clock's time and returns at once.
+///
+/// `values` is a `TumbleCrowdValues`. `half` is 0 for a result in 32 bits, 1 for 16 bits. A Vulkan device evaluates
+/// while instances and the clock are changed for the next frame; the CPU evaluates before this function returns. The
+/// caller takes the result with `tumble_crowd_wait`, or with `tumble_crowd_wait_half` if `half` is 1, before it
+/// evaluates or submits again.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
+/// requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_submit(
     crowd: *mut TumbleCrowd,
@@ -134,10 +149,13 @@ pub extern "C" fn tumble_crowd_submit(
     })
 }
 
-/// Whether what was submitted is done, so that `tumble_crowd_wait` does not wait.
+/// Returns whether the submitted evaluation has ended, so that `tumble_crowd_wait` does not wait.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted; `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
-/// `done` has room for a truth value.
+/// `done` must point to memory for a `bool`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_poll(
     crowd: *const TumbleCrowd,
@@ -152,8 +170,8 @@ pub unsafe extern "C" fn tumble_crowd_poll(
     })
 }
 
-/// Waits for what was submitted in 32 or 16 bits, and takes its result. What has the other precision, or
-/// another size, stays.
+/// Waits for an evaluation that was submitted in 32 or 16 bits, and takes its result. If the precision or the size
+/// differs, the result can still be taken.
 ///
 /// # Safety
 /// As [`list_mut`].
@@ -176,11 +194,18 @@ unsafe fn wait<T: Number>(
     Ok(take(&mut state.inner, output)?)
 }
 
-/// Waits for what was submitted with `half` 0, and takes its result. If an argument is refused, the
-/// result can still be taken.
+/// Waits for an evaluation that was submitted with `half` 0, and takes its result.
+///
+/// `output_count` is the number of floats of `output`: exactly the `tumble_crowd_output_count` at the time of the
+/// submission.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
+/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+/// if the device fails.
 ///
 /// # Safety
-/// `output` has room for `output_count` floats, which nothing else uses during the call.
+/// `output` must have `output_count` floats, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_wait(
     crowd: *mut TumbleCrowd,
@@ -191,11 +216,18 @@ pub unsafe extern "C" fn tumble_crowd_wait(
     code(|| unsafe { wait(crowd, false, (output, output_count), Crowd::wait_into) })
 }
 
-/// Waits for what was submitted with `half` 1, and takes its result. If an argument is refused, the
-/// result can still be taken.
+/// Waits for an evaluation that was submitted with `half` 1, and takes its result.
+///
+/// `output_count` is the number of numbers of 16 bits of `output`: exactly the `tumble_crowd_output_count` at the
+/// time of the submission.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
+/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
+/// if the device fails.
 ///
 /// # Safety
-/// `output` has room for `output_count` halves, which nothing else uses during the call.
+/// `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_wait_half(
     crowd: *mut TumbleCrowd,

@@ -1,4 +1,4 @@
-//! Crowds, and what their instances play.
+//! Crowds, the layers of their instances, and the clock.
 
 use std::sync::{Mutex, MutexGuard};
 
@@ -11,8 +11,8 @@ use crate::engine::TumbleEngine;
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
 
-/// Many instances of a library's skeleton, each of which plays clips at a separate time and speed. Threads
-/// that use the same crowd at once wait for each other.
+/// A crowd: many instances of a library's skeleton, each of which plays clips at its time and speed. Calls of several
+/// threads on the same crowd run one after another.
 pub struct TumbleCrowd {
     state: Mutex<State>,
     /// Whether its engine is on the application's Vulkan device.
@@ -21,7 +21,7 @@ pub struct TumbleCrowd {
 
 pub(crate) struct State {
     pub(crate) inner: Crowd,
-    /// Memory for what is set, kept from call to call.
+    /// Memory for the changes of a call, reused by the next one.
     changes: Vec<(usize, usize, CrowdLayer)>,
 }
 
@@ -35,12 +35,20 @@ impl TumbleCrowd {
     }
 }
 
-/// Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each. All of them stand still at the start of
-/// the library's first clip until they are set. The library is copied, to the device too: what is
-/// pushed to it later is not in this crowd.
+/// Creates a crowd of 1 to 1 000 000 instances with 1 to 4 layers each, on an engine's device.
+///
+/// All instances stand still at the start of the library's first clip until `tumble_crowd_set` changes them; the
+/// layers above the first have weight 0. The clock starts at 0. The library is copied, also to the device: later
+/// changes of it do not reach the crowd. The engine and the library may be freed before the crowd. The caller frees
+/// the crowd with `tumble_crowd_free`.
+///
+/// # Errors
+/// `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
+/// instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
+/// enough memory or the device fails.
 ///
 /// # Safety
-/// `crowd` has room for a handle.
+/// `crowd` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_new(
     engine: *const TumbleEngine,
@@ -65,11 +73,18 @@ pub unsafe extern "C" fn tumble_crowd_new(
     })
 }
 
-/// Sets what layers of instances play from now on: 16 bytes each that reach the device with the next
-/// evaluation. Of two for the same layer the later one counts. If one is refused, none is set.
+/// Sets what layers of instances play from now on. `layers` is an array of `count` changes.
+///
+/// A fade of a layer that is set ends. If two changes are for one layer, the later one counts. The changes, at most
+/// 20 bytes each, reach the device with the next evaluation.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
+/// if another member is invalid. The message has the index of the first change that is refused. After any error
+/// nothing changes.
 ///
 /// # Safety
-/// `layers` has `count` such structures.
+/// `layers` must have `count` structures.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_set(
     crowd: *mut TumbleCrowd,
@@ -90,11 +105,15 @@ pub unsafe extern "C" fn tumble_crowd_set(
     })
 }
 
-/// What a layer of an instance plays, and where it stands now; speed and weight are as they were rounded.
-/// `layer->size`, `layer->instance` and `layer->layer` say which, the rest is written.
+/// Returns what a layer of an instance plays, with its current time. Speed and weight are the rounded ones.
+///
+/// The caller sets `layer->size`, `layer->instance` and `layer->layer`; the call writes the other members.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 ///
 /// # Safety
-/// `layer` is such a structure, which nothing else uses during the call.
+/// `layer` must point to a `TumbleCrowdLayer`, which nothing else uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_get(
     crowd: *const TumbleCrowd,
@@ -124,10 +143,13 @@ pub unsafe extern "C" fn tumble_crowd_get(
     })
 }
 
-/// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
+/// Returns the tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's length.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
 ///
 /// # Safety
-/// `tick` has room for a number.
+/// `tick` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_tick(
     crowd: *const TumbleCrowd,
@@ -144,23 +166,31 @@ pub unsafe extern "C" fn tumble_crowd_tick(
     })
 }
 
-/// Advances the clock of all instances by the ticks nearest to a number of seconds. Where the sum must not
-/// drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
+/// Moves the clock of all instances forward by `seconds`, rounded to ticks.
+///
+/// The rounding errors of many steps add up. If the clock must follow frames exactly, as in a film at 30000/1001
+/// frames a second, use `tumble_crowd_set_clock` with each frame's time.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if `seconds` is negative or not finite, or the clock would reach 2^52 ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_advance(crowd: *mut TumbleCrowd, seconds: f64) -> TumbleResult {
     code(|| Ok(handle::get(crowd)?.lock()?.inner.advance(seconds)?))
 }
 
-/// Sets the clock, ticks below 2^52; all instances move with it, forwards or backwards.
+/// Sets the clock's time, ticks, forwards or backwards. All instances follow.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_set_clock(crowd: *mut TumbleCrowd, ticks: u64) -> TumbleResult {
     code(|| Ok(handle::get(crowd)?.lock()?.inner.set_clock(ticks)?))
 }
 
-/// The clock, ticks.
+/// Returns the clock's time, ticks.
 ///
 /// # Safety
-/// `ticks` has room for a number.
+/// `ticks` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_clock(
     crowd: *const TumbleCrowd,
@@ -175,7 +205,8 @@ pub unsafe extern "C" fn tumble_crowd_clock(
     })
 }
 
-/// Frees a crowd, after waiting for what was submitted; its targets stay. Null is allowed.
+/// Frees a crowd, after waiting for a submitted evaluation. Its targets stay valid until they are freed. Does nothing
+/// if `crowd` is null.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_free(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| handle::free(crowd))

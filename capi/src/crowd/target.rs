@@ -1,4 +1,4 @@
-//! Crowds on an application's own Vulkan device, recorded into its own command buffers.
+//! Crowds on an application's Vulkan device, recorded into the application's command buffers.
 
 use std::ffi::c_void;
 
@@ -11,7 +11,8 @@ use crate::handle::{self, Object};
 use crate::result::{TumbleResult, code};
 use crate::vulkan::buffer_range;
 
-/// A range of an application's buffer that a crowd is evaluated into, with all that recording needs.
+/// A crowd target: everything that is needed to record evaluations of a crowd, and the range of the application's
+/// buffer that receives their results.
 pub struct TumbleCrowdTarget {
     inner: CrowdTarget,
 }
@@ -20,18 +21,26 @@ impl Object for TumbleCrowdTarget {
     const NAME: &'static str = "crowd target";
 }
 
-/// Prepares everything to evaluate into a range of an application's buffer, on the device of
-/// `tumble_engine_from_vulkan`: kernels are compiled and memory is allocated here, and not when a frame
-/// is recorded. `values` is a `TumbleCrowdValues`, and `half` 1 for numbers of 16 bits. `buffer` is the
-/// `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has
-/// at least `tumble_crowd_output_count` × 4 bytes, × 2 with `half`: as many instances as have room there may be
-/// visible later.
+/// Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 ///
-/// The buffer belongs to that device, has memory, and was made for use as
-/// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; it stays the application's, and lives longer than the target.
+/// Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
+/// created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
+/// `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
+/// `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
+/// `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
+/// instances than are visible now, more may be visible later.
+///
+/// The buffer must belong to the engine's device, be bound to memory, and have the usage
+/// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it
+/// destroys the buffer or the device.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
+/// `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
+/// matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
-/// The buffer is as said, and `target` has room for a handle.
+/// The buffer must be as described, and `target` must point to memory for a handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_target_new(
     crowd: *const TumbleCrowd,
@@ -55,20 +64,27 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
     })
 }
 
-/// Records an evaluation at the clock's time into the application's `VkCommandBuffer`: up to 20 bytes for each
-/// layer that changed since the last evaluation, 4 for each instance of a new list of visible ones, and the dispatches. Nothing is waited for, submitted or
-/// allocated. What is recorded behind it, or submitted to the same queue later, sees the result; it
-/// waits for all that was recorded before it.
+/// Records an evaluation at the clock's time into the application's command buffer `commands`, a `VkCommandBuffer`.
 ///
-/// The command buffer is of the engine's device and of the family of its queue, in recording, outside of
-/// a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
-/// after a frame that is thrown away, call `tumble_crowd_forget_recorded`. The library submits to that
-/// queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
-/// `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
-/// application keeps these calls and its own submissions from one another.
+/// The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
+/// instance of a new list of visible instances, and dispatch the kernels. If no instance is visible, nothing is
+/// recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
+/// commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
+/// see the result.
+///
+/// The command buffer must belong to the engine's device and to the family of the engine's queue, and must be in the
+/// recording state, outside a render pass. Everything that is recorded must be submitted to the engine's queue, once
+/// and in the order of the calls. If a recorded frame is discarded, call `tumble_crowd_forget_recorded`.
+/// `tumble_engine_from_vulkan` says which calls of the library submit to that queue: the application must not submit
+/// at the same time without a lock.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
+/// instances are visible than it has room for. After any error nothing is recorded.
 ///
 /// # Safety
-/// The command buffer is as said, and its work is submitted as said.
+/// The command buffer must be as described, nothing else may use it during the call, and its commands must be
+/// submitted as described.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_record(
     crowd: *mut TumbleCrowd,
@@ -85,8 +101,8 @@ pub unsafe extern "C" fn tumble_crowd_record(
     })
 }
 
-/// Forgets what was recorded: the next evaluation writes all layers again.
-/// Call it if a recorded frame was discarded.
+/// Marks all layers as unknown to the device, so that the next evaluation writes all of them. Call it if a recorded
+/// frame was discarded.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_forget_recorded(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| {
@@ -95,10 +111,10 @@ pub extern "C" fn tumble_crowd_forget_recorded(crowd: *mut TumbleCrowd) -> Tumbl
     })
 }
 
-/// Frees a target, after all work that was recorded with it has ended. Null is allowed.
+/// Frees a crowd target. Does nothing if `target` is null.
 ///
 /// # Safety
-/// No such work is in flight.
+/// All work that was recorded with the target must have ended, and none may be submitted later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_target_free(target: *mut TumbleCrowdTarget) -> TumbleResult {
     code(|| handle::free(target))

@@ -5,12 +5,18 @@ use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{TumbleResult, code};
 
-/// From now on evaluates the instances of a list alone, as a camera sees them: a result has their rows and no others,
-/// in the list's order, with the bits that they have among all. The others go on meanwhile. The list is in any
-/// order, names no instance twice, and may be empty; it is copied. If it is refused, everything stays.
+/// Limits evaluations to a list of `count` instances, for example those that a camera sees.
+///
+/// A result then has the rows of these instances only, in the list's order, with the same bits as among all
+/// instances. The clips of the other instances continue. The list may be in any order and may be empty; no instance
+/// may be in it twice. It is copied.
+///
+/// # Errors
+/// `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist; `TUMBLE_RESULT_INVALID_ARGUMENT` if it is in the list
+/// twice. After any error nothing changes.
 ///
 /// # Safety
-/// `instances` has `count` numbers.
+/// `instances` must have `count` numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_set_visible(
     crowd: *mut TumbleCrowd,
@@ -25,7 +31,7 @@ pub unsafe extern "C" fn tumble_crowd_set_visible(
     })
 }
 
-/// From now on evaluates all instances again.
+/// Makes all instances visible again, in the order of their indices.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_set_all_visible(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| {
@@ -34,10 +40,10 @@ pub extern "C" fn tumble_crowd_set_all_visible(crowd: *mut TumbleCrowd) -> Tumbl
     })
 }
 
-/// How many instances are evaluated: as many as the list has, or all.
+/// Returns the number of visible instances: the length of the list, or the number of all instances without a list.
 ///
 /// # Safety
-/// `count` has room for a number.
+/// `count` must point to memory for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_visible_count(
     crowd: *const TumbleCrowd,
