@@ -113,9 +113,7 @@ impl TrackSet {
         if let Some(key) = ups.iter().position(has_no_length) {
             return Err(TrackError::NoUp { track, key });
         }
-        check_finite(track, "point of the path", &points, |point| {
-            point.is_finite()
-        })?;
+        check_vectors(track, "point of the path", &points, &[])?;
         self.push(name, &times[..1], &[Quat::IDENTITY])?;
         self.set_translations(track, times, &points, &[])?;
         if let Some(path) = &mut self.vectors[Channel::Translation as usize][track] {
@@ -152,27 +150,7 @@ impl TrackSet {
         if !tangents.is_empty() {
             check_length(track, "tangents", keys.len(), tangents.len())?;
         }
-        let quantity = "vector or its tangent";
-        check_finite(track, quantity, &keys, |key| key.is_finite())?;
-        check_finite(track, quantity, tangents, |[arriving, leaving]| {
-            arriving.is_finite() && leaving.is_finite()
-        })?;
-        let limit = LARGEST_VECTOR;
-        let is_too_large = |vector: &Vec3| vector.abs().max_element() > limit as f32;
-        let key = keys.iter().position(is_too_large);
-        let key = key.or_else(|| {
-            tangents
-                .iter()
-                .position(|both| both.iter().any(is_too_large))
-        });
-        if let Some(key) = key {
-            return Err(TrackError::DataTooLarge {
-                track,
-                key,
-                quantity,
-                limit,
-            });
-        }
+        check_vectors(track, "vector or its tangent", &keys, tangents)?;
         self.widen_span(times);
         let tracks = self.track_count();
         let vectors = &mut self.vectors[channel as usize];
@@ -202,5 +180,31 @@ impl TrackSet {
     /// A track's translations or scales, if it has any.
     pub(crate) fn vectors(&self, channel: Channel, track: usize) -> Option<&VectorTrack> {
         (self.vectors[channel as usize].get(track)?).as_deref()
+    }
+}
+
+/// Refuses vectors and tangents that are not finite or too large.
+fn check_vectors(
+    track: usize,
+    quantity: &'static str,
+    keys: &[Vec3],
+    tangents: &[[Vec3; 2]],
+) -> Result<(), TrackError> {
+    check_finite(track, quantity, keys, |key| key.is_finite())?;
+    check_finite(track, quantity, tangents, |[arriving, leaving]| {
+        arriving.is_finite() && leaving.is_finite()
+    })?;
+    let limit = LARGEST_VECTOR;
+    let is_too_large = |vector: &Vec3| vector.abs().max_element() > limit as f32;
+    let key = keys.iter().position(is_too_large);
+    let has_too_large = |both: &[Vec3; 2]| both.iter().any(is_too_large);
+    match key.or_else(|| tangents.iter().position(has_too_large)) {
+        Some(key) => Err(TrackError::DataTooLarge {
+            track,
+            key,
+            quantity,
+            limit,
+        }),
+        None => Ok(()),
     }
 }
