@@ -943,7 +943,9 @@ TumbleResult tumble_set_track_name(const struct TumbleSet *set,
  # Safety
  `first` and `last` must each point to memory for a number.
  */
-TumbleResult tumble_set_time_span(const struct TumbleSet *set, double *first, double *last);
+TumbleResult tumble_set_time_span(const struct TumbleSet *set,
+                                  double *first,
+                                  double *last);
 
 /*
  Frees a set. Clips that were made from it stay valid. Does nothing if `set` is null.
@@ -964,7 +966,8 @@ TumbleResult tumble_set_free(struct TumbleSet *set);
  # Safety
  `path` must be a text that ends with a zero byte, and `file` must point to memory for a handle.
  */
-TumbleResult tumble_file_load(const char *path, struct TumbleFile **file);
+TumbleResult tumble_file_load(const char *path,
+                              struct TumbleFile **file);
 
 /*
  Returns the number of clips that could be read; 0 if the handle is invalid. Other functions take the index of a
@@ -976,7 +979,8 @@ size_t tumble_file_clip_count(const struct TumbleFile *file);
  Returns the name of a clip, empty if it has none: UTF-8, valid until the file is freed; null if there is no such
  clip.
  */
-const char *tumble_file_clip_name(const struct TumbleFile *file, size_t clip);
+const char *tumble_file_clip_name(const struct TumbleFile *file,
+                                  size_t clip);
 
 /*
  Creates a set with the rotations, translations and scales of all tracks of a clip. The set is a copy: it does not
@@ -1044,7 +1048,8 @@ size_t tumble_file_message_count(const struct TumbleFile *file);
  Returns the message `index`, counted from 0: UTF-8, valid until the file is freed; null if there is no such
  message.
  */
-const char *tumble_file_message(const struct TumbleFile *file, size_t index);
+const char *tumble_file_message(const struct TumbleFile *file,
+                                size_t index);
 
 /*
  Frees a file. Sets and libraries that were made from it stay valid. Does nothing if `file` is null.
@@ -1462,13 +1467,15 @@ uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *
  Returns the length of a clip in ticks: from its first key (of a rotation, translation or scale) to its last, and
  at least 1; 0 if there is no such clip.
  */
-uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library, size_t clip);
+uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *library,
+                                         size_t clip);
 
 /*
  Returns the name of a joint, empty in a library of `tumble_crowd_library_new`: UTF-8, valid until the library is
  freed; null if there is no such joint.
  */
-const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library, size_t joint);
+const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library,
+                                            size_t joint);
 
 /*
  Copies the indices of the joints' parents into `parents`, -1 for a root. `joint_count` must be the number of
@@ -1729,7 +1736,8 @@ TumbleResult tumble_crowd_set_all_visible(struct TumbleCrowd *crowd);
  # Safety
  `count` must point to memory for a number.
  */
-TumbleResult tumble_crowd_visible_count(const struct TumbleCrowd *crowd, size_t *count);
+TumbleResult tumble_crowd_visible_count(const struct TumbleCrowd *crowd,
+                                        size_t *count);
 
 /*
  Returns the number of numbers of a result: 4 for rotations, or 12 for matrices, × joints × visible instances.
@@ -1814,7 +1822,9 @@ TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
  */
-TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd, float *output, size_t output_count);
+TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd,
+                               float *output,
+                               size_t output_count);
 
 /*
  Waits for an evaluation that was submitted with `half` 1, and takes its result.

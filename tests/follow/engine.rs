@@ -621,9 +621,9 @@ fn what_cannot_be_followed_is_refused() {
         .push_path("", &[0.0], &[Vec3::ZERO], &[Some(Vec3::ZERO)])
         .unwrap_err();
     assert!(matches!(up, TrackError::NoUp { key: 0, .. }));
-    let far = set.push_path("", &[0.0], &[Vec3::splat(2e30)], &[]);
-    let far = far.unwrap_err();
-    assert!(matches!(far, TrackError::DataTooLarge { key: 0, .. }));
+    let too_large = set.push_path("", &[0.0], &[Vec3::splat(2e30)], &[]);
+    let too_large = too_large.unwrap_err();
+    assert!(matches!(too_large, TrackError::DataTooLarge { key: 0, .. }));
     // A refused path leaves no track.
     assert_eq!((set.track_count(), set.time_span()), (0, None));
 
