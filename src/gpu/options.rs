@@ -77,6 +77,19 @@ pub enum Mapping {
     Samples,
 }
 
+/// Where the arcs of [`SLERP`](crate::method::SLERP) are prepared for a Vulkan device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PrepareArcs {
+    /// Of many keys on the card, if it has memory of its own; else on the host.
+    #[default]
+    Automatic,
+    /// On the host, which uploads keys and arcs.
+    OnHost,
+    /// On the device, to which keys are uploaded, and 4 bytes for each arc. Arcs between keys whose signs are
+    /// [as authored](crate::KeySigns::AsAuthored) are prepared on the host all the same.
+    OnDevice,
+}
+
 /// Choices for an [`Engine`](crate::engine::Engine); none of them changes a bit of any result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -104,6 +117,8 @@ pub struct EngineOptions {
     pub reads: Reads,
     /// How a Vulkan device's invocations share the samples.
     pub mapping: Mapping,
+    /// Where arcs are prepared for a Vulkan device.
+    pub prepare_arcs: PrepareArcs,
     /// Use a device although it fails the self-test: its bits may differ.
     pub allow_inexact: bool,
 }

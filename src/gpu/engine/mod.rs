@@ -1,5 +1,6 @@
 //! Evaluation on a Vulkan device.
 
+mod arcs;
 #[cfg(feature = "prove")]
 pub(crate) mod choices;
 pub(crate) mod from_keys;
@@ -66,6 +67,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
+    /// Keys from which on the arcs between them are prepared on the device.
+    prepares_arcs_from: usize,
     /// Whether the caller's memory is imported where the device can.
     pub(crate) imports: bool,
     /// Rotations of one window.
@@ -107,6 +110,7 @@ impl VulkanEngine {
             keys_in_flight: Exclusive::default(),
             in_flight_count,
             maps_samples: device.physical.maps_samples(options.mapping),
+            prepares_arcs_from: arcs::prepared_from(options.prepare_arcs, info.kind),
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
@@ -275,7 +279,7 @@ impl VulkanEngine {
         }
     }
 
-    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,
+    /// Copies a clip's segments to the device, or prepares them there. The buffers of `spare`, which are no longer needed,
     /// are used again where they are large enough.
     pub(crate) fn upload(
         &self,
@@ -290,16 +294,22 @@ impl VulkanEngine {
             .groups
             .iter()
             .map(|group| {
-                let segments = group.segments.as_bytes();
                 let constants = bytemuck::cast_slice(&group.constants);
-                self.check_size("segments", segments)?;
+                let segment_bytes = group.segments.bytes_on_device() as u64;
+                (self.device.physical).check_range("segments", segment_bytes)?;
                 self.check_size("keys", constants)?;
-                Ok((
-                    self.resident("tumble segments", segments, &mut segments_of)?,
-                    self.resident("tumble constants", constants, &mut constants_of)?,
-                ))
+                let segments = match group.segments.are_arcs_listed {
+                    true => self.room_for_arcs(segment_bytes, &mut segments_of)?,
+                    false => {
+                        let segments = group.segments.as_bytes();
+                        self.resident("tumble segments", segments, &mut segments_of)?
+                    }
+                };
+                let constants = self.resident("tumble constants", constants, &mut constants_of)?;
+                Ok((segments, constants))
             })
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<Vec<_>, VulkanError>>()?;
+        self.prepare_arcs(clip, &groups)?;
         let device = Arc::clone(&self.device);
         Ok(ClipBuffers { device, groups })
     }
