@@ -228,7 +228,7 @@ pub mod vulkan {
         //! How an engine uses its device, for measurements and tests. Every choice gives the same bits, and
         //! `Automatic`, the default of each, is right for programs.
 
-        pub use crate::gpu::options::{Mapping, ReadBack, Reads, Transfer, Uploads};
+        pub use crate::gpu::options::{Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads};
     }
 }
 

@@ -7,7 +7,7 @@ use crate::support::{
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{ReferenceCurve, angle_between};
-use tumble::vulkan::tuning::Transfer;
+use tumble::vulkan::tuning::{PrepareArcs, Transfer};
 use tumble::{
     Device, Encoding, Ends, Engine, EngineOptions, Interpolation, KeySigns, Layout, METHODS,
     Rotations, SampleTimes, TrackSet, VectorWidth, WrapMode, method,
@@ -183,6 +183,11 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
                         stage(options, variant + budget);
                     }
                     (options.reads, options.mapping) = (reads, mapping);
+                    // With each budget both.
+                    options.prepare_arcs = match (variant + budget / 2) % 2 {
+                        0 => PrepareArcs::OnDevice,
+                        _ => PrepareArcs::OnHost,
+                    };
                     options.memory = memory;
                 });
                 for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {

@@ -187,6 +187,21 @@ const FROM_KEYS: [(&str, &[&str], usize); 3] = [
     ("cubics", &["from_keys/small_angle"], 3),
 ];
 
+/// The kernel that prepares arcs: its files.
+const PREPARE_ARCS: [&str; 5] = [
+    "math/canonical",
+    "math/sine_cosine",
+    "forms/evaluate_arc",
+    "from_keys/arc_between",
+    "prepare_arcs",
+];
+
+/// What it reads. Keys are the constants of a clip.
+static INTERVALS: [Read; 2] = [
+    read("keys", "vec4u", "key_at"),
+    read("intervals", "u32", "interval_at"),
+];
+
 /// Kernels over evaluated poses.
 const POSES: [&str; 6] = [
     "poses/add",
@@ -365,5 +380,11 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
         });
     }
+    kernels.push(Kernel {
+        name: "prepare_arcs".to_owned(),
+        files: PREPARE_ARCS.to_vec(),
+        reads: INTERVALS.iter().collect(),
+        has_texels: false,
+    });
     kernels
 }

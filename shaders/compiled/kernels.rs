@@ -58,6 +58,7 @@ pub(crate) const COSM1_1: f32 = -0.5;
 pub(crate) const COSM1_2: f32 = 0.041666668;
 pub(crate) const CROWD_WORKGROUP: u32 = 64;
 pub(crate) const DEGREES: f32 = 57.29578;
+pub(crate) const END_NEGATED: u32 = 2147483648;
 pub(crate) const FLUSHED_BITS: u32 = 645922816;
 pub(crate) const FORM_ARC: u32 = 1;
 pub(crate) const FORM_CONSTANT: u32 = 0;
@@ -75,6 +76,7 @@ pub(crate) const IS_KEY: u32 = 2147483648;
 pub(crate) const ITEM_SAMPLES: u32 = 16;
 pub(crate) const KEY_AT_END: f32 = 1.0;
 pub(crate) const KEY_INNER: f32 = 0.0;
+pub(crate) const KEY_OF_INTERVAL: u32 = 1073741823;
 pub(crate) const KEY_UNKNOWN: f32 = 2.0;
 pub(crate) const LEAST_NORMAL: u32 = 947912704;
 pub(crate) const LEAST_SQUARED_SUM: f32 = 9.094947e-13;
@@ -93,6 +95,7 @@ pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PI: f32 = 3.1415927;
 pub(crate) const PI_LOW: f32 = -8.742278e-8;
 pub(crate) const POSE_WORKGROUP: u32 = 64;
+pub(crate) const PREPARE_WORKGROUP: u32 = 64;
 pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
 pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
 pub(crate) const QUARTER_COSINE_6: f32 = -0.0013887301;
@@ -137,6 +140,7 @@ pub(crate) const SMALL_SQUARED_EXTENT: f32 = 0.001;
 pub(crate) const SNORM_SHIFT: f32 = 12582912.0;
 pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
 pub(crate) const START_BIAS: u32 = 131072;
+pub(crate) const START_NEGATED: u32 = 1073741824;
 pub(crate) const SYMMETRIC: u32 = 64;
 pub(crate) const THIRD: f32 = 0.33333334;
 pub(crate) const TICKS: u32 = 2147483647;
@@ -161,6 +165,16 @@ const _: () = {
     assert!(size_of::<ArcSegment>() == 32);
     assert!(std::mem::offset_of!(ArcSegment, middle) == 0);
     assert!(std::mem::offset_of!(ArcSegment, tangent) == 16);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ArcsDispatch {
+/// How many there are.
+    pub(crate) count: u32,
+}
+const _: () = {
+    assert!(size_of::<ArcsDispatch>() == 4);
+    assert!(std::mem::offset_of!(ArcsDispatch, count) == 0);
 };
 /// Which items the samples of 32 neighbouring positions belong to.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -689,6 +703,7 @@ pub(crate) enum Kernel {
     CrowdWalkAll,
     CrowdSkin,
     CrowdHalf,
+    PrepareArcs,
 }
 /// How the work over segments is listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -798,7 +813,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 101] = [
+pub(crate) static KERNELS: [KernelCode; 102] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3536), texels: Some(("arc_frames_euler_texels", 3654)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
@@ -900,4 +915,5 @@ pub(crate) static KERNELS: [KernelCode; 101] = [
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1264), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, bindings: 2, segments: None },
+    KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1808), texels: None, bindings: 3, segments: None },
 ];

@@ -52,6 +52,12 @@ impl Backend {
         self.opened().map(|opened| opened.engine().group_bytes)
     }
 
+    /// Whether a Vulkan device prepares the arcs between so many keys.
+    pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
+        self.opened()
+            .is_some_and(|opened| opened.engine().prepares_arcs(keys))
+    }
+
     /// Bytes that segments may take, if there is a limit.
     pub(crate) fn budget(&self) -> Option<usize> {
         match self {

@@ -50,6 +50,7 @@ impl Uploaded {
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
         to_prepare.group_bytes = backend.group_bytes();
+        to_prepare.lists_arcs = backend.prepares_arcs(to_prepare.batch.keys(set));
         let data = ClipData::new(set, interpolation, to_prepare)?;
         Self::of_data(backend, data, spare)
     }

@@ -112,6 +112,10 @@ pub(crate) mod engine {
             match self.never {}
         }
 
+        pub(crate) fn prepares_arcs(&self, _keys: usize) -> bool {
+            match self.never {}
+        }
+
         pub(crate) fn upload(
             &self,
             _clip: &ClipData,

@@ -76,6 +76,19 @@ pub enum Mapping {
     Samples,
 }
 
+/// Where the arcs of [`SLERP`](crate::method::SLERP) are prepared for a Vulkan device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PrepareArcs {
+    /// On a discrete card for many keys, otherwise on the host.
+    #[default]
+    Automatic,
+    /// On the host, which uploads keys and arcs.
+    OnHost,
+    /// On the device, to which keys and 4 bytes for each arc are uploaded. Arcs between keys whose signs are
+    /// [as authored](crate::KeySigns::AsAuthored) are always prepared on the host.
+    OnDevice,
+}
+
 /// Options of an [`Engine`](crate::engine::Engine). None of them changes any bit of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -102,6 +115,8 @@ pub struct EngineOptions {
     pub reads: Reads,
     /// How samples are distributed to invocations of a Vulkan device.
     pub mapping: Mapping,
+    /// Where arcs are prepared for a Vulkan device.
+    pub prepare_arcs: PrepareArcs,
     /// Whether a device is used although it fails the self-test; its bits may differ from the CPU's.
     pub allow_inexact: bool,
 }

@@ -115,6 +115,9 @@ impl Opened {
             for list in engine.lists() {
                 engine.pipeline(Kernel::over_segments(form, list, encoding.row().store))?;
             }
+            if form == Form::Arc && engine.prepares_arcs(usize::MAX) {
+                engine.pipeline(Kernel::PrepareArcs)?;
+            }
             if encoding == Encoding::F32 {
                 for kernel in [
                     Kernel::FromKeysArcs,

@@ -1,5 +1,6 @@
 //! Preparation of arcs from keys in vector lanes: one key interval in each lane. A block is filled with intervals of
-//! several tracks.
+//! several tracks. If a device prepares the arcs, lists the intervals for it: the
+//! twin of `shaders/prepare_arcs.wgsl`.
 
 use std::ops::Range;
 
@@ -9,7 +10,7 @@ use crate::curve::options::KeySigns;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
 use crate::prepare::prepared::Prepared;
-use crate::shader::ArcSegment;
+use crate::shader::{ArcSegment, END_NEGATED, START_NEGATED};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::runs::NONE;
@@ -79,7 +80,13 @@ impl ArcPreparation {
             spans.starts.extend_from_slice(&times[intervals.clone()]);
             spans.sources.extend(indices.map(SpanSource::Segment));
             spans.keys.extend(first_key..last_key);
-            self.push(prepared, keys, set.signs(index), intervals.clone());
+            let signs = set.signs(index);
+            if prepared.segments.are_arcs_listed {
+                let listed = listed(signs, intervals.clone(), first_key);
+                prepared.segments.intervals.extend(listed);
+            } else {
+                self.push(prepared, keys, signs, intervals.clone());
+            }
         } else {
             for (key, constant) in intervals.clone().zip(first_key..) {
                 let [start, end] = [times[key], times[key + 1]];
@@ -143,6 +150,18 @@ impl ArcPreparation {
         let arcs = arcs.map(|(&middle, &tangent)| ArcSegment { middle, tangent });
         prepared.segments.arcs.extend(arcs.take(count));
     }
+}
+
+/// Intervals of a track as the device reads them, the first of which begins with the constant `first_key`.
+fn listed(signs: Signs<'_>, intervals: Range<usize>, first_key: u32) -> impl Iterator<Item = u32> {
+    let is_any_negated = signs.between(intervals.start..intervals.end + 1).any();
+    intervals.zip(first_key..).map(move |(key, constant)| {
+        let flag = |key, flag| match is_any_negated && signs.is_negated(key) {
+            true => flag,
+            false => 0,
+        };
+        constant | flag(key, START_NEGATED) | flag(key + 1, END_NEGATED)
+    })
 }
 
 /// The middle of an arc between two keys if the arc exceeds 180°; then it becomes two arcs.

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
+use crate::curve::options::{Axes, InterpolationError, KeySigns, Quantity, Speed};
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
@@ -55,6 +55,9 @@ pub(crate) struct PrepareRequest<'a> {
     /// Groups are made large from the start and not merged, because copying them together would take longer than one
     /// dispatch for each.
     pub(crate) large_groups: bool,
+    /// Arcs are listed for a device that computes them, where the list says all that it needs: not as
+    /// keys are authored, since arcs of more than half a turn are cut in f64.
+    pub(crate) lists_arcs: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
     /// Groups whose memory is reused.
@@ -68,6 +71,7 @@ impl PrepareRequest<'_> {
             batch: Batch::Tracks(0..set.track_count()),
             group_bytes: None,
             large_groups: false,
+            lists_arcs: false,
             only_for: None,
             spare: Vec::new(),
         }
@@ -97,6 +101,9 @@ fn prepare(
         cut: (interpolation.speed == Speed::AsKeyed).then_some(PART_INTERVALS),
     };
     let only_for = (request.only_for).filter(|_| interpolation.wrap().are_held());
+    let lists_arcs = request.lists_arcs
+        && interpolation.form() == Form::Arc
+        && interpolation.signs == KeySigns::Shortest;
     let first_track = request.batch.tracks().start as u32;
     let spare = Mutex::new(request.spare);
     let stop = stop::current();
@@ -104,6 +111,7 @@ fn prepare(
         let reused = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut prepared = reused.unwrap_or_else(|| Prepared::new(interpolation));
         prepared.clear();
+        prepared.segments.are_arcs_listed = lists_arcs;
         let mut preparation = Preparation::new(interpolation);
         if let Some(timeline) = only_for {
             preparation.only_for(timeline, set);
@@ -111,11 +119,7 @@ fn prepare(
         let keys = match &batch {
             // As many as have a sample; these lists are not kept.
             Batch::Intervals { .. } if preparation.leaves_intervals_out() => 0,
-            Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
-            Batch::Span { .. } | Batch::Intervals { .. } => {
-                let intervals = batch.intervals(set);
-                intervals.map(|(_, intervals)| intervals.len() + 1).sum()
-            }
+            batch => batch.keys(set),
         };
         prepared.reserve(keys)?;
         stop::during(stop.clone(), || {
@@ -365,8 +369,7 @@ fn merge(groups: Vec<Prepared>, limit: usize) -> Vec<Prepared> {
     let bytes = |group: &Prepared| {
         group
             .segments
-            .as_bytes()
-            .len()
+            .bytes_on_device()
             .max(size_of_val(group.constants.as_slice()))
     };
     let mut merged: Vec<Vec<Prepared>> = Vec::new();

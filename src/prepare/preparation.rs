@@ -199,6 +199,17 @@ impl Batch {
         }
     }
 
+    /// Keys of all its intervals.
+    pub(crate) fn keys(&self, set: &TrackSet) -> usize {
+        match self {
+            Self::Tracks(tracks) => set.keys_of(tracks.clone()),
+            Self::Span { .. } | Self::Intervals { .. } => {
+                let intervals = self.intervals(set);
+                intervals.map(|(_, intervals)| intervals.len() + 1).sum()
+            }
+        }
+    }
+
     /// Each track with the intervals of it that belong to the batch.
     pub(crate) fn intervals(&self, set: &TrackSet) -> impl Iterator<Item = (usize, Range<usize>)> {
         let batch = self.clone();

@@ -11,14 +11,16 @@ use crate::fit::exact::fit::IntervalCurve;
 use crate::math::quaternion::round_quat;
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
-use crate::shader::{ArcSegment, Form, PolynomialSegment};
+use crate::shader::{
+    ArcSegment, END_NEGATED, Form, KEY_OF_INTERVAL, PolynomialSegment, START_NEGATED,
+};
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{NONE, Parameter};
 use crate::time::spans::{SpanSource, Spans, TrackExtension, TrackPart};
 use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
-use crate::twin::Evaluate as _;
+use crate::twin::{COARSE, Evaluate as _};
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 pub(crate) struct Prepared {
@@ -81,6 +83,7 @@ impl Prepared {
     /// Removes everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.segments.arcs.clear();
+        self.segments.intervals.clear();
         self.segments.polynomials.clear();
         self.constants.clear();
         self.exact.clear();
@@ -148,10 +151,41 @@ impl Prepared {
                 ..part
             }));
         self.segments.arcs.extend(other.segments.arcs);
+        // The key's index has room: a buffer of a device has fewer keys.
+        let intervals = other.segments.intervals.into_iter();
+        (self.segments.intervals).extend(intervals.map(|interval| interval + constants));
         let polynomials = other.segments.polynomials;
         self.segments.polynomials.extend(polynomials);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
+    }
+
+    /// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
+    /// those ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)). Of arcs that only the device knows
+    /// it may be true where none has.
+    #[inline(always)]
+    pub(crate) fn may_be_tiny(&self, index: u32) -> bool {
+        let (segments, index) = (&self.segments, index as usize);
+        match segments.form {
+            Form::Arc if segments.are_arcs_listed => self.may_be_tiny_between(index),
+            Form::Arc => !segments.arcs[index].is_canonical(),
+            Form::Polynomial => !segments.polynomials[index].is_canonical(),
+        }
+    }
+
+    /// The same of an arc that is listed: each component of its middle is at least as large as that of half the sum
+    /// of its keys, which [`arc_between`](crate::twin::arc_between::arc_between) lengthens.
+    fn may_be_tiny_between(&self, index: usize) -> bool {
+        let interval = self.segments.intervals[index];
+        let key = (interval & KEY_OF_INTERVAL) as usize;
+        let [start, end] = [self.constants[key], self.constants[key + 1]];
+        let is_start_negated = interval & START_NEGATED != 0;
+        let sign = match is_start_negated == (interval & END_NEGATED != 0) {
+            true => 1.0,
+            false => -1.0,
+        };
+        let is_zero = |c: usize| start[c] == 0.0 && end[c] == 0.0;
+        (0..4).any(|c| ((start[c] + end[c] * sign) * 0.5).abs() < COARSE && !is_zero(c))
     }
 
     /// The value of a sample by the `index`th curve of `exact`, evaluated in f64.
@@ -296,11 +330,16 @@ impl Prepared {
     }
 }
 
-/// The segments of one clip, all of one form: the list of the other form stays empty.
+/// The segments of one clip, all of one form and in one list: the others stay empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     pub(crate) form: Form,
+    /// Whether arcs are not computed, but listed in `intervals` for a device to compute.
+    pub(crate) are_arcs_listed: bool,
     pub(crate) arcs: Vec<ArcSegment>,
+    /// The interval of each arc as the device reads it: the index of the constant that is the key before it, with
+    /// [`START_NEGATED`] and [`END_NEGATED`].
+    pub(crate) intervals: Vec<u32>,
     pub(crate) polynomials: Vec<PolynomialSegment>,
 }
 
@@ -308,17 +347,20 @@ impl Segments {
     pub(crate) fn new(form: Form) -> Self {
         Self {
             form,
+            are_arcs_listed: false,
             arcs: Vec::new(),
+            intervals: Vec::new(),
             polynomials: Vec::new(),
         }
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.arcs.len() + self.polynomials.len()
+        self.arcs.len() + self.intervals.len() + self.polynomials.len()
     }
 
     pub(crate) fn reserve(&mut self, count: usize) {
         match self.form {
+            Form::Arc if self.are_arcs_listed => self.intervals.reserve(count),
             Form::Arc => self.arcs.reserve(count),
             Form::Polynomial => self.polynomials.reserve(count),
         }
@@ -326,6 +368,7 @@ impl Segments {
 
     fn reserve_exact(&mut self, count: usize) {
         match self.form {
+            Form::Arc if self.are_arcs_listed => self.intervals.reserve_exact(count),
             Form::Arc => self.arcs.reserve_exact(count),
             Form::Polynomial => self.polynomials.reserve_exact(count),
         }
@@ -333,21 +376,18 @@ impl Segments {
 
     pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
         match self.form {
+            Form::Arc if self.are_arcs_listed => self.intervals.try_reserve(count),
             Form::Arc => self.arcs.try_reserve(count),
             Form::Polynomial => self.polynomials.try_reserve(count),
         }
     }
 
-    /// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
-    /// those ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)).
-    #[inline(always)]
-    pub(crate) fn may_be_tiny(&self, index: u32) -> bool {
-        match self.form {
-            Form::Arc => !self.arcs[index as usize].is_canonical(),
-            Form::Polynomial => !self.polynomials[index as usize].is_canonical(),
-        }
+    /// Bytes that they take where kernels read them.
+    pub(crate) fn bytes_on_device(&self) -> usize {
+        self.len() * segment_size(self.form)
     }
 
+    /// Those that are computed.
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self.form {
             Form::Arc => bytemuck::cast_slice(&self.arcs),

@@ -5,7 +5,7 @@
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
-use tumble::vulkan::tuning::Mapping;
+use tumble::vulkan::tuning::{Mapping, PrepareArcs};
 use tumble::vulkan::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 use tumble::{Engine, EngineOptions, Error};
 
@@ -111,6 +111,9 @@ impl Application {
     pub(crate) fn try_engine(&self, mapping: Mapping) -> Result<Engine, Error> {
         let mut options = EngineOptions::default();
         options.mapping = mapping;
+        if mapping == Mapping::Samples {
+            options.prepare_arcs = PrepareArcs::OnDevice;
+        }
         // SAFETY: the handles belong together and outlive the engine.
         unsafe { Engine::from_vulkan(self.handles(), &options) }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::vulkan::tuning::{Mapping, ReadBack, Reads, Transfer, Uploads};
+use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads};
 use tumble::{Device, Engine, EngineOptions, SampleTimes, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
@@ -31,6 +31,14 @@ pub const KERNEL_OPTIONS: [(Reads, Mapping); 3] = [
     (Reads::TexelBuffers, Mapping::Runs),
     (Reads::StorageBuffers, Mapping::Samples),
 ];
+
+/// Where arcs are prepared, with kernels that are used so: each way with some of [`KERNEL_OPTIONS`].
+pub fn prepare_arcs(kernel: (Reads, Mapping)) -> PrepareArcs {
+    match kernel {
+        (Reads::StorageBuffers, Mapping::Runs) => PrepareArcs::OnHost,
+        _ => PrepareArcs::OnDevice,
+    }
+}
 
 /// How uploads come to a device whose results are staged, and how these are copied back.
 pub const STAGED: [(Uploads, ReadBack); 3] = [
@@ -64,6 +72,7 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
         for &(reads, mapping) in kernel_options() {
             let mut options = EngineOptions::default();
             (options.reads, options.mapping) = (reads, mapping);
+            options.prepare_arcs = prepare_arcs((reads, mapping));
             change(&mut options);
             let new = || Engine::with_options(device.clone(), &options).unwrap();
             let engine = open.entry(format!("{index} {options:?}"));

@@ -7,11 +7,13 @@ use crate::from_keys::arcs::TwoKeyBlock;
 use crate::from_keys::cubics::CubicBlock;
 use crate::math::canonical::canonical;
 use crate::shader::{
-    ArcSegment, Form, IS_CONSTANT, IS_KEY, KEY_INNER, PolynomialSegment, ROWS_PER_INVOCATION,
+    ArcSegment, END_NEGATED, Form, IS_CONSTANT, IS_KEY, KEY_INNER, PREPARE_WORKGROUP,
+    PolynomialSegment, ROWS_PER_INVOCATION, START_NEGATED,
 };
 use crate::simd::dispatch::in_lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
+use crate::twin::arc_between::arc_between;
 
 use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;
@@ -291,6 +293,37 @@ fn from_four_keys() -> Twin {
     })
 }
 
+/// An interval with signs of both keys, the others of the list beside it.
+fn prepared_arcs() -> Twin {
+    const BEFORE: u32 = PREPARE_WORKGROUP; // a workgroup above this one
+    const COUNT: u32 = BEFORE + 3;
+    with_globals("prepare_arcs", "main", |random, trial| {
+        let index = BEFORE + random.below(COUNT - BEFORE);
+        let pair = random.pair();
+        let negated = [random.once_in(2), random.once_in(2)];
+        let mut keys = [0; 4].map(|_| random.unit().map(f32::to_bits));
+        let key = random.below(3);
+        for (j, (authored, is_negated)) in pair.into_iter().zip(negated).enumerate() {
+            let stored = authored.map(|c| if is_negated { -c } else { c });
+            keys[key as usize + j] = stored.map(f32::to_bits);
+        }
+        let flag = |is_negated, flag| if is_negated { flag } else { 0 };
+        let flags = flag(negated[0], START_NEGATED) | flag(negated[1], END_NEGATED);
+        let mut intervals = [0; COUNT as usize];
+        intervals[index as usize] = key | flags;
+        trial.argument([index - BEFORE, 1, 0]);
+        trial.argument([1u32, 2, 1]);
+        trial.global("dispatch", index + 1);
+        trial.global("keys", keys);
+        trial.global("intervals", intervals);
+        trial.output("rotations");
+        trial.expect(vec![[UNTOUCHED; 4]; 2 * index as usize]);
+        let (middle, tangent) = arc_between(pair[0], pair[1]);
+        trial.expect(middle);
+        trial.expect(tangent);
+    })
+}
+
 pub(super) fn evaluation() -> Vec<Twin> {
     vec![
         runs::<ArcSegment>(false),
@@ -302,5 +335,6 @@ pub(super) fn evaluation() -> Vec<Twin> {
         from_two_keys("from_keys_arcs", Form::Arc),
         from_two_keys("from_keys_two_keys", Form::Polynomial),
         from_four_keys(),
+        prepared_arcs(),
     ]
 }

@@ -218,6 +218,7 @@ pub(super) fn readers() -> Vec<Twin> {
             reader(crowd, "position_at", "positions", 2),
         ]);
     }
+    all.push(reader("prepare_arcs", "interval_at", "intervals", 1));
     all.push(with_globals(
         "arc_times_f32",
         "distance_from_middle",

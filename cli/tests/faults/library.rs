@@ -10,7 +10,7 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use tumble::crowd::{CrowdError, CrowdLibrary, CrowdValues};
 use tumble::vulkan::VulkanError;
-use tumble::vulkan::tuning::{ReadBack, Transfer, Uploads};
+use tumble::vulkan::tuning::{PrepareArcs, ReadBack, Transfer, Uploads};
 use tumble::{
     Device, Encoding, Engine, EngineOptions, Error, Layout, SampleTimes, Skeleton, TrackSet,
     VectorMethod, method,
@@ -86,6 +86,7 @@ fn library_work() {
         options.transfer = Transfer::Staged;
         options.uploads = Uploads::Staged;
         options.read_back = ReadBack::Overlapped;
+        options.prepare_arcs = PrepareArcs::OnDevice;
         let engine = Engine::with_options(devices[0].clone(), &options)?;
         let set = hostile_set(2, 8);
         let clip = engine.upload(&set, method::C2)?;
@@ -105,7 +106,14 @@ fn library_work() {
             exported.wait()?;
             exported.memory_file()?;
         }
-        // By segments, and straight from keys.
+        // By segments that are on the device already, by new ones, and straight from keys.
+        let arcs = engine.upload(&set, method::SLERP)?;
+        let found = arcs.evaluate(&frames)?;
+        let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;
+        assert_eq!(
+            first_difference(expected.as_quats(), found.as_quats()),
+            None
+        );
         for frames in [frames, SampleTimes::at(vec![0.3, 0.7])] {
             let found = engine.evaluate(&set, method::SLERP, &frames)?;
             let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;

@@ -87,13 +87,7 @@ impl SetPieces<'_> {
 
     /// The number of keys of the intervals that are prepared for a piece.
     fn keys(&self, piece: &Window) -> usize {
-        match self.batch(piece) {
-            Batch::Tracks(tracks) => self.set.keys_of(tracks),
-            batch => batch
-                .intervals(self.set)
-                .map(|(_, intervals)| intervals.len() + 1)
-                .sum(),
-        }
+        self.batch(piece).keys(self.set)
     }
 
     /// The intervals that are prepared for a piece.

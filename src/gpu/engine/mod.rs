@@ -1,5 +1,6 @@
 //! Evaluation on a Vulkan device.
 
+mod arcs;
 #[cfg(feature = "prove")]
 pub(crate) mod choices;
 pub(crate) mod from_keys;
@@ -67,6 +68,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
+    /// The number of keys from which on the arcs between them are prepared on the device.
+    prepares_arcs_from: usize,
     /// Whether the caller's memory is imported if the device can.
     pub(crate) imports: bool,
     /// Rotations of one window.
@@ -108,6 +111,7 @@ impl VulkanEngine {
             keys_in_flight: Exclusive::default(),
             in_flight_count,
             maps_samples: device.physical.maps_samples(options.mapping),
+            prepares_arcs_from: arcs::prepared_from(options.prepare_arcs, info.kind),
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
@@ -276,8 +280,8 @@ impl VulkanEngine {
         }
     }
 
-    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed, are reused if they
-    /// are large enough.
+    /// Copies a clip's segments to the device, or prepares them there. The buffers of `spare`, which are no longer
+    /// needed, are reused if they are large enough.
     pub(crate) fn upload(
         &self,
         clip: &ClipData,
@@ -291,16 +295,22 @@ impl VulkanEngine {
             .groups
             .iter()
             .map(|group| {
-                let segments = group.segments.as_bytes();
                 let constants = bytemuck::cast_slice(&group.constants);
-                self.check_size("segments", segments)?;
+                let segment_bytes = group.segments.bytes_on_device() as u64;
+                (self.device.physical).check_range("segments", segment_bytes)?;
                 self.check_size("keys", constants)?;
-                Ok((
-                    self.resident("tumble segments", segments, &mut segments_of)?,
-                    self.resident("tumble constants", constants, &mut constants_of)?,
-                ))
+                let segments = match group.segments.are_arcs_listed {
+                    true => self.room_for_arcs(segment_bytes, &mut segments_of)?,
+                    false => {
+                        let segments = group.segments.as_bytes();
+                        self.resident("tumble segments", segments, &mut segments_of)?
+                    }
+                };
+                let constants = self.resident("tumble constants", constants, &mut constants_of)?;
+                Ok((segments, constants))
             })
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<Vec<_>, VulkanError>>()?;
+        self.prepare_arcs(clip, &groups)?;
         let device = Arc::clone(&self.device);
         Ok(ClipBuffers { device, groups })
     }

@@ -7,13 +7,15 @@ use crate::from_keys::cubics::CubicBlock;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::dot;
 use crate::shader::{
-    FROM_KEYS_WORKGROUP, Form, IS_KEY, KEY_AT_END, KEY_INNER, Kernel, KeySample,
-    ROWS_PER_INVOCATION, RowShape, SIGN_NEGATED, TangentWeights,
+    ArcSegment, ArcsDispatch, END_NEGATED, FROM_KEYS_WORKGROUP, Form, IS_KEY, KEY_AT_END,
+    KEY_INNER, Kernel, KeySample, ROWS_PER_INVOCATION, RowShape, SIGN_NEGATED, START_NEGATED,
+    TangentWeights,
 };
 use crate::simd::dispatch::in_lanes;
+use crate::twin::arc_between::arc_between;
 
 use super::random::Random;
-use super::{Trial, bytes};
+use super::{Trial, bytes, groups};
 
 /// A key as a kernel reads it, with its original sign and with the sign for the shortest path.
 #[derive(Clone, Copy)]
@@ -55,6 +57,36 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
     // All rows of an invocation, or one each that begins where a line of memory does.
     [(ROWS_PER_INVOCATION, 0), (1, 7)]
         .map(|(each, line)| rows.trial(kernel, each, line))
+        .into()
+}
+
+/// Trials of the kernel that prepares arcs: between neighbouring keys, with signs of both, in one column of
+/// workgroups and in one row.
+pub(super) fn arc_trials() -> Vec<Trial> {
+    const COUNT: usize = 200;
+    let mut random = Random::canonical();
+    let (mut keys, mut intervals, mut arcs) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..COUNT {
+        let pair = random.pair();
+        let [start, end] = pair.map(|key| (key, random.once_in(3)));
+        let flag = |(_, is_negated), flag| if is_negated { flag } else { 0 };
+        let flags = flag(start, START_NEGATED) | flag(end, END_NEGATED);
+        intervals.push(keys.len() as u32 | flags);
+        let stored =
+            |(key, is_negated): ([f32; 4], bool)| if is_negated { key.map(|c| -c) } else { key };
+        keys.extend([stored(start), stored(end)]);
+        arcs.push(arc_between(pair[0], pair[1]));
+    }
+    let count = COUNT as u32;
+    [false, true]
+        .map(|in_row| {
+            let inputs = [bytes(&keys), bytes(&intervals)];
+            let mut trial = Trial::new(inputs, &ArcsDispatch { count }, groups(COUNT, in_row));
+            for (i, &(middle, tangent)) in arcs.iter().enumerate() {
+                trial.expect(i, &ArcSegment { middle, tangent });
+            }
+            trial
+        })
         .into()
 }
 

@@ -101,6 +101,7 @@ fn trials(kernel: Kernel) -> Vec<Trial> {
         Kernel::FromKeysArcs | Kernel::FromKeysTwoKeys | Kernel::FromKeysCubics => {
             from_keys::trials(kernel)
         }
+        Kernel::PrepareArcs => from_keys::arc_trials(),
         Kernel::PosesAdd
         | Kernel::PosesBlend
         | Kernel::PosesMix

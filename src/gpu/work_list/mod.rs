@@ -382,7 +382,7 @@ impl Emit for PartsList<'_> {
                         first_distance
                     }
                 };
-                if self.cut == Cut::Whole && prepared.segments.may_be_tiny(index) {
+                if self.cut == Cut::Whole && prepared.may_be_tiny(index) {
                     flags = MAY_BE_TINY;
                 }
             }

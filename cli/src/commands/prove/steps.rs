@@ -9,7 +9,7 @@ use tumble::verify::golden::Golden;
 use tumble::verify::random::round;
 use tumble::verify::renderer::renderer;
 use tumble::vulkan::VulkanDevice;
-use tumble::vulkan::tuning::{Mapping, ReadBack, Reads, Transfer, Uploads};
+use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads};
 use tumble::{Device, Engine, EngineOptions};
 
 use crate::commands::prove::report::{
@@ -59,7 +59,7 @@ struct DeviceSetting {
 /// How kernels read and what an invocation takes; how results and uploads are moved; a memory budget.
 type SettingParts = (
     (Reads, Mapping, &'static str),
-    (Transfer, Uploads, ReadBack, &'static str),
+    (Transfer, Uploads, ReadBack, PrepareArcs, &'static str),
     Option<u64>,
 );
 
@@ -70,12 +70,13 @@ impl DeviceSetting {
         (options.reads, options.mapping) = (reading.0, reading.1);
         (options.transfer, options.uploads, options.read_back) = (moving.0, moving.1, moving.2);
         options.memory = memory;
+        options.prepare_arcs = moving.3;
         let budget = match memory {
             Some(bytes) => format!("{} KiB of memory", bytes >> 10),
             None => "all memory".to_owned(),
         };
         Self {
-            name: format!("{}, {}, {budget}", reading.2, moving.3),
+            name: format!("{}, {}, {budget}", reading.2, moving.4),
             options,
         }
     }
@@ -90,19 +91,33 @@ impl DeviceSetting {
         ];
         let (uploads, read_back) = (Uploads::Automatic, ReadBack::Automatic);
         let moving = [
-            (Transfer::Automatic, uploads, read_back, "moved as chosen"),
+            (
+                Transfer::Automatic,
+                uploads,
+                read_back,
+                PrepareArcs::Automatic,
+                "moved as chosen",
+            ),
             (
                 Transfer::Staged,
                 Uploads::Staged,
                 ReadBack::Overlapped,
-                "staged, copied beside",
+                PrepareArcs::OnDevice,
+                "staged, copied beside, arcs prepared on the device",
             ),
-            (Transfer::InPlace, Uploads::Direct, read_back, "in place"),
+            (
+                Transfer::InPlace,
+                Uploads::Direct,
+                read_back,
+                PrepareArcs::OnDevice,
+                "in place, arcs prepared on the device",
+            ),
             (
                 Transfer::Staged,
                 Uploads::Direct,
                 ReadBack::SameQueue,
-                "staged, uploaded directly",
+                PrepareArcs::OnHost,
+                "staged, uploaded directly, arcs prepared on the host",
             ),
         ];
         let budgets = [None, Some(256 << 10)];
