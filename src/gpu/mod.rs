@@ -30,7 +30,7 @@
 //!    overwrites the rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys go to [`engine::from_keys`] without segments. Crowds have their own tables and
-//! targets ([`crowd`]); [`clip_target`] records a clip into an application's commands, and [`pass_target`] passes over
+//! targets ([`crowd`]), and on cards kernels that have all steps of a frame ([`whole_instances`]); [`clip_target`] records a clip into an application's commands, and [`pass_target`] passes over
 //! poses from buffer to buffer.
 //!
 //! # Where memory lies
@@ -80,4 +80,5 @@ pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;
+pub(crate) mod whole_instances;
 pub(crate) mod work_list;

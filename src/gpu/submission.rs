@@ -553,7 +553,7 @@ impl Drop for Semaphore {
 }
 
 /// The most buffers that a kernel binds.
-const MAX_BINDINGS: u32 = 6;
+const MAX_BINDINGS: u32 = 10;
 
 /// A pool of descriptor sets. Whoever has one drops it when no submitted work uses its sets any more.
 pub(crate) struct DescriptorPool {

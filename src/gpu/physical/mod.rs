@@ -24,7 +24,8 @@ use crate::shader::spirv::FloatControls;
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
 
-/// The most storage buffers that a kernel binds where none is a texel buffer. Vulkan promises 4.
+/// The most storage buffers that a kernel binds where none is a texel buffer, but for those over whole instances of
+/// crowds, which others can replace. Vulkan promises 4.
 const MAX_STORAGE_BUFFERS: u32 = 6;
 
 /// A physical device, not yet opened.
