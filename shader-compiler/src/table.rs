@@ -251,14 +251,22 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
     (
         "locals",
         &CHANNELS,
-        &["math/matrix", "crowd/layers", "crowd/locals"],
+        &[
+            "math/matrix",
+            "crowd/layers",
+            "crowd/transform",
+            "crowd/locals",
+        ],
     ),
     (
         "plain_locals",
         &PLAIN_CHANNELS,
-        &["math/matrix", "crowd/locals"],
+        &["math/matrix", "crowd/transform", "crowd/locals"],
     ),
 ];
+
+/// What comes with the dispatches of most kernels over a crowd.
+const CROWD_ARGUMENTS: [&str; 2] = ["crowd/workgroup", "crowd/dispatch"];
 
 /// Other kernels over a crowd.
 const CROWD: [(&str, &[&str]); 7] = [
@@ -269,6 +277,9 @@ const CROWD: [(&str, &[&str]); 7] = [
         &[
             "crowd/entry",
             "lists/frame_distance",
+            "crowd/time_tables",
+            "crowd/time_buffers",
+            "crowd/ticks",
             "crowd/times",
             "crowd",
         ],
@@ -279,6 +290,7 @@ const CROWD: [(&str, &[&str]); 7] = [
             "math/canonical",
             "crowd/affine",
             "crowd/link",
+            "crowd/link_buffers",
             "crowd/walk",
             "crowd",
         ],
@@ -289,6 +301,7 @@ const CROWD: [(&str, &[&str]); 7] = [
             "math/canonical",
             "crowd/affine",
             "crowd/link",
+            "crowd/link_buffers",
             "crowd/walk_all",
         ],
     ),
@@ -296,7 +309,53 @@ const CROWD: [(&str, &[&str]); 7] = [
         "skin",
         &["math/canonical", "crowd/affine", "crowd/skin", "crowd"],
     ),
-    ("half", &["math/half", "crowd/half", "crowd"]),
+    (
+        "half",
+        &[
+            "math/half",
+            "crowd/half_buffers",
+            "crowd/any_half",
+            "crowd/half",
+            "crowd",
+        ],
+    ),
+];
+
+/// What the kernels over whole instances share: they find positions, and store in either precision.
+const WHOLE: [&str; 7] = [
+    "crowd/workgroup",
+    "lists/frame_distance",
+    "crowd/time_tables",
+    "crowd/ticks",
+    "math/half",
+    "crowd/any_half",
+    "crowd/whole",
+];
+
+/// Files of those that evaluate matrices.
+const WHOLE_MATRICES: [&str; 5] = [
+    "math/matrix",
+    "crowd/transform",
+    "crowd/affine",
+    "crowd/link",
+    "crowd/whole_matrices",
+];
+
+/// Kernels over whole instances, for cards, each with the files that it needs beside those that it shares.
+const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
+    (
+        "whole_rotations",
+        &[&CHANNELS, &["crowd/layers", "crowd/whole_rotations"]],
+    ),
+    (
+        "plain_whole_rotations",
+        &[&PLAIN_CHANNELS, &["crowd/whole_rotations"]],
+    ),
+    (
+        "whole_matrices",
+        &[&CHANNELS, &["crowd/layers"], &WHOLE_MATRICES],
+    ),
+    ("plain_whole_matrices", &[&PLAIN_CHANNELS, &WHOLE_MATRICES]),
 ];
 
 /// The files of the self-test.
@@ -367,7 +426,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     for (name, shared, parts) in CROWD_JOINTS {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [&["crowd/dispatch"], shared, parts, &["stores/f32", "crowd"]].concat(),
+            files: [&CROWD_ARGUMENTS, shared, parts, &["stores/f32", "crowd"]].concat(),
             reads: CROWD_READS.iter().collect(),
             has_texels: true,
         });
@@ -375,7 +434,15 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     for (name, parts) in CROWD {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [&["crowd/dispatch"], parts].concat(),
+            files: [&CROWD_ARGUMENTS, parts].concat(),
+            reads: Vec::new(),
+            has_texels: false,
+        });
+    }
+    for (name, parts) in CROWD_WHOLE {
+        kernels.push(Kernel {
+            name: format!("crowd_{name}"),
+            files: [&WHOLE, &*parts.concat()].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

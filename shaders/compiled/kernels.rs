@@ -81,6 +81,7 @@ pub(crate) const KEY_UNKNOWN: f32 = 2.0;
 pub(crate) const LEAST_NORMAL: u32 = 947912704;
 pub(crate) const LEAST_SQUARED_SUM: f32 = 9.094947e-13;
 pub(crate) const LINE: u32 = 8;
+pub(crate) const LINE_VECTORS: u32 = 8;
 pub(crate) const LOG_1: f32 = 0.16666667;
 pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
@@ -89,6 +90,8 @@ pub(crate) const LONGEST_ANGLE_SQUARE: f32 = 2.4674;
 pub(crate) const LONGEST_STEP: f32 = 0.0034;
 pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
 pub(crate) const MAX_WALKED: u32 = 128;
+pub(crate) const MAX_WHOLE_JOINTS: u32 = 128;
+pub(crate) const MAX_WHOLE_POSITIONS: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
 pub(crate) const ON_KEY: u32 = 2147483648;
@@ -361,6 +364,55 @@ const _: () = {
     assert!(std::mem::offset_of!(CrowdSpan, whole) == 4);
     assert!(std::mem::offset_of!(CrowdSpan, scale) == 8);
     assert!(std::mem::offset_of!(CrowdSpan, offset) == 12);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdWholeDispatch {
+/// How many instances are evaluated.
+    pub(crate) count: u32,
+/// The first one.
+    pub(crate) first_instance: u32,
+/// Joints of the skeleton.
+    pub(crate) joints: u32,
+/// Layers of an instance.
+    pub(crate) layers: u32,
+/// The most time bases of a clip.
+    pub(crate) bases: u32,
+/// The first of the links that say where each level begins and ends.
+    pub(crate) first_link: u32,
+/// The clock, ticks: the lower 32 bits.
+    pub(crate) clock_low: u32,
+/// The clock's upper bits.
+    pub(crate) clock_high: u32,
+/// The cell of the first mask.
+    pub(crate) masks: u32,
+/// The cell of the first reference pose.
+    pub(crate) references: u32,
+/// Instances of a workgroup. They have `MAX_WHOLE_POSITIONS` time bases and `MAX_WHOLE_JOINTS` joints at most.
+    pub(crate) instances: u32,
+/// How many levels are walked; 0 where matrices stay in their parents' frames.
+    pub(crate) levels: u32,
+/// 1 where matrices are multiplied by the inverse bind matrices, else 0.
+    pub(crate) is_skinning: u32,
+/// 1 where values are stored in half precision, else 0.
+    pub(crate) is_half: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdWholeDispatch>() == 56);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, count) == 0);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, first_instance) == 4);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, joints) == 8);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, layers) == 12);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, bases) == 16);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, first_link) == 20);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, clock_low) == 24);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, clock_high) == 28);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, masks) == 32);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, references) == 36);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, instances) == 40);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, levels) == 44);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_skinning) == 48);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_half) == 52);
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -703,6 +755,10 @@ pub(crate) enum Kernel {
     CrowdWalkAll,
     CrowdSkin,
     CrowdHalf,
+    CrowdWholeRotations,
+    CrowdPlainWholeRotations,
+    CrowdWholeMatrices,
+    CrowdPlainWholeMatrices,
     PrepareArcs,
 }
 /// How the work over segments is listed.
@@ -813,7 +869,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 102] = [
+pub(crate) static KERNELS: [KernelCode; 106] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3536), texels: Some(("arc_frames_euler_texels", 3654)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
@@ -915,5 +971,9 @@ pub(crate) static KERNELS: [KernelCode; 102] = [
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1264), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, bindings: 2, segments: None },
+    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8627), texels: None, bindings: 8, segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5307), texels: None, bindings: 8, segments: None },
+    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10347), texels: None, bindings: 10, segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7035), texels: None, bindings: 10, segments: None },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1808), texels: None, bindings: 3, segments: None },
 ];

@@ -25,6 +25,4 @@ struct CrowdDispatch {
     references: u32,
 }
 
-const CROWD_WORKGROUP: u32 = 64;
-
 var<immediate> dispatch: CrowdDispatch;

@@ -2,12 +2,6 @@
 // affine matrix: T R S.
 // Twin: src/twin/crowd_matrices.rs.
 
-// A row of R with the columns scaled, and the translation behind it.
-fn transform_row(axis: vec3f, scale: vec4f, moved: f32) -> vec4f {
-    let row = canonical(vec4f(axis, 0.0));
-    return canonical(vec4f(row.x * scale.x, row.y * scale.y, row.z * scale.z, moved));
-}
-
 // `index` is a joint of an instance.
 fn crowd_work(index: u32) {
     let instance = index / dispatch.joints;

@@ -13,6 +13,7 @@ use crate::gpu::in_flight::KernelResults;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding, Commands, DescriptorPool};
+use crate::gpu::whole_instances::WholeInstances;
 use crate::output::crowd::{
     CrowdFrame, CrowdOutput, CrowdValues, EntryChanges, VisibleInstances, listed_changes,
 };
@@ -116,10 +117,29 @@ impl DeviceCrowd {
         (limit / LEAST_WINDOW * LEAST_WINDOW).clamp(LEAST_WINDOW, all) as u32
     }
 
+    /// Whether instances have one layer, and all rotations are arcs or constants.
+    fn is_plain(&self) -> bool {
+        self.tables.arguments.layers == 1 && self.tables.only_arcs
+    }
+
+    /// How instances are evaluated as wholes, where they are: on cards that can bind all that a kernel then reads. Software
+    /// devices run a workgroup's invocations one after another, and stop at each barrier.
+    fn whole(&self, output: CrowdOutput) -> Option<WholeInstances> {
+        let device = &self.engine.device;
+        let binds = |whole: &WholeInstances| {
+            Pipeline::storage_buffers(device, whole.kernel) <= device.physical.storage_buffers
+        };
+        let whole = WholeInstances::new(&self.tables.arguments, output, self.is_plain());
+        whole.filter(|whole| self.engine.maps_samples && binds(whole))
+    }
+
     /// The kernels for a result, in their order.
     pub(crate) fn kernels(&self, output: CrowdOutput) -> Vec<Kernel> {
         use CrowdValues::{Model, Rotations, Skinning};
-        let is_plain = self.tables.arguments.layers == 1 && self.tables.only_arcs;
+        if let Some(whole) = self.whole(output) {
+            return vec![whole.kernel];
+        }
+        let is_plain = self.is_plain();
         let joints = match (output.values, is_plain) {
             (Rotations, true) => Kernel::CrowdPlainRotations,
             (Rotations, false) => Kernel::CrowdRotations,
@@ -158,9 +178,32 @@ impl DeviceCrowd {
             Kernel::CrowdWalk | Kernel::CrowdWalkAll => vec![whole(&tables.links), values],
             Kernel::CrowdSkin => vec![whole(&tables.bind), values],
             Kernel::CrowdHalf => vec![values, output],
-            _ => {
+            Kernel::CrowdRotations
+            | Kernel::CrowdPlainRotations
+            | Kernel::CrowdLocals
+            | Kernel::CrowdPlainLocals => {
                 let (channels, cells) = (whole(&tables.channels), whole(&tables.cells));
                 vec![entries, channels, cells, positions, values]
+            }
+            // Over whole instances.
+            _ => {
+                let CrowdTables {
+                    clips,
+                    bases,
+                    spans,
+                    channels,
+                    cells,
+                    ..
+                } = tables;
+                let read = [clips, bases, spans, channels, cells].map(whole);
+                let has_matrices = !matches!(
+                    kernel,
+                    Kernel::CrowdWholeRotations | Kernel::CrowdPlainWholeRotations
+                );
+                let skeleton = [&tables.links, &tables.bind].map(whole);
+                let skeleton = if has_matrices { &skeleton[..] } else { &[] };
+                // The result is bound in both precisions.
+                [&[entries], &read[..], skeleton, &[output; 2]].concat()
             }
         }
     }
@@ -190,7 +233,7 @@ struct BoundKernel {
 struct Window {
     kernels: Vec<BoundKernel>,
     /// The descriptor sets of the first kernels, those that read entries, for gathered entries.
-    on_gathered: [vk::DescriptorSet; 2],
+    on_gathered: Vec<vk::DescriptorSet>,
     buffers: WindowBuffers,
 }
 
@@ -200,6 +243,8 @@ pub struct CrowdTarget {
     /// The crowd that the target was made for; its buffers are in the descriptor sets.
     pub(crate) crowd: Arc<DeviceCrowd>,
     output: CrowdOutput,
+    /// How instances are evaluated as wholes, if they are.
+    whole: Option<WholeInstances>,
     /// The range of the result.
     pub(crate) range: Binding,
     /// The maximum number of instances.
@@ -212,9 +257,10 @@ pub struct CrowdTarget {
     // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
     // flight when the target is dropped.
     _pool: DescriptorPool,
+    /// Nothing where instances are evaluated as wholes.
     positions: Buffer,
     gathered: Buffer,
-    /// The values of a window before they are rounded to 16 bits.
+    /// The values of a window before a separate kernel rounds them to 16 bits.
     values: Option<Buffer>,
 }
 
@@ -234,12 +280,19 @@ impl CrowdTarget {
             let size = u64::from(window) * each;
             Buffer::new(&engine.device, name, size, Residence::Device)
         };
-        let positions = new("tumble crowd places", crowd.position_bytes())?;
+        let whole = crowd.whole(output);
+        let position_bytes = if whole.is_some() {
+            0
+        } else {
+            crowd.position_bytes()
+        };
+        let positions = new("tumble crowd places", position_bytes)?;
         let entry_bytes = size_of::<CrowdEntry>() as u64 * u64::from(arguments.layers);
         let gathered = new("tumble crowd gathered entries", entry_bytes)?;
-        let values = u64::from(arguments.joints) * output.vector_count() as u64 * 16;
-        let whole = (output.is_half).then(|| new("tumble crowd values", values));
-        let whole = whole.transpose()?;
+        let value_bytes = u64::from(arguments.joints) * output.vector_count() as u64 * 16;
+        let has_values = output.is_half && whole.is_none();
+        let values = has_values.then(|| new("tumble crowd values", value_bytes));
+        let values = values.transpose()?;
         let pipelines = crowd
             .kernels(output)
             .into_iter()
@@ -271,16 +324,19 @@ impl CrowdTarget {
             let buffers = WindowBuffers {
                 entries,
                 positions: Binding::whole(&positions),
-                values: whole.as_ref().map_or(range, Binding::whole),
+                values: values.as_ref().map_or(range, Binding::whole),
                 output: range,
             };
             let on_gathered = WindowBuffers {
                 entries: Binding::whole(&gathered),
                 ..buffers
             };
-            let [times, joints] = [&pipelines[0], &pipelines[1]].map(|(kernel, pipeline)| {
-                pool.set(pipeline, &crowd.bindings(*kernel, &on_gathered))
-            });
+            let read_entries = pipelines.iter().take(2);
+            let on_gathered = read_entries
+                .map(|(kernel, pipeline)| {
+                    pool.set(pipeline, &crowd.bindings(*kernel, &on_gathered))
+                })
+                .collect::<Result<_, VulkanError>>()?;
             let kernels = pipelines
                 .iter()
                 .map(|(kernel, pipeline)| {
@@ -294,13 +350,14 @@ impl CrowdTarget {
                 .collect::<Result<_, VulkanError>>()?;
             windows.push(Window {
                 kernels,
-                on_gathered: [times?, joints?],
+                on_gathered,
                 buffers,
             });
         }
         Ok(Self {
             crowd: Arc::clone(crowd),
             output,
+            whole,
             range: Binding::range(buffer, offset, u64::from(room) * each),
             room,
             scatter,
@@ -310,7 +367,7 @@ impl CrowdTarget {
             _pool: pool,
             positions,
             gathered,
-            values: whole,
+            values,
         })
     }
 
@@ -431,6 +488,15 @@ impl CrowdTarget {
             let mut set = bound.set;
             if let Some(&on_gathered) = gathered {
                 (set, arguments.first_instance) = (on_gathered, 0);
+            }
+            if let Some(whole) = &self.whole {
+                let count = instances;
+                let levels = &self.crowd.tables.levels;
+                let (pushed, groups) = whole.dispatch(CrowdDispatch { count, ..arguments }, levels);
+                let groups = self.crowd.engine.workgroups(groups * WORKGROUP);
+                let bytes = bytemuck::bytes_of(&pushed);
+                commands.dispatch(&bound.pipeline, set, bytes, groups);
+                continue;
             }
             let dispatch = |arguments: CrowdDispatch, invocations| {
                 let groups = self.crowd.engine.workgroups(invocations);

@@ -29,8 +29,9 @@
 //!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
-//! tables and targets ([`crowd`]). [`clip_target`] records a clip into an application's commands, and [`pass_target`]
-//! records passes over poses from buffer to buffer.
+//! tables and targets ([`crowd`]), and on cards kernels that do all steps of a frame ([`whole_instances`]).
+//! [`clip_target`] records a clip into an application's commands, and [`pass_target`] records passes over poses from
+//! buffer to buffer.
 //!
 //! # Memory
 //!
@@ -79,4 +80,5 @@ pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;
+pub(crate) mod whole_instances;
 pub(crate) mod work_list;

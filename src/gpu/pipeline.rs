@@ -7,11 +7,11 @@ use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
-use crate::shader::{CrowdDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
+use crate::shader::{CrowdWholeDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
 
 /// The maximum size of push constants, bytes; Vulkan guarantees at least 128.
 const PUSHED: u32 = {
-    let size = size_of::<CrowdDispatch>();
+    let size = size_of::<CrowdWholeDispatch>();
     assert!(size_of::<Dispatch>() <= size && size_of::<Grid>() <= size);
     assert!(size_of::<RowShape>() <= size && size_of::<PoseDispatch>() <= size);
     assert!(size <= 128);
@@ -24,7 +24,8 @@ pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
     pub(crate) set_layout: vk::DescriptorSetLayout,
-    /// The number of buffers that it binds; it writes the last one.
+    /// The number of buffers that it binds; it writes the last one. (Kernels over whole instances write the last but one
+    /// or the last, which are the same buffer.)
     pub(crate) bindings: u32,
     /// Whether its input buffers are texel buffers, not storage buffers.
     reads_texels: bool,

@@ -53,7 +53,8 @@ fn run_over(
         found.flush(&(0..output.len()))?;
     }
     let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
-    bindings.push(Binding::whole(&found));
+    // Kernels that store in one of two precisions have a binding for each.
+    bindings.resize(pipeline.bindings as usize, Binding::whole(&found));
     // Made last: dropped first, it waits for its work before the buffers are freed.
     let mut submission = Submission::new(&pipeline.device, QueueLane::Kernels)?;
     submission.begin(1)?;

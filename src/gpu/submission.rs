@@ -552,7 +552,7 @@ impl Drop for Semaphore {
 }
 
 /// The maximum number of buffers that a kernel binds.
-const MAX_BINDINGS: u32 = 6;
+const MAX_BINDINGS: u32 = 10;
 
 /// A pool of descriptor sets. It must be dropped after all submitted work with its sets has ended.
 pub(crate) struct DescriptorPool {

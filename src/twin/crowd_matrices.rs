@@ -1,6 +1,6 @@
-//! Twin of `shaders/crowd/locals.wgsl`, `shaders/crowd/affine.wgsl`, `shaders/crowd/walk.wgsl`,
-//! `shaders/crowd/walk_all.wgsl`, `shaders/crowd/skin.wgsl` and `shaders/crowd/half.wgsl`: the same names, the
-//! same order.
+//! Twin of `shaders/crowd/transform.wgsl`, `shaders/crowd/locals.wgsl`, `shaders/crowd/affine.wgsl`,
+//! `shaders/crowd/walk.wgsl`, `shaders/crowd/walk_all.wgsl`, `shaders/crowd/skin.wgsl`, `shaders/crowd/any_half.wgsl`
+//! and `shaders/crowd/half.wgsl`: the same names, the same order.
 
 use glam::Vec4;
 

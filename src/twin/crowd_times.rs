@@ -1,5 +1,5 @@
-//! Twin of `shaders/crowd/times.wgsl` and `shaders/crowd/entry.wgsl`: the same names, with the whole
-//! numbers of 64 bits that the shader makes of two words.
+//! Twin of `shaders/crowd/ticks.wgsl`, `shaders/crowd/times.wgsl` and `shaders/crowd/entry.wgsl`: the same names, with
+//! the whole numbers of 64 bits that the shader makes of two words.
 
 use crate::shader::{
     CrowdBase, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan, ON_KEY, RUNS_BACKWARDS,

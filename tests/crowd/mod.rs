@@ -10,6 +10,7 @@ mod visible;
 use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;
 use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::vulkan::tuning::{Mapping, Transfer};
 use tumble::{
     Device, Engine, EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet,
     VectorMethod, VectorWidth, WrapMode, method,
@@ -201,7 +202,8 @@ pub(crate) fn layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
     }
 }
 
-/// Crowds on the CPU at every width and on every Vulkan device, which play the same.
+/// Crowds on the CPU at every width and on every Vulkan device, there with a kernel for each step and with one for
+/// whole instances, which play the same.
 fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(String, Crowd)> {
     let mut all = Vec::new();
     for width in VectorWidth::available() {
@@ -212,19 +214,23 @@ fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(Strin
         all.push((format!("CPU, {width:?}"), crowd));
     }
     for device in vulkan_devices() {
-        for transfer in [
-            tumble::vulkan::tuning::Transfer::InPlace,
-            tumble::vulkan::tuning::Transfer::Staged,
+        for (transfer, mapping) in [
+            (Transfer::InPlace, Mapping::Runs),
+            (Transfer::Staged, Mapping::Runs),
+            (Transfer::InPlace, Mapping::Samples),
+            (Transfer::Staged, Mapping::Samples),
         ] {
             let mut options = EngineOptions::default();
+            options.mapping = mapping;
             options.transfer = transfer;
-            if transfer == tumble::vulkan::tuning::Transfer::Staged {
+            if transfer == Transfer::Staged {
                 crate::support::stage(&mut options, instances);
                 options.memory = Some(4096); // so that windows are as short as they may be
             }
             let engine = Engine::with_options(device.clone(), &options).unwrap();
             let crowd = engine.crowd(library, instances, layers).unwrap();
-            all.push((format!("{}, {transfer:?}", engine.device_name()), crowd));
+            let name = engine.device_name();
+            all.push((format!("{name}, {transfer:?}, {mapping:?}"), crowd));
         }
     }
     all
@@ -289,6 +295,55 @@ fn every_device_has_the_bits_of_the_cpu() {
                 numbers
                     .into_iter()
                     .all(|&bits| f32::from_bits(bits).is_finite())
+            );
+        }
+    }
+}
+
+/// Instances that are too large for a workgroup's memory, by their joints or by their time bases, of which each joint
+/// has another; and those that are just small enough.
+#[test]
+fn instances_that_are_too_large_for_a_workgroup_have_the_same_bits() {
+    let mut random = Random(83);
+    for (joints, layers) in [(128, 1), (129, 1), (32, 4), (33, 4)] {
+        let mut library = CrowdLibrary::new(&skeleton(&mut random, joints)).unwrap();
+        let mut set = TrackSet::new();
+        for joint in 0..joints {
+            let times = [0.0, 0.5, 1.1, 1.6].map(|time| time + 0.01 * joint as f64);
+            let keys = times.map(|_| random.rotation().as_quat());
+            set.push(format!("{joint}"), &times, &keys).unwrap();
+        }
+        library
+            .push(&set, method::SLERP, VectorMethod::Linear)
+            .unwrap();
+        library
+            .set_inverse_bind(&vec![Affine3A::from_translation(Vec3::ONE); joints])
+            .unwrap();
+        let plays: Vec<_> = (0..40 * layers)
+            .map(|slot| (slot / layers, slot % layers))
+            .map(|(instance, layer)| {
+                let time = random.between(0.0, 1e6) as i64;
+                let plays = CrowdLayer::new(0).at(time);
+                (
+                    instance,
+                    layer,
+                    CrowdLayer {
+                        weight: 0.6,
+                        ..plays
+                    },
+                )
+            })
+            .collect();
+        let mut expected = Vec::new();
+        for (name, mut crowd) in crowds(&library, 40, layers) {
+            crowd.set_all(&plays).unwrap();
+            let found = ALL.map(|values| bits(&evaluated(&mut crowd, values)));
+            if expected.is_empty() {
+                expected = found.to_vec();
+            }
+            assert!(
+                found[..] == expected,
+                "{name}, {joints} joints, {layers} layers"
             );
         }
     }

@@ -98,10 +98,13 @@ fn compiled(
     listings
 }
 
-/// How often a kernel divides whole numbers, by what is no constant for the compiler. Processors of
-/// AMD's have no such division: it is made of a reciprocal, taken to a whole number, and of exact steps
-/// that make good what that lacks.
+/// How often a kernel divides whole numbers, where its functions are put into their callers. Processors of AMD's have
+/// no such division: it is made of a reciprocal, taken to a whole number, and of exact steps that make good what that
+/// lacks.
 fn divisions(kernel: &str) -> usize {
+    const ENTRY_POINT: u32 = 15;
+    const FUNCTION: u32 = 54;
+    const CALL: u32 = 57;
     const DIVISION: u32 = 134;
     const REMAINDER: u32 = 137;
     let code = tumble::vulkan::kernels()
@@ -112,12 +115,26 @@ fn divisions(kernel: &str) -> usize {
         .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
     let words: Vec<u32> = words.collect();
-    let (mut offset, mut found) = (5, 0);
+    let (mut offset, mut main, mut function) = (5, 0, 0);
+    // Of each function its divisions, and the functions that it calls.
+    let mut functions = BTreeMap::<u32, (usize, Vec<u32>)>::new();
     while let Some(&word) = words.get(offset) {
-        found += usize::from([DIVISION, REMAINDER].contains(&(word & 0xffff)));
+        let body = functions.entry(function).or_default();
+        match word & 0xffff {
+            ENTRY_POINT => main = words[offset + 2],
+            FUNCTION => function = words[offset + 2],
+            CALL => body.1.push(words[offset + 3]),
+            DIVISION | REMAINDER => body.0 += 1,
+            _ => {}
+        }
         offset += (word >> 16).max(1) as usize;
     }
-    found
+    fn within(function: u32, functions: &BTreeMap<u32, (usize, Vec<u32>)>) -> usize {
+        let (divisions, calls) = &functions[&function];
+        let called = calls.iter().map(|&called| within(called, functions));
+        divisions + called.sum::<usize>()
+    }
+    within(main, &functions)
 }
 
 /// What is wrong with a kernel.

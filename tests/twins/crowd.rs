@@ -89,42 +89,48 @@ fn number(random: &mut Random, bits: u32) -> u64 {
 }
 
 /// What comes with a dispatch.
-#[derive(Default)]
-struct CrowdDispatch {
-    count: u32,
-    first_instance: u32,
-    joints: u32,
-    layers: u32,
-    bases: u32,
-    first_link: u32,
-    clock: u64,
-    masks: u32,
-    references: u32,
+#[derive(Default, Clone, Copy)]
+pub(super) struct CrowdDispatch {
+    pub(super) count: u32,
+    pub(super) first_instance: u32,
+    pub(super) joints: u32,
+    pub(super) layers: u32,
+    pub(super) bases: u32,
+    pub(super) first_link: u32,
+    pub(super) clock: u64,
+    pub(super) masks: u32,
+    pub(super) references: u32,
+}
+
+impl Cells for CrowdDispatch {
+    fn put(&self, cells: &mut Vec<u64>) {
+        let [low, high] = words(self.clock);
+        let words = [
+            self.count,
+            self.first_instance,
+            self.joints,
+            self.layers,
+            self.bases,
+            self.first_link,
+            low,
+            high,
+            self.masks,
+            self.references,
+        ];
+        Cells::put(&words, cells);
+    }
 }
 
 impl CrowdDispatch {
     fn put(&self, trial: &mut TwinTrial) {
-        let [low, high] = words(self.clock);
-        trial.global(
-            "dispatch",
-            [
-                self.count,
-                self.first_instance,
-                self.joints,
-                self.layers,
-                self.bases,
-                self.first_link,
-                low,
-                high,
-                self.masks,
-                self.references,
-            ],
-        );
+        let mut cells = Vec::new();
+        Cells::put(self, &mut cells);
+        trial.global("dispatch", cells);
     }
 }
 
 /// An entry that may stand anywhere in a clip of a period, and a time of the clock.
-fn entry(random: &mut Random, period: u32) -> (CrowdEntry, u64) {
+pub(super) fn entry(random: &mut Random, period: u32) -> (CrowdEntry, u64) {
     let wrap = random.below(3);
     let within = number(random, 32) % (u64::from(period) * u64::from(wrap.max(1)) + 1);
     let early = match wrap {
@@ -144,7 +150,7 @@ fn entry(random: &mut Random, period: u32) -> (CrowdEntry, u64) {
     (result, (u64::from(anchor) << 8).wrapping_add(elapsed))
 }
 
-fn period(random: &mut Random) -> u32 {
+pub(super) fn period(random: &mut Random) -> u32 {
     1 + number(random, 30) as u32
 }
 
@@ -316,23 +322,23 @@ pub(super) fn times() -> Vec<Twin> {
     ]
 }
 
-const JOINTS: u32 = 2;
-const BASES: u32 = 2;
-const CLIPS: u32 = 2;
+pub(super) const JOINTS: u32 = 2;
+pub(super) const BASES: u32 = 2;
+pub(super) const CLIPS: u32 = 2;
 /// Cells of segments and keys, before the masks.
-const CELLS: u32 = 72;
+pub(super) const CELLS: u32 = 72;
 
 /// Everything that the kernels over layers read.
-struct LayerScene {
-    entries: Vec<CrowdEntry>,
-    channels: Vec<CrowdChannel>,
-    cells: Vec<[f32; 4]>,
-    positions: Vec<CrowdPosition>,
-    layers: u32,
-    first_instance: u32,
+pub(super) struct LayerScene {
+    pub(super) entries: Vec<CrowdEntry>,
+    pub(super) channels: Vec<CrowdChannel>,
+    pub(super) cells: Vec<[f32; 4]>,
+    pub(super) positions: Vec<CrowdPosition>,
+    pub(super) layers: u32,
+    pub(super) first_instance: u32,
 }
 
-fn channel(random: &mut Random) -> CrowdChannel {
+pub(super) fn channel(random: &mut Random) -> CrowdChannel {
     let forms = [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL];
     let form = forms[random.below(4) as usize];
     CrowdChannel {
@@ -343,20 +349,20 @@ fn channel(random: &mut Random) -> CrowdChannel {
     }
 }
 
-fn position(random: &mut Random) -> CrowdPosition {
+pub(super) fn position(random: &mut Random) -> CrowdPosition {
     CrowdPosition {
         span: random.below(2) | if random.once_in(4) { ON_KEY } else { 0 },
         parameter: random.parameter(),
     }
 }
 
-fn cells(random: &mut Random, count: u32) -> Vec<[f32; 4]> {
+pub(super) fn cells(random: &mut Random, count: u32) -> Vec<[f32; 4]> {
     (0..count).map(|_| random.rotation()).collect()
 }
 
 impl LayerScene {
     /// For two instances of a window.
-    fn new(random: &mut Random) -> Self {
+    pub(super) fn new(random: &mut Random) -> Self {
         let (layers, first_instance) = (1 + random.below(3), random.below(2));
         let masks = 3 * JOINTS;
         let references = CLIPS * JOINTS * CHANNELS;
@@ -380,7 +386,7 @@ impl LayerScene {
         }
     }
 
-    fn twin(&self) -> Layers<'_> {
+    pub(super) fn twin(&self) -> Layers<'_> {
         Layers {
             entries: &self.entries[(self.first_instance * self.layers) as usize..],
             channels: &self.channels,
@@ -394,7 +400,7 @@ impl LayerScene {
         }
     }
 
-    fn put(&self, trial: &mut TwinTrial) {
+    pub(super) fn put(&self, trial: &mut TwinTrial) {
         trial.global("entries", self.entries.as_slice().to_cells());
         trial.global("channels", self.channels.as_slice().to_cells());
         trial.global("cells", self.cells.as_slice().to_cells());
@@ -427,7 +433,7 @@ impl LayerScene {
 }
 
 /// The channel in a form, or as a constant where its first key has an even index.
-fn plain(channel: CrowdChannel, form: u32) -> CrowdChannel {
+pub(super) fn plain(channel: CrowdChannel, form: u32) -> CrowdChannel {
     let is_constant = channel.keys.is_multiple_of(2);
     let form = if is_constant { FORM_CONSTANT } else { form };
     let first = channel.first + 1;
@@ -451,7 +457,7 @@ fn plain_value(function: &'static str, form: u32) -> Twin {
     })
 }
 
-trait ToCells {
+pub(super) trait ToCells {
     fn to_cells(&self) -> Vec<u64>;
 }
 
@@ -561,7 +567,7 @@ pub(super) fn layers() -> Vec<Twin> {
     ]
 }
 
-fn rows(random: &mut Random) -> Rows {
+pub(super) fn rows(random: &mut Random) -> Rows {
     [random.vector(), random.vector(), random.vector()]
 }
 
@@ -748,7 +754,7 @@ pub(super) fn matrices() -> Vec<Twin> {
 }
 
 /// A number near the largest half, or any.
-fn half_of(random: &mut Random) -> f32 {
+pub(super) fn half_of(random: &mut Random) -> f32 {
     match random.once_in(4) {
         true => 65_520.0 + 100.0 * random.number(),
         false => random.finite(),

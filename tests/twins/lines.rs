@@ -39,7 +39,8 @@ use super::source;
 const WORKGROUPS: u32 = 60;
 
 /// Invocations that a card runs together, and the bytes that it moves together.
-const CARDS: [(u32, u64); 6] = [(32, 32), (32, 64), (32, 128), (64, 32), (64, 64), (64, 128)];
+pub(super) const CARDS: [(u32, u64); 6] =
+    [(32, 32), (32, 64), (32, 128), (64, 32), (64, 64), (64, 128)];
 
 /// The built-in inputs of an entry point.
 #[derive(Clone, Copy)]
@@ -64,24 +65,24 @@ struct Launch {
 }
 
 /// The cells of a buffer, four bytes each.
-fn cells(bytes: &[u8]) -> Vec<u64> {
+pub(super) fn cells(bytes: &[u8]) -> Vec<u64> {
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
     words.into_iter().map(u64::from).collect()
 }
 
 /// Lines that waves touched, and the fewest that would have done.
 #[derive(Debug, Clone, Copy, Default)]
-struct Lines {
+pub(super) struct Lines {
     touched: u64,
     least: u64,
 }
 
 impl Lines {
-    fn ratio(self) -> f64 {
+    pub(super) fn ratio(self) -> f64 {
         self.touched as f64 / self.least.max(1) as f64
     }
 
-    fn add(&mut self, more: Self) {
+    pub(super) fn add(&mut self, more: Self) {
         self.touched += more.touched;
         self.least += more.least;
     }
@@ -96,7 +97,7 @@ fn touched(ranges: &[Range<u64>], line: u64) -> u64 {
 }
 
 /// What a store of all lanes of a wave takes: at least the bytes as if they lay side by side.
-fn store(ranges: &[Range<u64>], line: u64) -> Lines {
+pub(super) fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     let bytes: u64 = ranges.iter().map(|range| range.end - range.start).sum();
     Lines {
         touched: touched(ranges, line),
@@ -195,7 +196,7 @@ impl Launch {
     }
 }
 
-fn global(program: &Program, name: &str) -> usize {
+pub(super) fn global(program: &Program, name: &str) -> usize {
     let index = program.globals.iter().position(|global| global == name);
     index.unwrap_or_else(|| panic!("no global {name}"))
 }
@@ -225,7 +226,7 @@ fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
     lines
 }
 
-fn loads_of(workgroup: &[Vec<Touch>], line: u64) -> Lines {
+pub(super) fn loads_of(workgroup: &[Vec<Touch>], line: u64) -> Lines {
     let mut buffers = BTreeMap::<usize, Vec<_>>::new();
     for touch in workgroup.iter().flatten().filter(|touch| !touch.is_store) {
         buffers.entry(touch.global).or_default().push(touch.bytes());
@@ -239,7 +240,7 @@ fn loads_of(workgroup: &[Vec<Touch>], line: u64) -> Lines {
 
 // ---------------------------------------------------------------- the workloads
 
-fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
+pub(super) fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
     let mut rotation = DQuat::IDENTITY;
     let mut next = || {
         let axis = DVec3::from_array([(); 3].map(|()| 2.0 * random.f64() - 1.0));

@@ -9,6 +9,7 @@
 mod cells;
 mod coalesced;
 mod crowd;
+mod crowd_lines;
 mod frame;
 mod functions;
 mod kernels;
@@ -20,6 +21,7 @@ mod poses;
 mod program;
 mod stores;
 mod trial;
+mod whole_instances;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;
@@ -52,6 +54,7 @@ fn twins() -> Vec<Twin> {
     all.extend(crowd::times());
     all.extend(crowd::layers());
     all.extend(crowd::matrices());
+    all.extend(whole_instances::whole_instances());
     all.push(poses::self_test());
     all
 }

@@ -17,13 +17,13 @@ use super::{Trial, bytes, groups};
 
 /// Instances of the window, and those before it.
 const INSTANCES: u32 = 11;
-const BEFORE: u32 = 1;
-const JOINTS: u32 = 7;
-const CLIPS: u32 = 3;
-const BASES: u32 = 2;
+pub(super) const BEFORE: u32 = 1;
+pub(super) const JOINTS: u32 = 7;
+pub(super) const CLIPS: u32 = 3;
+pub(super) const BASES: u32 = 2;
 /// Cells of segments and keys, before the masks.
-const CELLS: u32 = 72;
-const MASKS: u32 = 3;
+pub(super) const CELLS: u32 = 72;
+pub(super) const MASKS: u32 = 3;
 
 pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
     let random = &mut Random::canonical();
@@ -50,7 +50,7 @@ fn number(random: &mut Random, bits: u32) -> u64 {
 }
 
 /// An entry at any time of a clip with this period, for a time of the clock.
-fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> CrowdEntry {
+pub(super) fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> CrowdEntry {
     let wrap = random.below(3);
     let within = number(random, 32) % (u64::from(period) * u64::from(wrap.max(1)) + 1);
     let early = match wrap {
@@ -149,7 +149,7 @@ fn times(random: &mut Random) -> Trial {
     trial
 }
 
-fn channel(random: &mut Random) -> CrowdChannel {
+pub(super) fn channel(random: &mut Random) -> CrowdChannel {
     let forms = [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL];
     let form = forms[random.below(4) as usize];
     CrowdChannel {
@@ -161,7 +161,7 @@ fn channel(random: &mut Random) -> CrowdChannel {
 }
 
 /// A channel of one form, or a constant one, for the kernels without branches.
-fn plain(random: &mut Random, form: u32) -> CrowdChannel {
+pub(super) fn plain(random: &mut Random, form: u32) -> CrowdChannel {
     let channel = channel(random);
     let (first, base) = (channel.first + 1, channel.form_and_base & 0x00ff_ffff);
     match random.once_in(3) {
@@ -249,7 +249,7 @@ fn joints(random: &mut Random, layers: u32, is_plain: bool, are_locals: bool) ->
     trial
 }
 
-fn rows(random: &mut Random) -> Rows {
+pub(super) fn rows(random: &mut Random) -> Rows {
     [random.vector(), random.vector(), random.vector()]
 }
 
@@ -287,11 +287,11 @@ fn walk(random: &mut Random) -> Trial {
 }
 
 /// The links of a skeleton, level by level: each a joint and its parent.
-const LEVELS: [&[[u32; 2]]; 3] = [&[[1, 0], [2, 0]], &[[6, 1]], &[[3, 2], [5, 6], [4, 6]]];
+pub(super) const LEVELS: [&[[u32; 2]]; 3] =
+    [&[[1, 0], [2, 0]], &[[6, 1]], &[[3, 2], [5, 6], [4, 6]]];
 
-fn walk_all(random: &mut Random) -> Trial {
-    const POSES: usize = 19;
-    let before: Vec<_> = (0..POSES * JOINTS as usize).map(|_| rows(random)).collect();
+/// These links, and behind them where each level begins and ends, from an index on.
+pub(super) fn links_of_levels() -> (Vec<CrowdLink>, u32) {
     let link = |[joint, parent]: [u32; 2]| CrowdLink { joint, parent };
     let mut links: Vec<_> = LEVELS.concat().into_iter().map(link).collect();
     let mut first = 0;
@@ -300,6 +300,13 @@ fn walk_all(random: &mut Random) -> Trial {
         links.push(link([first, first + level.len() as u32]));
         first += level.len() as u32;
     }
+    (links, first_link)
+}
+
+fn walk_all(random: &mut Random) -> Trial {
+    const POSES: usize = 19;
+    let before: Vec<_> = (0..POSES * JOINTS as usize).map(|_| rows(random)).collect();
+    let (links, first_link) = links_of_levels();
     let dispatch = CrowdDispatch {
         count: POSES as u32,
         joints: JOINTS,

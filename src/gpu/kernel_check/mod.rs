@@ -8,6 +8,7 @@ mod poses;
 pub(crate) mod random;
 mod segments;
 pub(crate) mod self_test;
+mod whole_instances;
 
 use bytemuck::NoUninit;
 
@@ -119,6 +120,10 @@ fn trials(kernel: Kernel) -> Vec<Trial> {
         | Kernel::CrowdHalf
         | Kernel::CrowdGather
         | Kernel::CrowdScatter => crowd::trials(kernel),
+        Kernel::CrowdWholeRotations
+        | Kernel::CrowdPlainWholeRotations
+        | Kernel::CrowdWholeMatrices
+        | Kernel::CrowdPlainWholeMatrices => whole_instances::trials(kernel),
         _ => segments::trials(kernel),
     }
 }

@@ -24,7 +24,8 @@ use crate::shader::spirv::FloatControls;
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
 
-/// The maximum number of storage buffers that a kernel binds without texel buffers. Vulkan guarantees 4.
+/// The maximum number of storage buffers that a kernel binds without texel buffers, except for kernels over whole
+/// instances of crowds, which others can replace. Vulkan guarantees 4.
 const MAX_STORAGE_BUFFERS: u32 = 6;
 
 /// A physical device, not yet opened.

@@ -1,0 +1,7 @@
+// What the kernel that finds positions reads, and where it leaves them.
+
+@group(0) @binding(0) var<storage, read> entries: array<CrowdEntry>;
+@group(0) @binding(1) var<storage, read> clips: array<CrowdClip>;
+@group(0) @binding(2) var<storage, read> time_bases: array<CrowdBase>;
+@group(0) @binding(3) var<storage, read> spans: array<CrowdSpan>;
+@group(0) @binding(4) var<storage, read_write> positions: array<CrowdPosition>;

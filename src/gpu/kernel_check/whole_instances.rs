@@ -1,0 +1,240 @@
+//! Trials of the kernels over whole instances of a crowd.
+
+use bytemuck::Zeroable as _;
+
+use crate::math::canonical::canonical;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::shader::{
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan,
+    CrowdWholeDispatch, FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SCALE, SPEED_MAGNITUDE,
+    START_BIAS, TRANSLATION,
+};
+use crate::twin::crowd_layers::Layers;
+use crate::twin::crowd_matrices::{Rows, affine_product, to_any_half, transform};
+use crate::twin::crowd_times::base_positions;
+
+use super::crowd::{
+    BASES, BEFORE, CELLS, CLIPS, JOINTS, LEVELS, MASKS, channel, entry, links_of_levels, plain,
+    rows,
+};
+use super::random::Random;
+use super::{Trial, bytes};
+
+/// Instances of the window, and those of a workgroup: so many that an invocation has several joints, and several
+/// time bases.
+const INSTANCES: u32 = 26;
+const OF_WORKGROUP: u32 = 10;
+const CLOCK: u64 = 0x00ab_cdef_0123_4567;
+
+pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+    use CrowdValues::{Local, Model, Rotations, Skinning};
+    let random = &mut Random::canonical();
+    let is_plain = matches!(
+        kernel,
+        Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices
+    );
+    let outputs = match kernel {
+        Kernel::CrowdWholeRotations | Kernel::CrowdPlainWholeRotations => {
+            vec![CrowdOutput::from(Rotations), CrowdOutput::half(Rotations)]
+        }
+        _ => vec![
+            CrowdOutput::half(Local),
+            CrowdOutput::from(Model),
+            CrowdOutput::from(Skinning),
+            CrowdOutput::half(Skinning),
+        ],
+    };
+    let trial = |output| WholeScene::new(random, is_plain).trial(output);
+    outputs.into_iter().map(trial).collect()
+}
+
+/// Everything that the kernels read.
+struct WholeScene {
+    layers: u32,
+    entries: Vec<CrowdEntry>,
+    clips: Vec<CrowdClip>,
+    bases: Vec<CrowdBase>,
+    spans: Vec<CrowdSpan>,
+    channels: Vec<CrowdChannel>,
+    cells: Vec<[f32; 4]>,
+    bind: Vec<Rows>,
+}
+
+/// Where the masks and the reference poses begin among the cells.
+const CELL_TABLES: [u32; 2] = [CELLS, CELLS + MASKS * JOINTS];
+
+impl WholeScene {
+    fn new(random: &mut Random, is_plain: bool) -> Self {
+        let layers = if is_plain { 1 } else { 4 };
+        let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
+        for clip in 0..CLIPS {
+            let period = 1000 + random.below(1 << 20);
+            let base_count = 1 + clip % BASES;
+            clips.push(CrowdClip {
+                period,
+                first_base: bases.len() as u32,
+                bases: base_count,
+            });
+            for _ in 0..base_count {
+                let count = 1 + random.below(2);
+                bases.push(CrowdBase {
+                    first: spans.len() as u32,
+                    count,
+                    step: count - 1,
+                });
+                // Parameters are about -1 to 1.
+                spans.extend(
+                    [0, random.below(period)][..count as usize]
+                        .iter()
+                        .map(|&start| CrowdSpan {
+                            start: start | if random.once_in(2) { ON_KEY } else { 0 },
+                            whole: start as i32,
+                            scale: canonical(random.parameter() / period as f32),
+                            offset: random.parameter(),
+                        }),
+                );
+            }
+        }
+        let channels = (0..CLIPS * JOINTS * CHANNELS).map(|index| {
+            let any = match (is_plain, index % CHANNELS == ROTATION) {
+                (true, true) => plain(random, FORM_ARC),
+                (true, false) => plain(random, FORM_CUBIC),
+                (false, _) => channel(random),
+            };
+            let base = random.below(clips[(index / (JOINTS * CHANNELS)) as usize].bases);
+            CrowdChannel {
+                form_and_base: any.form_and_base & 0xff00_0000 | base,
+                ..any
+            }
+        });
+        let channels = channels.collect();
+        let entries = (0..(BEFORE + INSTANCES) * layers).map(|_| {
+            let clip = random.below(CLIPS);
+            let played = &clips[clip as usize];
+            let mut entry = entry(random, clip, played.period, CLOCK);
+            if random.once_in(4) {
+                // At the start of a span, where a key may be.
+                let base = &bases[(played.first_base + random.below(played.bases)) as usize];
+                let span = &spans[(base.first + random.below(base.count)) as usize];
+                entry.speed_and_modes &= !SPEED_MAGNITUDE;
+                entry.start = START_BIAS + (span.start & !ON_KEY);
+            }
+            entry
+        });
+        let entries = entries.collect();
+        let [_, references] = CELL_TABLES;
+        let cells = references + CLIPS * JOINTS * CHANNELS;
+        let mut cells: Vec<[f32; 4]> = (0..cells).map(|_| random.rotation()).collect();
+        if is_plain {
+            cells[0] = [0.0; 4];
+        }
+        Self {
+            layers,
+            entries,
+            bind: (0..JOINTS).map(|_| rows(random)).collect(),
+            clips,
+            bases,
+            spans,
+            channels,
+            cells,
+        }
+    }
+
+    /// The entries of the window.
+    fn window(&self) -> &[CrowdEntry] {
+        &self.entries[(BEFORE * self.layers) as usize..]
+    }
+
+    fn trial(&self, output: CrowdOutput) -> Trial {
+        let is_rotations = output.values == CrowdValues::Rotations;
+        let walks = matches!(output.values, CrowdValues::Model | CrowdValues::Skinning);
+        let (links, first_link) = links_of_levels();
+        let [masks, references] = CELL_TABLES;
+        let pushed = CrowdWholeDispatch {
+            count: INSTANCES,
+            first_instance: BEFORE,
+            joints: JOINTS,
+            layers: self.layers,
+            bases: BASES,
+            first_link,
+            clock_low: CLOCK as u32,
+            clock_high: (CLOCK >> 32) as u32,
+            masks,
+            references,
+            instances: OF_WORKGROUP,
+            levels: if walks { LEVELS.len() as u32 } else { 0 },
+            is_skinning: (output.values == CrowdValues::Skinning).into(),
+            is_half: output.is_half.into(),
+        };
+        // One of the workgroups has no instance.
+        let groups = [2, INSTANCES.div_ceil(OF_WORKGROUP).div_ceil(2), 1];
+        let mut trial = Trial::new([], &pushed, groups);
+        trial.inputs = vec![
+            bytes(&self.entries),
+            bytes(&self.clips),
+            bytes(&self.bases),
+            bytes(&self.spans),
+            bytes(&self.channels),
+            bytes(&self.cells),
+        ];
+        if !is_rotations {
+            trial.inputs.extend([bytes(&links), bytes(&self.bind)]);
+        }
+        for (index, vector) in self.vectors(output.values).iter().enumerate() {
+            match output.is_half {
+                true => trial.expect(index, &vector.map(to_any_half)),
+                false => trial.expect(index, vector),
+            }
+        }
+        trial
+    }
+
+    /// What the twins make of it, one step after another.
+    fn vectors(&self, values: CrowdValues) -> Vec<[f32; 4]> {
+        let none = CrowdPosition::zeroed();
+        let mut positions = vec![none; self.window().len() * BASES as usize];
+        let of_entries = positions.chunks_exact_mut(BASES as usize);
+        for (entry, found) in self.window().iter().zip(of_entries) {
+            let (clips, bases, spans) = (&self.clips, &self.bases, &self.spans);
+            base_positions(entry, CLOCK, clips, bases, spans, found);
+        }
+        let [masks, references] = CELL_TABLES;
+        let twin = Layers {
+            entries: self.window(),
+            channels: &self.channels,
+            cells: &self.cells,
+            positions: &positions,
+            joints: JOINTS,
+            layers: self.layers,
+            bases: BASES,
+            masks,
+            references,
+        };
+        let mut vectors = Vec::new();
+        for instance in 0..INSTANCES {
+            let layered = |joint, kind| twin.layered(instance, joint, kind);
+            if values == CrowdValues::Rotations {
+                vectors.extend((0..JOINTS).map(|joint| layered(joint, ROTATION)));
+                continue;
+            }
+            let transform = |joint| {
+                let [moved, scale] = [TRANSLATION, SCALE].map(|kind| layered(joint, kind));
+                transform(layered(joint, ROTATION), moved, scale)
+            };
+            let mut pose: Vec<Rows> = (0..JOINTS).map(transform).collect();
+            if values != CrowdValues::Local {
+                for [joint, parent] in LEVELS.concat() {
+                    let (joint, parent) = (joint as usize, parent as usize);
+                    pose[joint] = affine_product(&pose[parent], &pose[joint]);
+                }
+            }
+            if values == CrowdValues::Skinning {
+                for (matrix, bind) in pose.iter_mut().zip(&self.bind) {
+                    *matrix = affine_product(matrix, bind);
+                }
+            }
+            vectors.extend(pose.into_iter().flatten());
+        }
+        vectors
+    }
+}
