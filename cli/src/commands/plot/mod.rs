@@ -36,9 +36,10 @@ use crate::messages::{names, words};
 /// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A set of N boxes has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so on,
-counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a key. For
-files of paths, the speed, the angular speed of the direction and the roll are drawn for each --frame.
+A set of N boxes (tracks, joints) has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so
+on, counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a
+key. For files of paths, the speed, the angular speed of the direction and the roll are drawn for
+each --frame.
 
 Examples:
   tumble plot data/pendulum.dat -o pendulum.svg

@@ -155,9 +155,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         words::bytes(text.len() as f64),
     ));
     if arguments.open {
-        open::that_detached(destination.path()).map_err(|error| {
-            let message =
-                format!("{destination}: no browser could be started: {error}; open the file");
+        open::that_detached(destination.path()).map_err(|_| {
+            let message = format!(
+                "{destination} is written, but no browser could be started; open the file in one"
+            );
             Failure::new(OUTPUT, message)
         })?;
     }
