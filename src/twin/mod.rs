@@ -80,9 +80,9 @@ pub(crate) trait Evaluate: NoUninit {
     fn at(&self, parameter: f32) -> Vec4;
 
     /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample, so that no
-    /// filter is needed. Each component is a sum `m + r`, where `m` is the component of the segment's middle. If |m|
-    /// >= 2^-40, either |r| < |m|/2, and the sum exceeds 2^-41; or both are multiples of 2^-64, and so is the sum,
-    /// which is +0 if they cancel. If all constants of the component are +0, it is +0.
+    /// filter is needed. Each component is a sum `m + r`, where `m` is the component of the segment's middle. If
+    /// `|m| >= 2^-40`, either `|r| < |m|/2`, and the sum exceeds 2^-41; or both are multiples of 2^-64, and so is the
+    /// sum, which is +0 if they cancel. If all constants of the component are +0, it is +0.
     #[inline(always)]
     fn is_canonical(&self) -> bool {
         let constants: &[[f32; 4]] = bytemuck::cast_slice(slice::from_ref(self));

@@ -279,14 +279,18 @@ fn a_mistake_anywhere_is_found() {
             let Some(wrong) = mistake(&checked.module, expression) else {
                 continue;
             };
-            let mut changed = function.clone();
-            *changed.expressions.get_mut(at) = wrong;
-            program.functions[index] = checked.compiled(&changed, info);
             let span = function.expressions.get_span(at);
             let line = span.location(text).line_number as usize;
             let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
             let range = span.to_range().map_or("", |range| &text[range]).to_owned();
-            *mistakes.entry((line, range)).or_insert(false) |= twin
+            let is_found = mistakes.entry((line, range)).or_insert(false);
+            if *is_found {
+                continue; // in another kernel that it is joined into
+            }
+            let mut changed = function.clone();
+            *changed.expressions.get_mut(at) = wrong;
+            program.functions[index] = checked.compiled(&changed, info);
+            *is_found = twin
                 .compare(&program, Random::new(), SAMPLES_OF_MISTAKES)
                 .is_err();
         }

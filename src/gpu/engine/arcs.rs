@@ -158,7 +158,7 @@ mod tests {
                 time += [0.01, 1.0, 1e-5, 300.0][key % 4];
                 times.push(time);
                 let other = [(); 4].map(|()| component());
-                let before = all.last().map_or(other, |last| last.to_array());
+                let before = all.last().map_or(other, Quat::to_array);
                 let near = |by: f32| std::array::from_fn(|c| before[c] + other[c] * by);
                 let [x, y, z, w] = before;
                 let next: [f32; 4] = match (key + track) % 9 {
