@@ -12,7 +12,7 @@ use proptest::prelude::*;
 pub(crate) mod exactness;
 
 use exactness::spirv::{FloatControls, SpirvError, float_controls, without_decorations};
-use exactness::{PassError, no_contraction, splat_products, texel_buffers};
+use exactness::{PassError, no_contraction, splat_products, texel_buffers, workgroup_layouts};
 
 const ALL_CONTROLS: FloatControls = FloatControls {
     preserve_signed_zero_inf_nan: true,
@@ -276,11 +276,61 @@ fn textures_of_one_dimension_become_texel_buffers() {
     assert_eq!(texel_buffers(&passed).unwrap(), passed);
 }
 
+/// Memory of a workgroup has no layout: a type in it is decorated only where a buffer needs it.
+#[test]
+fn types_in_workgroup_memory_lose_their_layout() {
+    let kernel = |shared: &str| {
+        compile(&format!(
+            "struct Pair {{ row: vec4f, list: array<u32, 4> }}
+             struct Other {{ row: vec4f, list: array<u32, 5> }}
+             @group(0) @binding(0) var<storage, read_write> values: array<Pair>;
+             var<workgroup> shared_values: array<{shared}, 8>;
+             @compute @workgroup_size(8) fn main(@builtin(local_invocation_index) lane: u32) {{
+                 shared_values[lane].list[1] = lane;
+                 workgroupBarrier();
+                 values[lane].list[2] = shared_values[7u - lane].list[1];
+             }}"
+        ))
+    };
+    let layouts = |module: &[u32]| {
+        let of = |(opcode, operands): &(u16, Vec<u32>)| match opcode {
+            71 => operands[1] == 6,  // ArrayStride
+            72 => operands[2] == 35, // Offset
+            _ => false,
+        };
+        instructions(module).iter().filter(|one| of(one)).count()
+    };
+    let module = kernel("Other");
+    let before = layouts(&module);
+    let passed = workgroup_layouts(&module).unwrap();
+    validate("workgroup", "vulkan1.1", &passed);
+    assert_eq!(
+        before - layouts(&passed),
+        4,
+        "two strides and two offsets go"
+    );
+    assert_eq!(workgroup_layouts(&passed).unwrap(), passed);
+    assert!(matches!(
+        workgroup_layouts(&kernel("Pair")),
+        Err(PassError::SharedLayout { .. })
+    ));
+    let mut with_workgroup_memory = 0;
+    for (name, code) in tumble::vulkan::kernels() {
+        let code = words(code);
+        assert_eq!(workgroup_layouts(&code).unwrap(), code, "{name}");
+        let all = instructions(&code);
+        let shares = |(opcode, operands): &(u16, Vec<u32>)| *opcode == 32 && operands[1] == 4;
+        with_workgroup_memory += usize::from(all.iter().any(shares));
+    }
+    assert!(with_workgroup_memory > 0);
+}
+
 #[test]
 fn what_is_no_module_is_refused() {
     assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv.into()));
     assert_eq!(texel_buffers(&[]), Err(SpirvError::NotSpirv));
     assert_eq!(splat_products(&[]), Err(SpirvError::NotSpirv));
+    assert_eq!(workgroup_layouts(&[]), Err(SpirvError::NotSpirv.into()));
     assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv.into()));
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
     assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete.into()));
@@ -319,6 +369,7 @@ proptest! {
         let _ = float_controls(&module, ALL_CONTROLS);
         let _ = without_decorations(&module);
         let _ = texel_buffers(&module);
+        let _ = texel_buffers(&module);
         let _ = splat_products(&module);
     }
 
@@ -331,6 +382,7 @@ proptest! {
             module[offset] = value;
             let _ = no_contraction(&module);
             let _ = float_controls(&module, ALL_CONTROLS);
+            let _ = texel_buffers(&module);
             let _ = texel_buffers(&module);
             let _ = splat_products(&module);
         }

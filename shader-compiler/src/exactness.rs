@@ -26,7 +26,12 @@ const MEMORY_MODEL: u16 = 14;
 const TYPE_FLOAT: u16 = 22;
 const TYPE_VECTOR: u16 = 23;
 const TYPE_IMAGE: u16 = 25;
+const TYPE_ARRAY: u16 = 28;
+const TYPE_RUNTIME_ARRAY: u16 = 29;
+const TYPE_STRUCT: u16 = 30;
+const TYPE_POINTER: u16 = 32;
 const LOAD: u16 = 61;
+const MEMBER_DECORATE: u16 = 72;
 const COMPOSITE_CONSTRUCT: u16 = 80;
 const IMAGE_FETCH: u16 = 95;
 const EXECUTION_MODE_ID: u16 = 331;
@@ -70,6 +75,14 @@ pub enum PassError {
         word: usize,
         /// Its opcode.
         opcode: u16,
+    },
+    /// A type that a buffer and a workgroup share, of which one needs a layout that the other forbids.
+    #[error(
+        "type %{id} is used in a buffer and in workgroup memory; declare one of its own for each"
+    )]
+    SharedLayout {
+        /// The id of the type.
+        id: u32,
     },
     /// A floating-point type other than 32 bits wide.
     #[error("a float type of {bits} bits; only 32 are exact everywhere")]
@@ -189,6 +202,64 @@ pub fn texel_buffers(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
                 words[first] = instruction_word(IMAGE_FETCH, FETCH_WORDS as u32);
             }
             _ => {}
+        }
+    }
+    Ok(words)
+}
+
+/// Removes the strides and offsets of types that lie in workgroup memory alone. Vulkan forbids them there
+/// (VUID-StandaloneSpirv-None-10684), and naga writes them for every type that can be in a buffer.
+///
+/// # Errors
+/// A [`PassError`] for words that are no module, and for a type with a layout that a buffer uses, too.
+pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
+    const UNIFORM: u32 = 2;
+    const WORKGROUP: u32 = 4;
+    const PUSH_CONSTANT: u32 = 9;
+    const STORAGE_BUFFER: u32 = 12;
+    // RowMajor, ColMajor, ArrayStride, MatrixStride, Offset
+    const LAYOUT: [u32; 5] = [4, 5, 6, 7, 35];
+    let code = instructions(module)?;
+    // What a type consists of is declared before it, and what points to it after it.
+    let mut parts = BTreeMap::<u32, &[u32]>::new();
+    let (mut shared, mut laid_out) = (BTreeSet::new(), BTreeSet::new());
+    for instruction in &code {
+        match (instruction.opcode, instruction.words) {
+            (TYPE_ARRAY | TYPE_RUNTIME_ARRAY, [_, id, element, ..]) => {
+                parts.insert(*id, std::slice::from_ref(element));
+            }
+            (TYPE_STRUCT, [_, id, members @ ..]) => {
+                parts.insert(*id, members);
+            }
+            (TYPE_POINTER, [_, _, class, to]) => {
+                let found = match *class {
+                    WORKGROUP => &mut shared,
+                    UNIFORM | PUSH_CONSTANT | STORAGE_BUFFER => &mut laid_out,
+                    _ => continue,
+                };
+                let mut types = vec![*to];
+                while let Some(id) = types.pop() {
+                    if found.insert(id) {
+                        types.extend(parts.get(&id).copied().unwrap_or_default());
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut words = module[..HEADER_WORDS].to_vec();
+    for instruction in &code {
+        let layout_of = match (instruction.opcode, instruction.words) {
+            (op::DECORATE, [_, id, decoration, ..]) if LAYOUT.contains(decoration) => Some(*id),
+            (MEMBER_DECORATE, [_, id, _, decoration, ..]) if LAYOUT.contains(decoration) => {
+                Some(*id)
+            }
+            _ => None,
+        };
+        match layout_of.filter(|id| shared.contains(id)) {
+            Some(id) if laid_out.contains(&id) => return Err(PassError::SharedLayout { id }),
+            Some(_) => {}
+            None => words.extend_from_slice(instruction.words),
         }
     }
     Ok(words)

@@ -202,6 +202,8 @@ impl Module {
         let words =
             exactness::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
+            exactness::workgroup_layouts(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let words =
             exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
     }

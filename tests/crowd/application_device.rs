@@ -10,15 +10,22 @@ use super::{ALL, cpu, layer, library};
 use crate::application::{Application, Commands};
 use crate::support::{Random, vulkan_devices};
 
-/// Several frames in flight, each into another buffer, in every encoding: the bits of the CPU.
+/// Several frames in flight, each into another buffer, in every encoding, by each choice of kernels: the bits
+/// of the CPU.
 #[test]
 fn frames_are_recorded_into_an_applications_commands() {
     if vulkan_devices().is_empty() {
         return;
     }
+    for mapping in [Mapping::Runs, Mapping::Samples] {
+        assert_frames_are_recorded(mapping);
+    }
+}
+
+fn assert_frames_are_recorded(mapping: Mapping) {
     const FRAMES: usize = 3;
     let application = Application::new();
-    let engine = application.engine(Mapping::Automatic);
+    let engine = application.engine(mapping);
     let mut random = Random(29);
     let library = library(&mut random, 21, &[method::SLERP, method::BESSEL_OVERHAUSER]);
     let outputs = ALL
@@ -155,10 +162,16 @@ fn frames_of_visible_instances_are_recorded() {
     if vulkan_devices().is_empty() {
         return;
     }
+    for mapping in [Mapping::Runs, Mapping::Samples] {
+        assert_visible_instances_are_recorded(mapping);
+    }
+}
+
+fn assert_visible_instances_are_recorded(mapping: Mapping) {
     const INSTANCES: usize = 400;
     const ROOM: usize = 40;
     let application = Application::new();
-    let engine = application.engine(Mapping::Automatic);
+    let engine = application.engine(mapping);
     let mut random = Random(37);
     let library = library(&mut random, 7, &[method::SLERP, method::BESSEL_OVERHAUSER]);
     for output in [
