@@ -2,7 +2,8 @@
 # Every test, on this machine as on CI. Installs what the tests need where it is
 # missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val, valgrind,
 # which counts instructions, and chromium, which opens the pages of `tumble view`; Node for Khronos'
-# validator of glTF files, and Python with venv for the peers and the Python package.
+# validator of glTF files, Python with venv for the peers and the Python package, and qemu, which
+# executes aarch64's instructions.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -28,6 +29,7 @@ missing_packages() {
     command -v node >/dev/null || echo nodejs
     command -v npm >/dev/null || echo npm
     python3 -c 'import venv, ensurepip' 2>/dev/null || echo python3-venv
+    [ "$(uname -m)" = aarch64 ] || command -v qemu-aarch64-static >/dev/null || echo qemu-user-static
 }
 
 install_packages() {
@@ -74,7 +76,8 @@ fetch_validator() {
 fetch() {
     [ $# -eq 0 ] || install_packages "$@"
     fetching=()
-    for part in fetch_peers fetch_validator ./scripts/mesa.sh './scripts/python.sh --environment'; do
+    for part in fetch_peers fetch_validator ./scripts/mesa.sh './scripts/python.sh --environment' \
+        './scripts/aarch64.sh --fetch'; do
         $part &
         fetching+=($!)
     done
@@ -124,7 +127,7 @@ fi
 # Three seconds for each fuzz target, about a quarter for files of each format; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
 # The Python package waits for processes that it starts more than it computes, and other tests for their last
-# one: two rows of tests beside the engine's keep both cores busy.
+# one: what runs beside the engine's tests keeps both cores busy.
 beside=()
 start_beside() { # a file for what it says, a command
     local said=$1
@@ -138,6 +141,7 @@ others() {
     cargo test --workspace --no-fail-fast --doc || failed=$?
     return $failed
 }
+start_beside target/aarch64.log ./scripts/aarch64.sh
 start_beside target/others.log others
 start_beside target/python.log ./scripts/python.sh --color=yes
 failed=0
