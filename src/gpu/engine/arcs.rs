@@ -117,7 +117,9 @@ mod tests {
                 ..EngineOptions::default()
             };
             change(&mut options);
-            Engine::with_options(device, &options).unwrap()
+            let engine = Engine::with_options(device, &options).unwrap();
+            assert_eq!(engine.choices().unwrap().arcs_prepared_from, Some(0));
+            engine
         };
         devices.into_iter().map(open).collect()
     }

@@ -21,6 +21,8 @@ pub struct EngineChoices {
     pub read_back: &'static str,
     /// `direct`, `small-direct` or `host`: the default of uploads to the device.
     pub uploads: &'static str,
+    /// The number of keys from which on the device prepares the arcs of a clip; `None` where the host always does.
+    pub arcs_prepared_from: Option<usize>,
     /// Whether kernels write into the caller's memory, which is imported.
     pub imports_memory: bool,
     /// The number of windows in flight.
@@ -73,6 +75,8 @@ impl VulkanEngine {
                 Some(_) => "small-direct",
                 None => "host",
             },
+            arcs_prepared_from: (self.prepares_arcs_from < usize::MAX)
+                .then_some(self.prepares_arcs_from),
             imports_memory: self.imports && device.borrows.is_some(),
             windows_in_flight: self.in_flight_count,
             window: self.window(),

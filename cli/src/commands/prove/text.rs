@@ -86,9 +86,15 @@ fn who(proof: &Proof, text: &mut String) {
         );
     }
     if let Some(choices) = &device.choices {
+        let arcs = match choices.arcs_prepared_from {
+            Some(0) => "there".to_owned(),
+            Some(keys) => format!("there from {keys} keys on"),
+            None => "by the host".to_owned(),
+        };
         let _ = writeln!(
             text,
-            "  chosen     neighbours take {}, kernels read {}, results {}, copied by {}, uploads {}",
+            "  chosen     neighbours take {}, kernels read {}, results {}, copied by {}, uploads {}, \
+             arcs prepared {arcs}",
             choices.mapping, choices.reads, choices.transfer, choices.read_back, choices.uploads
         );
     }
