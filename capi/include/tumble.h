@@ -400,6 +400,41 @@ typedef uint32_t TumbleMatrixOrder;
 #endif // __cplusplus
 
 /*
+ What a pass does. Each has the bits of the same operation on the CPU.
+ */
+enum TumblePassOperation
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   The weighted sum of layers, normalized. Inputs: one or more layers, with a weight for each, finite and within
+   ±1e9.
+   */
+  TUMBLE_PASS_OPERATION_BLEND = 0,
+  /*
+   Slerp between two inputs, with one weight, 0 to 1: at 0 the result is the first input.
+   */
+  TUMBLE_PASS_OPERATION_MIX = 1,
+  /*
+   The first input, and the weighted difference of the second from `reference`, with one weight, 0 to 1.
+   */
+  TUMBLE_PASS_OPERATION_ADD = 2,
+  /*
+   Rotations and positions in the world, from one input, the rotations in the parents' frames, and a skeleton. No
+   weight; the layout must be `TUMBLE_LAYOUT_FRAME_MAJOR`.
+   */
+  TUMBLE_PASS_OPERATION_WORLD = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumblePassOperation TumblePassOperation;
+#else
+typedef uint32_t TumblePassOperation;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  A clip: a set that was prepared for one interpolation and uploaded to an engine's device. Any number of threads
  may use it at the same time.
  */
@@ -439,6 +474,12 @@ typedef struct TumbleEngine TumbleEngine;
  A motion file that was read: its clips, and messages about it. Any number of threads may use it at the same time.
  */
 typedef struct TumbleFile TumbleFile;
+
+/*
+ A pass target: a pass, prepared for recording into command buffers, and the range of the application's buffer that
+ receives its result.
+ */
+typedef struct TumblePassTarget TumblePassTarget;
 
 /*
  A set: tracks of rotation keys that are evaluated together, each with optional translations and scales. Any number
@@ -621,6 +662,81 @@ typedef struct TumbleRequest {
    */
   size_t sample_count;
 } TumbleRequest;
+
+/*
+ A range of a Vulkan buffer.
+ */
+typedef struct TumbleBufferRange {
+  /*
+   The `VkBuffer`, as a number: `(uint64_t)buffer`.
+   */
+  uint64_t buffer;
+  /*
+   The start of the range, bytes.
+   */
+  uint64_t offset;
+  /*
+   The length of the range, bytes.
+   */
+  uint64_t size;
+} TumbleBufferRange;
+
+/*
+ A pass over rotations in buffers of an application's Vulkan device. Each input has four f32 `x y z w` for each
+ sample of each track, as `tumble_clip_evaluate_to_buffer` and `tumble_clip_record` write them.
+ */
+typedef struct TumblePass {
+  /*
+   `sizeof(TumblePass)`.
+   */
+  size_t size;
+  /*
+   A `TumblePassOperation`.
+   */
+  uint32_t operation;
+  /*
+   A `TumbleLayout`, of every input and of the result.
+   */
+  uint32_t layout;
+  /*
+   The number of tracks of every input.
+   */
+  size_t track_count;
+  /*
+   The number of samples of each track.
+   */
+  size_t sample_count;
+  /*
+   The inputs, as the operation says. Each range starts at a multiple of 256, the layers of a blend at multiples
+   of 16, and has at least 16 × `track_count` × `sample_count` bytes. Layers that are contiguous in one buffer,
+   from a multiple of 256 on, are read directly; others are first copied into one buffer.
+   */
+  const struct TumbleBufferRange *inputs;
+  /*
+   The number of `inputs`.
+   */
+  size_t input_count;
+  /*
+   The weights, as the operation says.
+   */
+  const float *weights;
+  /*
+   The number of `weights`.
+   */
+  size_t weight_count;
+  /*
+   For `TUMBLE_PASS_OPERATION_ADD`: a rotation `x y z w` for each track.
+   */
+  const float *reference;
+  /*
+   For `TUMBLE_PASS_OPERATION_WORLD`: the index of each joint's parent, -1 for a root, with a joint for each track.
+   */
+  const int32_t *parents;
+  /*
+   For `TUMBLE_PASS_OPERATION_WORLD`: the position `x y z` of each joint in its parent's frame; null: all are 0.
+   */
+  const float *offsets;
+} TumblePass;
 
 /*
  An application's Vulkan instance, device and queue, for `tumble_engine_from_vulkan`. The library does not destroy
@@ -1288,6 +1404,109 @@ TumbleResult tumble_clip_record(const struct TumbleClipTarget *target,
 TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
 
 /*
+ Returns the size of a pass's result in bytes: 16 for each sample of each track, or 32 for
+ `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
+ or the engine was not created by `tumble_engine_from_vulkan`; `TUMBLE_RESULT_INVALID_POINTER` if an array is null;
+ `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
+
+ # Safety
+ `pass` must point to a `TumblePass` whose pointers are null or as its members say, and `bytes` must point to memory
+ for a number.
+ */
+TumbleResult tumble_pass_bytes(const struct TumbleEngine *engine,
+                               const struct TumblePass *pass,
+                               uint64_t *bytes);
+
+/*
+ Runs a pass with its result in a range of a buffer, and waits for it. Commands that are submitted to the engine's
+ queue afterwards see the result; the inputs may be written by commands that were submitted there before.
+
+ The range starts at a multiple of 256, has at least the bytes of `tumble_pass_bytes`, and does not overlap an
+ input. All buffers must belong to the engine's device, be bound to memory, and have the usage
+ `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`; layers of a blend that are not contiguous need
+ `VK_BUFFER_USAGE_TRANSFER_SRC_BIT` too. This call submits to the engine's queue.
+
+ # Errors
+ As `tumble_pass_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short;
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
+ track by track, or the result overlaps an input; `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ # Safety
+ `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as
+ described, and nothing else may use the ranges during the call.
+ */
+TumbleResult tumble_pass_to_buffer(const struct TumbleEngine *engine,
+                                   const struct TumblePass *pass,
+                                   uint64_t buffer,
+                                   uint64_t offset,
+                                   uint64_t size);
+
+/*
+ Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
+
+ The kernel is compiled and memory is allocated here, not when a frame is recorded; this call submits to the
+ engine's queue when it checks a new kernel. The buffers must be as `tumble_pass_to_buffer` says. The target does
+ not need the engine afterwards. The application frees it with `tumble_pass_target_free` before it destroys a buffer
+ or the device.
+
+ # Errors
+ As `tumble_pass_to_buffer`.
+
+ # Safety
+ `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as
+ described; and `target` must point to memory for a handle.
+ */
+TumbleResult tumble_pass_target_new(const struct TumbleEngine *engine,
+                                    const struct TumblePass *pass,
+                                    uint64_t buffer,
+                                    uint64_t offset,
+                                    uint64_t size,
+                                    struct TumblePassTarget **target);
+
+/*
+ Sets the weights of a pass target for later recordings: as many as the pass has. Commands that are already recorded
+ keep theirs.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of weights is another, or a weight is out of its range; then none is
+ set.
+
+ # Safety
+ `weights` must have `weight_count` numbers.
+ */
+TumbleResult tumble_pass_set_weights(const struct TumblePassTarget *target,
+                                     const float *weights,
+                                     size_t weight_count);
+
+/*
+ Records a pass into the application's command buffer `commands`, a `VkCommandBuffer`.
+
+ Nothing is submitted, waited for or allocated. The weights stay in the commands. Barriers are included: the pass
+ waits for all commands that were recorded before it, such as those of `tumble_clip_record`, and all commands after
+ it see the result. The commands may be submitted any number of times; all recordings of one target must run on one
+ queue.
+
+ The command buffer must belong to the engine's device and to a queue family that can compute, and must be in the
+ recording state, outside a render pass.
+
+ # Safety
+ The command buffer must be as described, and nothing else may use it during the call.
+ */
+TumbleResult tumble_pass_record(const struct TumblePassTarget *target,
+                                void *commands);
+
+/*
+ Frees a pass target. Does nothing if `target` is null.
+
+ # Safety
+ All work that was recorded with the target must have ended, and none may be submitted later.
+ */
+TumbleResult tumble_pass_target_free(struct TumblePassTarget *target);
+
+/*
  Sets the translation keys of the track `track`, counted from 0, and replaces earlier ones.
 
  `times` are `key_count` key times in seconds, at least one, strictly increasing; they may differ from the times of
@@ -1324,16 +1543,18 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
                                size_t key_count);
 
 /*
- Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds and
- clips into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`).
+ Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds,
+ clips and passes into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`,
+ `tumble_pass_record`).
 
  The Vulkan objects belong to the application. It may destroy them only after it has freed the engine, its clips,
  crowds and targets, and after all calls with these have returned. The caller frees the engine with
  `tumble_engine_free`. `options` may be null for the defaults.
 
  These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
- `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_crowd_new`,
- `tumble_crowd_target_new`, `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
+ `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
+ `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_evaluate`,
+ `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
  Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
  queue that only the library uses, if the device has several.
 

@@ -15,11 +15,13 @@ pub mod engine;
 pub mod file;
 mod handle;
 pub mod interpolation;
+pub mod pass;
 pub mod request;
 pub mod result;
 pub mod samples;
 pub mod set;
 pub mod set_vectors;
+mod skeleton;
 #[cfg(test)]
 mod tests;
 pub mod version;

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tumble::crowd::CrowdError;
 use tumble::vulkan::VulkanError;
-use tumble::{Error, SkeletonError, TrackError};
+use tumble::{Error, PoseError, SkeletonError, TrackError};
 use tumble_formats::Diagnostic;
 
 /// The result code of a call. If it is not `TUMBLE_RESULT_OK`, `tumble_last_error` returns a message with the reason.
@@ -73,6 +73,8 @@ impl From<Error> for Failure {
             Error::OutputLength { .. }
             | Error::OutputBytes { .. }
             | Error::ComparedLength { .. } => TumbleResult::WrongSize,
+            Error::Pose(PoseError::Buffer { .. }) => TumbleResult::WrongSize,
+            Error::Pose(_) => TumbleResult::InvalidArgument,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
             Error::NoSuchPart { .. } => TumbleResult::OutOfRange,
             Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
@@ -83,6 +85,10 @@ impl From<Error> for Failure {
             Error::BufferOnCpu => Self::new(
                 code,
                 "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with tumble_engine_from_vulkan",
+            ),
+            Error::Pose(PoseError::TrackMajor) => Self::new(
+                code,
+                "the poses of a skeleton lie track by track in the buffer; evaluate them with TUMBLE_LAYOUT_FRAME_MAJOR",
             ),
             Error::NotRotations => Self::new(
                 code,

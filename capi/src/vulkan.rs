@@ -242,16 +242,18 @@ pub(crate) fn buffer_range(
     })
 }
 
-/// Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds and
-/// clips into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`).
+/// Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds,
+/// clips and passes into the application's command buffers (`tumble_crowd_record`, `tumble_clip_record`,
+/// `tumble_pass_record`).
 ///
 /// The Vulkan objects belong to the application. It may destroy them only after it has freed the engine, its clips,
 /// crowds and targets, and after all calls with these have returned. The caller frees the engine with
 /// `tumble_engine_free`. `options` may be null for the defaults.
 ///
 /// These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
-/// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_crowd_new`,
-/// `tumble_crowd_target_new`, `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
+/// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
+/// `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_evaluate`,
+/// `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
 /// Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
 /// queue that only the library uses, if the device has several.
 ///

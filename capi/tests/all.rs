@@ -8,6 +8,7 @@ mod application;
 mod application_device;
 #[path = "../../tests/support/layer.rs"]
 mod layer;
+mod passes;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 
@@ -37,6 +38,7 @@ fn the_header_is_what_the_sources_say() {
         "samples",
         "clip",
         "request",
+        "pass",
         "set_vectors",
         "vulkan",
         "crowd/library",

@@ -29,25 +29,25 @@ const JOINTS: usize = 3;
 const INSTANCES: usize = 33;
 const FRAMES: usize = 3;
 
-fn words() -> String {
+pub(crate) fn words() -> String {
     // SAFETY: text that ends with a zero.
     let words = unsafe { CStr::from_ptr(tumble_last_error()) };
     words.to_string_lossy().into_owned()
 }
 
 #[track_caller]
-fn done(result: TumbleResult) {
+pub(crate) fn done(result: TumbleResult) {
     assert_eq!(result, TumbleResult::Ok, "{}", words());
 }
 
 #[track_caller]
-fn fails(result: TumbleResult, code: TumbleResult, says: &str) {
+pub(crate) fn fails(result: TumbleResult, code: TumbleResult, says: &str) {
     assert_eq!(result, code, "{}", words());
     assert!(words().contains(says), "{}", words());
 }
 
 /// What an application in C would fill in.
-fn handles(application: &Application) -> TumbleVulkan {
+pub(crate) fn handles(application: &Application) -> TumbleVulkan {
     let get = application.entry.static_fn().get_instance_proc_addr;
     TumbleVulkan {
         size: size_of::<TumbleVulkan>(),
@@ -89,7 +89,7 @@ unsafe extern "C" fn unlock_queue(user: *mut c_void) {
     unlocked.fetch_add(1, Ordering::SeqCst);
 }
 
-fn pointer(handle: impl Handle) -> *mut c_void {
+pub(crate) fn pointer(handle: impl Handle) -> *mut c_void {
     std::ptr::with_exposed_provenance_mut(handle.as_raw() as usize)
 }
 
@@ -98,7 +98,7 @@ fn function(function: vk::PFN_vkGetInstanceProcAddr) -> unsafe extern "C" fn() {
     unsafe { std::mem::transmute(function) }
 }
 
-fn open(vulkan: &TumbleVulkan, engine: &mut *mut TumbleEngine) -> TumbleResult {
+pub(crate) fn open(vulkan: &TumbleVulkan, engine: &mut *mut TumbleEngine) -> TumbleResult {
     // SAFETY: a structure, and room for the handle.
     unsafe { tumble_engine_from_vulkan(vulkan, null(), engine) }
 }
@@ -832,6 +832,7 @@ fn no_layer_has_anything_to_say() {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args([
             "application_device::",
+            "passes::",
             "--nocapture",
             "--skip",
             "no_layer_has",

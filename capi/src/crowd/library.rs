@@ -3,7 +3,7 @@
 use std::ffi::{CString, c_char};
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+use glam::{Affine3A, Mat3A, Vec3A};
 use tumble::crowd::CrowdLibrary;
 use tumble::{Skeleton, VectorMethod};
 use tumble_formats::motion::Transform;
@@ -13,6 +13,7 @@ use crate::handle::{self, Object};
 use crate::interpolation::TumbleInterpolation;
 use crate::result::{Failure, TumbleResult, code, guarded};
 use crate::set::TumbleSet;
+use crate::skeleton::joints;
 
 /// A library: the clips, masks and inverse bind matrices of one skeleton, prepared for crowds. Any number of threads
 /// may use it at the same time.
@@ -83,35 +84,18 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(library, "library")?;
-        let numbers = if offsets.is_null() {
-            0
-        } else {
-            product::<f32>(joint_count, 3, "offsets")?
-        };
         // SAFETY: as the caller promises.
-        let (parents, offsets) = unsafe {
-            (
-                list(parents, joint_count, "parents")?,
-                list(offsets, numbers, "offsets")?,
-            )
-        };
-        let (offsets, _) = offsets.as_chunks::<3>();
-        let joint = |(joint, &parent): (usize, &i32)| {
+        let joints = unsafe { joints(parents, offsets, joint_count)? };
+        let joint = |(parent, offset)| {
             let mut library_joint = LibraryJoint {
-                parent: usize::try_from(parent).ok(),
+                parent,
                 ..LibraryJoint::default()
             };
-            if library_joint.parent.is_none() && parent != -1 {
-                let message = format!("`parents[{joint}]` is {parent}; that of a root is -1");
-                return Err(Failure::argument(message));
-            }
-            if let Some(&offset) = offsets.get(joint) {
-                library_joint.rest.translation = Vec3::from_array(offset);
-            }
-            Ok(library_joint)
+            library_joint.rest.translation = offset;
+            library_joint
         };
-        let joints = parents.iter().enumerate().map(joint);
-        let made = TumbleCrowdLibrary::new(joints.collect::<Result<_, _>>()?, ticks_per_second)?;
+        let joints = joints.into_iter().map(joint).collect();
+        let made = TumbleCrowdLibrary::new(joints, ticks_per_second)?;
         // SAFETY: as the caller promises.
         unsafe { out.set(handle::give(made)) };
         Ok(())
