@@ -7,6 +7,8 @@ mod body;
 mod bvh;
 mod bvh_write;
 mod cases;
+#[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
+mod codes;
 mod dat_fixtures;
 #[cfg(feature = "fbx")]
 mod fbx;
