@@ -6,7 +6,7 @@
 #   scripts/platforms.sh wasm windows        these
 #
 #   aarch64   Linux on aarch64, by qemu: recorded hashes, the CPU's tests of the engine and of files
-#   wasm      WebAssembly, by Node: recorded hashes, without and with its vectors
+#   wasm      WebAssembly, by Node: recorded hashes, the CPU's tests, without and with its vectors
 #   windows   Windows on x86-64, by wine: recorded hashes, the CPU's tests, the program's commands
 #   types     macOS and Android: the engine, files and routes type-check
 #
@@ -65,12 +65,10 @@ wasm() {
     packages /usr/bin/node nodejs
     local name=wasm32-wasip1 vectors
     target $name
+    export CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $root/scripts/platforms/wasi.mjs"
     for vectors in -simd128 +simd128; do
-        step "wasm32, $vectors: recorded hashes"
-        RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=$vectors" cargo build --quiet --release \
-            --manifest-path tests/without_vulkan/Cargo.toml --target $name
-        node --no-warnings scripts/platforms/wasi.mjs \
-            "$CARGO_TARGET_DIR/$name/release/without-vulkan.wasm" golden
+        step "wasm32, $vectors: the CPU's tests"
+        RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=$vectors" scripts/cpu-tests.sh $name
     done
 }
 

@@ -122,7 +122,7 @@ pub use crate::engine::clip::Clip;
 pub use crate::engine::clip::request::Request;
 pub use crate::error::Error;
 pub use crate::gpu::options::EngineOptions;
-pub use crate::memory::OutOfMemoryError;
+pub use crate::memory::{OutOfMemoryError, available_memory};
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::VectorMethod;
 pub use crate::method::{METHODS, Method};

@@ -8,15 +8,18 @@
 mod accuracy;
 mod bit_identity;
 mod c2;
+#[cfg(feature = "vulkan")]
 mod crowd;
 mod encoding;
+#[cfg(feature = "vulkan")]
 mod examples;
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "vulkan", target_os = "linux"))]
 mod exported;
 mod external_vectors;
 mod extremes;
 mod follow;
 mod golden;
+#[cfg(feature = "vulkan")]
 mod mesa;
 mod method_lists;
 mod motion;
@@ -27,21 +30,29 @@ mod outside;
 mod poses;
 mod reduce;
 mod sparse_samples;
+#[cfg(feature = "vulkan")]
 mod speed;
+#[cfg(feature = "vulkan")]
 mod spirv;
 mod stream;
 mod textbook;
+#[cfg(feature = "vulkan")]
 mod threads;
+#[cfg(feature = "vulkan")]
 mod tidy;
 mod times;
 mod transforms;
+#[cfg(feature = "vulkan")]
 mod validation;
 mod verify;
+#[cfg(feature = "vulkan")]
 mod vulkan;
 mod widths;
 
+#[cfg(feature = "vulkan")]
 #[path = "support/application.rs"]
 mod application;
+#[cfg(feature = "vulkan")]
 #[path = "support/layer.rs"]
 mod layer;
 mod support;

@@ -1,6 +1,7 @@
 //! Poses from poses: layers blended, mixed and added, and chains walked down to the
 //! world. The same bits on every device, near the textbook.
 
+#[cfg(feature = "vulkan")]
 mod buffers;
 
 use crate::support::{Random, hostile_set, vulkan_devices};

@@ -471,7 +471,7 @@ mod tests {
             bytes.extend(header.bytes());
             from_bytes(&bytes).unwrap_err().to_string()
         };
-        let found = packed(r#"{"tracks":[{"keys":18446744073709551615}]}"#);
+        let found = packed(&format!(r#"{{"tracks":[{{"keys":{}}}]}}"#, usize::MAX));
         assert_eq!(found, "track 0: the bytes end before its key times");
         let found = packed(r#"{"tracks":[{"sharesTimes":true}]}"#);
         assert_eq!(found, "track 0 cannot share the times of a track before it");

@@ -3,6 +3,7 @@
 use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::beneath::{is_refused, open_beneath};
 use crate::diagnostic::{Code, Diagnostic};
@@ -11,7 +12,7 @@ use crate::diagnostic::{Code, Diagnostic};
 pub(super) struct Source {
     pub(super) name: String,
     pub(super) reader: BufReader<Box<dyn Read>>,
-    file: Option<(File, Metadata)>,
+    file: Option<(Arc<File>, Metadata)>,
 }
 
 impl Source {
@@ -70,12 +71,12 @@ impl Source {
 
     fn of_file(file: File, name: String) -> io::Result<Self> {
         let metadata = file.metadata()?;
-        let watched = file.try_clone()?;
-        let reader: Box<dyn Read> = Box::new(file);
+        let file = Arc::new(file);
+        let reader: Box<dyn Read> = Box::new(Arc::clone(&file));
         Ok(Self {
             name,
             reader: BufReader::with_capacity(BUFFER, reader),
-            file: metadata.is_file().then_some((watched, metadata)),
+            file: metadata.is_file().then_some((file, metadata)),
         })
     }
 

@@ -1,8 +1,7 @@
 //! Allocations whose size depends on a caller's request: they may fail, and then return an error.
 
 /// Below this number of bytes, only the system decides.
-#[cfg(target_os = "linux")]
-const LARGE: u128 = 1 << 30;
+const LARGE: u128 = 1 << 28;
 
 /// There is not enough memory for a result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -50,11 +49,7 @@ pub(crate) fn refuse_more_than_there_is<T>(
     purpose: &'static str,
 ) -> Result<(), OutOfMemoryError> {
     let asked = OutOfMemoryError::new::<T>(purpose, count);
-    #[cfg(target_os = "linux")]
-    if asked.bytes >= LARGE
-        && let Ok(text) = std::fs::read_to_string("/proc/meminfo")
-        && asked.bytes > available(&text)
-    {
+    if asked.bytes >= LARGE && available_memory().is_some_and(|bytes| asked.bytes > bytes.into()) {
         return Err(asked);
     }
     match isize::try_from(asked.bytes) {
@@ -63,16 +58,36 @@ pub(crate) fn refuse_more_than_there_is<T>(
     }
 }
 
-/// The bytes of memory and of swap space that are free or can be freed, from Linux's `/proc/meminfo`.
-#[cfg(target_os = "linux")]
-fn available(meminfo: &str) -> u128 {
-    let kibibytes = |name: &str| {
-        let line = meminfo.lines().find_map(|line| line.strip_prefix(name))?;
-        line.split_whitespace().next()?.parse::<u128>().ok()
-    };
-    match kibibytes("MemAvailable:") {
-        Some(memory) => (memory + kibibytes("SwapFree:").unwrap_or(0)) * 1024,
-        None => u128::MAX,
+/// The memory that this process can still get, bytes: of the system's memory what is free or can be freed, and its free
+/// swap space; in a container at most what its limit leaves. `None` where the system does not say, such as in a browser.
+///
+/// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less is available. Systems may promise
+/// memory that they do not have, and then end the process that uses it.
+#[must_use]
+pub fn available_memory() -> Option<u64> {
+    #[cfg(target_family = "wasm")]
+    return None;
+    #[cfg(not(target_family = "wasm"))]
+    {
+        let mut system = sysinfo::System::new();
+        system.refresh_memory();
+        if system.total_memory() == 0 {
+            return None;
+        }
+        let free = system.available_memory().saturating_add(system.free_swap());
+        let limits = system.cgroup_limits();
+        let limits = limits.map(|limits| (limits.total_memory, limits.rss));
+        Some(within_limits(free, system.total_memory(), limits))
+    }
+}
+
+/// Of the memory that a system has free, what a container's limit leaves: the limit without what its processes use.
+/// Files that it has in memory give way. A limit of all memory is none.
+#[cfg(not(target_family = "wasm"))]
+fn within_limits(free: u64, total: u64, limits: Option<(u64, u64)>) -> u64 {
+    match limits {
+        Some((limit, used)) if limit < total => free.min(limit.saturating_sub(used)),
+        _ => free,
     }
 }
 
@@ -82,7 +97,11 @@ mod tests {
 
     #[test]
     fn what_no_machine_has_is_refused_and_named() {
-        for count in [1 << 46, usize::MAX / 16, usize::MAX] {
+        for count in [
+            isize::MAX as usize >> if usize::BITS == 64 { 17 } else { 2 },
+            usize::MAX / 16,
+            usize::MAX,
+        ] {
             let expected = OutOfMemoryError {
                 purpose: "a result",
                 bytes: 16 * count as u128,
@@ -97,11 +116,21 @@ mod tests {
         assert!(reserved::<f32>(3, "a result").unwrap().capacity() >= 3);
     }
 
-    #[cfg(target_os = "linux")]
+    #[cfg(not(target_family = "wasm"))]
     #[test]
-    fn the_systems_table_is_read() {
-        let table = "MemTotal:  16 kB\nMemAvailable:      5 kB\nSwapFree:   2 kB\n";
-        assert_eq!(available(table), 7 * 1024);
-        assert_eq!(available("MemTotal: 16 kB\n"), u128::MAX);
+    fn a_containers_limit_counts_and_the_systems_does_not() {
+        assert_eq!(within_limits(70, 100, None), 70);
+        assert_eq!(within_limits(70, 100, Some((100, 60))), 70);
+        assert_eq!(within_limits(70, 100, Some((90, 60))), 30);
+        assert_eq!(within_limits(20, 100, Some((90, 60))), 20);
+        assert_eq!(within_limits(70, 100, Some((40, 60))), 0);
+    }
+
+    #[cfg(any(target_os = "linux", target_os = "macos", windows))]
+    #[test]
+    fn the_system_says_what_is_free() {
+        let free = available_memory().unwrap();
+        assert!(free > 1 << 20, "{free}");
+        assert!(free < 1 << 50, "{free}");
     }
 }

@@ -108,6 +108,7 @@ pub(crate) trait Parameters<L> {
     fn next(&mut self) -> L;
 }
 
-#[cfg(test)]
+// They compare kernels, too, which are there with Vulkan alone.
+#[cfg(all(test, feature = "vulkan"))]
 #[path = "../../tests/twins/mod.rs"]
 mod tests;

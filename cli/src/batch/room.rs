@@ -22,7 +22,7 @@ pub(crate) fn in_memory(
         .resolve(tracks, set.time_span())
         .map_err(|error| Failure::evaluating(name, &error.into()))?;
     let needed = (tracks * timeline.len() * size_of::<Quat>()) as f64 * copies as f64;
-    match available_memory() {
+    match tumble::available_memory().map(|bytes| bytes as f64) {
         Some(free) if needed > free => Err(too_large(
             name,
             tracks,
@@ -77,16 +77,6 @@ fn too_large(name: &str, tracks: usize, samples: usize, bytes: f64, limit: &str)
             words::bytes(bytes),
         ),
     )
-}
-
-/// The memory that Linux reports as available; unknown elsewhere, where only the library's limits apply.
-fn available_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024.0)
 }
 
 #[cfg(unix)]
