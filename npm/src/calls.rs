@@ -121,6 +121,7 @@ struct TrackHeader {
 /// A file whose bytes come behind.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
+#[cfg_attr(not(feature = "files"), allow(dead_code))] // no file is read then
 struct FileHeader {
     name: String,
     /// The rate of the keys, where the file does not say it.
