@@ -66,6 +66,9 @@ struct Inputs<'a> {
     weights: &'a [f32],
 }
 
+/// A pass, the weights that are set later, and the result before and after that.
+type Row<'a> = (TumblePass, &'a [f32], [Vec<u8>; 2]);
+
 fn bytes(engine: *const TumbleEngine, pass: &TumblePass) -> u64 {
     let mut bytes = 0;
     // SAFETY: a structure, and room for the number.
@@ -141,7 +144,7 @@ fn passes_give_the_bits_of_the_cpu() {
             let world = cpu.world(local, &skeleton).unwrap();
             bytemuck::cast_slice(world.as_slice()).to_vec()
         };
-        let rows: [(TumblePass, &[f32], [Vec<u8>; 2]); 4] = [
+        let rows: [Row<'_>; 4] = [
             (
                 blended.pass(Blend, samples),
                 &[1.0, 2.0, 0.0],
