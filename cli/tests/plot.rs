@@ -14,6 +14,8 @@ const FINER: f64 = 10.0;
 /// An SVG file's marks.
 struct Marks {
     texts: Vec<String>,
+    /// Labels of ticks below the axes of times, and where their middle is.
+    time_labels: Vec<(f64, f64)>,
     /// Stroke and points of every line.
     lines: Vec<(String, Vec<(f64, f64)>)>,
     dots: Vec<(f64, f64)>,
@@ -34,9 +36,13 @@ impl Marks {
             let numbers: Vec<f64> = numbers.filter_map(|number| number.parse().ok()).collect();
             numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
         };
+        let texts = || named("text").map(|text| (text, text.text().unwrap().trim()));
+        // Those of the other axis end where the panel begins; titles and names of axes are no numbers.
+        let middle = texts().filter(|(text, _)| text.attribute("text-anchor") == Some("middle"));
         Self {
-            texts: named("text")
-                .map(|text| text.text().unwrap().trim().to_owned())
+            texts: texts().map(|(_, shown)| shown.to_owned()).collect(),
+            time_labels: middle
+                .filter_map(|(text, shown)| Some((shown.parse().ok()?, number(text, "x"))))
                 .collect(),
             lines: named("polyline")
                 .map(|line| (line.attribute("stroke").unwrap().to_owned(), points(line)))
@@ -92,7 +98,12 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
             &["--dimension", dimension, "-m", "slerp", "--fps", "50"],
         );
         assert!(marks.says(title), "{:?}", marks.texts);
-        assert!(marks.says("slerp") && marks.says("key") && marks.says("frame (50 per second)"));
+        assert!(marks.says("slerp") && marks.says("key") && marks.says("time, s"));
+        assert!(
+            marks.says("101 frames, 50 per second; evaluated on CPU"),
+            "{:?}",
+            marks.texts
+        );
         let [curve] = marks.curves(SLERP)[..] else {
             panic!("one curve, not {}", marks.curves(SLERP).len());
         };
@@ -106,6 +117,14 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
         let height = (dots[1].1 - dots[0].1) / (values[1] - values[0]);
         let width = (dots[1].0 - dots[0].0) / (times[1] - times[0]);
         assert!(height < 0.0 && width > 0.0, "up is more, right is later");
+        assert!(marks.time_labels.len() >= 5, "{:?}", marks.time_labels);
+        for &(seconds, x) in &marks.time_labels {
+            let expected = dots[0].0 + width * (seconds - times[0]);
+            assert!(
+                (x - expected).abs() < FINER / 2.0,
+                "{seconds} s is at {x}, not {expected}"
+            );
+        }
         for ((dot, value), time) in dots.iter().zip(&values).zip(&times) {
             let expected = (
                 dots[0].0 + width * (time - times[0]),

@@ -215,7 +215,7 @@ impl PlotSource<'_> {
         Panel {
             title,
             axes: PanelAxes::Plane {
-                x: self.x.clone(),
+                x: self.x.axis.clone(),
                 y: PlotAxis {
                     label: label.to_owned(),
                     range,
