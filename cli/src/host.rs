@@ -111,6 +111,14 @@ pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
     Ok(Some(engine))
 }
 
+/// The known name that is most similar to a misspelt one, if any is similar: what the program suggests.
+pub fn nearest_name<'a>(
+    misspelt: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    words::nearest(misspelt, known)
+}
+
 /// A warning about `name` if curves of a set are less smooth than their method promises: their angular acceleration
 /// jumps at a key. `None` if there are none.
 #[must_use]

@@ -40,6 +40,31 @@ pub(crate) fn writing_results() -> Vec<String> {
     names
 }
 
+/// The README's commands over files of a clone do what it says, in a clone.
+#[test]
+fn commands_of_the_readme_work_in_a_clone() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("data")).unwrap();
+    let sample = "data/pendulum.dat";
+    fs::copy(root.join(sample), folder.path().join(sample)).unwrap();
+    let text = fs::read_to_string(root.join("README.md")).unwrap();
+    let lines = text.lines().filter_map(|line| line.strip_prefix("tumble "));
+    let lines: Vec<&str> = lines.filter(|line| line.contains(sample)).collect();
+    assert!(lines.len() >= 2, "{lines:?}");
+    for line in lines {
+        let command = line.split('#').next().unwrap();
+        // There may be no browser here.
+        let command = command.replace("--open", "-o page.html");
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let run = crate::program::run(folder.path(), &words);
+        // `verify` says so where there is no Vulkan device.
+        let is_done = run.code == 0 || words[0] == "verify" && run.code == 5;
+        assert!(is_done, "{line}: {}", run.words);
+    }
+    assert!(folder.path().join("speed.svg").exists());
+}
+
 /// A file, its part between two lines, and what that part is to be.
 struct WrittenPart {
     file: PathBuf,

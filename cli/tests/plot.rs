@@ -14,6 +14,10 @@ const FINER: f64 = 10.0;
 /// An SVG file's marks.
 struct Marks {
     texts: Vec<String>,
+    /// Labels of ticks below the axes of times, and where their middle is.
+    time_labels: Vec<(f64, f64)>,
+    /// Width and height in pixels.
+    size: [f64; 2],
     /// Stroke and points of every line.
     lines: Vec<(String, Vec<(f64, f64)>)>,
     dots: Vec<(f64, f64)>,
@@ -34,10 +38,15 @@ impl Marks {
             let numbers: Vec<f64> = numbers.filter_map(|number| number.parse().ok()).collect();
             numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
         };
+        let texts = || named("text").map(|text| (text, text.text().unwrap().trim()));
+        // Those of the other axis end where the panel begins; titles and names of axes are no numbers.
+        let middle = texts().filter(|(text, _)| text.attribute("text-anchor") == Some("middle"));
         Self {
-            texts: named("text")
-                .map(|text| text.text().unwrap().trim().to_owned())
+            texts: texts().map(|(_, shown)| shown.to_owned()).collect(),
+            time_labels: middle
+                .filter_map(|(text, shown)| Some((shown.parse().ok()?, number(text, "x"))))
                 .collect(),
+            size: ["width", "height"].map(|name| number(document.root_element(), name)),
             lines: named("polyline")
                 .map(|line| (line.attribute("stroke").unwrap().to_owned(), points(line)))
                 .collect(),
@@ -92,7 +101,12 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
             &["--dimension", dimension, "-m", "slerp", "--fps", "50"],
         );
         assert!(marks.says(title), "{:?}", marks.texts);
-        assert!(marks.says("slerp") && marks.says("key") && marks.says("frame (50 per second)"));
+        assert!(marks.says("slerp") && marks.says("key") && marks.says("time, s"));
+        assert!(
+            marks.says("101 frames, 50 per second; evaluated on CPU"),
+            "{:?}",
+            marks.texts
+        );
         let [curve] = marks.curves(SLERP)[..] else {
             panic!("one curve, not {}", marks.curves(SLERP).len());
         };
@@ -106,6 +120,14 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
         let height = (dots[1].1 - dots[0].1) / (values[1] - values[0]);
         let width = (dots[1].0 - dots[0].0) / (times[1] - times[0]);
         assert!(height < 0.0 && width > 0.0, "up is more, right is later");
+        assert!(marks.time_labels.len() >= 5, "{:?}", marks.time_labels);
+        for &(seconds, x) in &marks.time_labels {
+            let expected = dots[0].0 + width * (seconds - times[0]);
+            assert!(
+                (x - expected).abs() < FINER / 2.0,
+                "{seconds} s is at {x}, not {expected}"
+            );
+        }
         for ((dot, value), time) in dots.iter().zip(&values).zip(&times) {
             let expected = (
                 dots[0].0 + width * (time - times[0]),
@@ -175,6 +197,146 @@ fn panels_have_the_names_of_joints() {
         "{:?}",
         marks.texts
     );
+}
+
+/// A BVH file of joints side by side, `joint1` and so on. Those numbered in `still` do not turn.
+fn skeleton(folder: &Path, joints: usize, still: &[usize]) {
+    let mut text =
+        "HIERARCHY\nROOT joint1\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+            .to_owned();
+    for joint in 2..=joints {
+        text += &format!(
+            "JOINT joint{joint}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n\
+             End Site\n{{\nOFFSET 0 1 0\n}}\n}}\n"
+        );
+    }
+    text += "}\nMOTION\nFrames: 3\nFrame Time: 0.5\n";
+    for angle in [10, 20, 10] {
+        for joint in 1..=joints {
+            let angle = if still.contains(&joint) { 30 } else { angle };
+            text += &format!("{angle} 0 0 ");
+        }
+        text += "\n";
+    }
+    fs::write(folder.join("a.dat"), text).unwrap();
+}
+
+/// Would catch panels that show nothing, joints that are missing without a word, and chosen ones that are left out.
+#[test]
+fn joints_that_do_not_turn_are_left_out_unless_they_are_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let out = ["-o", "out.svg", "--overwrite", "--show", "speed"];
+    for (still, arguments, drawn, note) in [
+        (&[][..], "", &[1, 2, 3, 4][..], None),
+        (
+            &[2, 4],
+            "",
+            &[1, 3],
+            Some(
+                "a.dat: not drawn, they do not turn: joint2, joint4; --tracks or --box draws them\n",
+            ),
+        ),
+        (
+            &[1],
+            "",
+            &[2, 3, 4],
+            Some("a.dat: not drawn, it does not turn: joint1; --tracks or --box draws it\n"),
+        ),
+        (&[2, 4], "--box 2,3", &[2, 3], None),
+        (&[2, 4], "--tracks joint4", &[4], None),
+        (&[1, 2, 3, 4], "", &[1, 2, 3, 4], None),
+    ] {
+        skeleton(folder, 4, still);
+        let chosen = arguments.split_whitespace();
+        let line: Vec<&str> = ["plot", "a.dat"]
+            .into_iter()
+            .chain(out)
+            .chain(chosen)
+            .collect();
+        let words = succeed(folder, &line).words;
+        match note {
+            Some(note) => assert!(words.contains(note), "{words}"),
+            None => assert!(!words.contains("not drawn"), "{words}"),
+        }
+        let marks = Marks::of(&folder.join("out.svg"));
+        for joint in 1..=4 {
+            let is_drawn = marks.says(&format!("joint{joint}"));
+            assert_eq!(
+                is_drawn,
+                drawn.contains(&joint),
+                "{still:?} {arguments}: {joint}"
+            );
+        }
+    }
+    skeleton(folder, 4, &[2, 4]);
+    succeed(folder, &["plot", "a.dat", "-o", "each"]);
+    assert_eq!(fs::read_dir(folder.join("each")).unwrap().count(), 2);
+    succeed(folder, &["plot", "--report", "a.dat", "-o", "report"]);
+    let marks = Marks::of(&folder.join("report/a-speed.svg"));
+    assert!(marks.says("joint3") && !marks.says("joint2"));
+    // A dimension is one that is chosen.
+    succeed(
+        folder,
+        &["plot", "a.dat", "--dimension", "5", "-o", "one.svg"],
+    );
+    assert!(Marks::of(&folder.join("one.svg")).says("dimension 5: w of joint2"));
+}
+
+/// Would catch a page of one long column.
+#[test]
+fn a_page_of_many_panels_is_about_as_broad_as_high() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (joints, show, columns) in [
+        (1, "components", 1),
+        (2, "speed", 1),
+        (3, "speed", 2),
+        (8, "components", 2),
+        (9, "speed", 3),
+        (18, "error", 3),
+        (19, "speed", 4),
+        (31, "components", 4),
+        (8, "sphere", 2),
+        (9, "sphere", 3),
+        (10, "sphere", 4),
+        (31, "sphere", 6),
+    ] {
+        skeleton(folder, joints, &[]);
+        let marks = plot(folder, &["--show", show]);
+        let titles = marks.texts.iter().filter(|text| text.starts_with("joint"));
+        assert_eq!(titles.count(), joints);
+        let [width, height] = marks.size;
+        let panel = match (columns, show) {
+            (1, _) => 800.0,
+            (_, "sphere") => 400.0,
+            (2, _) => 560.0,
+            _ => 400.0,
+        };
+        assert_eq!(width / panel, f64::from(columns), "{joints} of {show}");
+        if joints > 8 {
+            let shape = width / height;
+            assert!((0.6..1.6).contains(&shape), "{joints} of {show}: {shape}");
+        }
+    }
+}
+
+/// Would catch an axis whose labels are all 0.
+#[test]
+fn an_axis_of_zeros_has_labels_that_differ() {
+    let folder = tempfile::tempdir().unwrap();
+    skeleton(folder.path(), 1, &[1]);
+    for (arguments, labels) in [
+        ("--show speed", &["0", "0.2", "0.8"][..]),
+        // Of a turn about z, this is x.
+        ("--dimension 2", &["-0.6", "0", "0.6"]),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let marks = plot(folder.path(), &arguments);
+        for label in labels {
+            assert!(marks.says(label), "{arguments:?}: {:?}", marks.texts);
+        }
+    }
 }
 
 #[test]
@@ -386,6 +548,10 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
                 .words
                 .contains("65 panels in one picture cannot be read")
     );
+    // What is not drawn does not count.
+    skeleton(folder.path(), 65, &[7]);
+    let marks = plot(folder.path(), &["--show", "speed"]);
+    assert!(marks.says("joint65") && !marks.says("joint7"));
 }
 
 /// A single key has no steps, no speed and no span of time.

@@ -17,7 +17,7 @@ use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::OutputRequest;
 use crate::follow;
-use crate::options::{Request, option_named, request_arrays, samples_of};
+use crate::options::{Request, option_named, request_arrays, samples_of, unknown_value};
 use crate::output::{encoding_named, quaternions_of};
 use crate::poses;
 use crate::run::{interruptible, stoppable};
@@ -88,10 +88,8 @@ pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
         return Ok((Axes::Parent, true));
     }
     let axes = name.parse().map_err(|error: UnknownNameError| {
-        input(format!(
-            "axes: there is no `{name}`; there are {}, world",
-            error.known.join(", ")
-        ))
+        let known = [&*error.known, &["world"]].concat();
+        unknown_value("axes", name, &known)
     })?;
     Ok((axes, false))
 }

@@ -15,7 +15,7 @@ use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 use crate::arrays::doubles;
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{input, of_diagnostic, of_track, warn};
-use crate::options::{frame_rate, one_of, option_of};
+use crate::options::{frame_rate, one_of, option_of, unknown_name};
 use crate::run::interruptible;
 
 /// The clips of a file, by their indices or names.
@@ -59,12 +59,17 @@ impl File {
     fn clip(&self) -> PyResult<Clip> {
         match &*self.clips {
             [clip] => Ok(clip.clone()),
-            _ => Err(input(format!(
-                "{}: has {}: {}; choose one by its name or index",
-                self.path.display(),
-                counted(self.clips.len(), "clip"),
-                self.names().join(", ")
-            ))),
+            [] => Err(input(format!("{}: has no clips", self.path.display()))),
+            clips => {
+                let names = self.names();
+                Err(input(format!(
+                    "{}: has {}: {}; choose one by its name or index: `file[{:?}]` or `file[0]`",
+                    self.path.display(),
+                    counted(clips.len(), "clip"),
+                    names.join(", "),
+                    names[0]
+                )))
+            }
         }
     }
 
@@ -115,8 +120,10 @@ impl File {
             let name = name.to_cow()?;
             let index = self.names().iter().position(|known| *known == *name);
             return index.map(|index| self.clips[index].clone()).ok_or_else(|| {
-                let names = self.names().join(", ");
-                PyKeyError::new_err(format!("there is no clip `{name}`; there are {names}"))
+                let names = self.names();
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                let refusal = format!("there is no clip `{name}`");
+                PyKeyError::new_err(unknown_name(&refusal, &name, &names))
             });
         }
         let index: isize = key
@@ -370,9 +377,7 @@ pub(crate) fn file_of_state(path: PathBuf, clips: Vec<Clip>, refused: Vec<String
 pub(crate) fn format_named(name: &str) -> PyResult<&'static Format> {
     Format::named(name).ok_or_else(|| {
         let names: Vec<&str> = tumble_formats::FORMATS.iter().map(|it| it.name).collect();
-        input(format!(
-            "there is no format `{name}`; there are {}",
-            names.join(", ")
-        ))
+        let refusal = format!("there is no format `{name}`");
+        input(unknown_name(&refusal, name, &names))
     })
 }

@@ -12,7 +12,7 @@ use tumble_formats::path::{Pace, PathPoints, paths_of};
 use crate::arrays::{ArrayValues, Order, doubles, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, ends, one_of, option_of};
+use crate::options::{SampleRequest, ends, one_of, option_named, option_of};
 use crate::run::interruptible;
 use crate::samples::of_values;
 
@@ -35,10 +35,7 @@ pub(crate) struct FollowOptions<'a, 'py> {
 
 impl FollowOptions<'_, '_> {
     fn follow(&self, origin: DVec3) -> PyResult<Follow> {
-        let method: VectorMethod = self
-            .method
-            .parse()
-            .map_err(|error| input(format!("method: {error}")))?;
+        let method: VectorMethod = option_named(self.method, "method")?;
         let direction = match (self.ahead, self.look_at) {
             (Some(_), Some(_)) => {
                 return Err(input(

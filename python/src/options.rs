@@ -12,6 +12,7 @@ use tumble::{
     Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
     TrackSet, UnknownNameError, WrapMode,
 };
+use tumble_cli::host;
 
 use crate::arrays;
 use crate::errors::{input, of_engine};
@@ -242,12 +243,26 @@ pub(crate) fn method_named(name: &str) -> PyResult<Option<Method>> {
     }
     let found = Method::named(name);
     found.map(Some).ok_or_else(|| {
-        let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
-        input(format!(
-            "there is no method `{name}`; there are {AUTHORED}, {}",
-            names.join(", ")
-        ))
+        let names = METHODS.iter().map(|method| method.name);
+        let names: Vec<&str> = std::iter::once(AUTHORED).chain(names).collect();
+        let refusal = format!("there is no method `{name}`");
+        input(unknown_name(&refusal, name, &names))
     })
+}
+
+/// The message about a name that is not in the list of the known ones: `refusal`, the list, and the name that was
+/// probably meant.
+pub(crate) fn unknown_name(refusal: &str, name: &str, known: &[&str]) -> String {
+    let similar = host::nearest_name(name, known.iter().copied());
+    let hint = similar.map(|similar| format!("; did you mean `{similar}`?"));
+    let list = known.join(", ");
+    format!("{refusal}; there are {list}{}", hint.unwrap_or_default())
+}
+
+/// As [`unknown_name`], for the value of a keyword.
+pub(crate) fn unknown_value(keyword: &str, name: &str, known: &[&str]) -> PyErr {
+    let refusal = format!("{keyword}: there is no `{name}`");
+    input(unknown_name(&refusal, name, known))
 }
 
 /// A name, or a pair of angular velocities.
@@ -273,12 +288,8 @@ pub(crate) fn option_named<T: FromStr<Err = UnknownNameError>>(
     name: &str,
     keyword: &str,
 ) -> PyResult<T> {
-    name.parse().map_err(|error: UnknownNameError| {
-        input(format!(
-            "{keyword}: there is no `{name}`; there are {}",
-            error.known.join(", ")
-        ))
-    })
+    name.parse()
+        .map_err(|error: UnknownNameError| unknown_value(keyword, name, &error.known))
 }
 
 /// As [`option_named`], of a value of Python.
@@ -299,10 +310,7 @@ pub(crate) fn one_of<T: Copy>(
     let found = known.iter().find(|(known_name, _)| **known_name == *name);
     found.map(|&(_, value)| value).ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(|&(name, _)| name).collect();
-        input(format!(
-            "{keyword}: there is no `{name}`; there are {}",
-            names.join(", ")
-        ))
+        unknown_value(keyword, &name, &names)
     })
 }
 
@@ -335,10 +343,8 @@ fn check_name(name: &str) -> PyResult<()> {
     if NAMES.contains(&name) {
         return Ok(());
     }
-    Err(PyTypeError::new_err(format!(
-        "there is no keyword `{name}`; there are {}",
-        NAMES.join(", ")
-    )))
+    let refusal = format!("there is no keyword `{name}`");
+    Err(PyTypeError::new_err(unknown_name(&refusal, name, &NAMES)))
 }
 
 /// The arrays among the keywords.

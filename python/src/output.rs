@@ -11,6 +11,7 @@ use tumble::{ComponentType, Encoding, EncodingOptions};
 
 use crate::arrays::{is_aligned, numpy};
 use crate::errors::input;
+use crate::options::unknown_value;
 
 /// The type of NumPy's that a component is stored as.
 pub(crate) fn type_name(component: ComponentType) -> &'static str {
@@ -39,10 +40,7 @@ pub(crate) fn encoding_named(name: &str, options: EncodingOptions) -> PyResult<E
     let found = rotation_encodings().find(|encoding| encoding.name() == name);
     found.map(|encoding| encoding.with(options)).ok_or_else(|| {
         let names: Vec<&str> = rotation_encodings().map(Encoding::name).collect();
-        input(format!(
-            "encoding: there is no `{name}`; there are {}",
-            names.join(", ")
-        ))
+        unknown_value("encoding", name, &names)
     })
 }
 

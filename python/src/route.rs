@@ -15,6 +15,7 @@ use tumble_routes::walkers::{self, Mover, Walker};
 
 use crate::arrays::{ArrayValues, doubles, parts};
 use crate::errors::{in_python, input, of_engine, warn_of};
+use crate::options::unknown_name;
 use crate::run::interruptible;
 
 /// A surface, on which routes are found: a mesh, or a net of Bézier control points.
@@ -147,11 +148,9 @@ impl RouteOptions {
         match &self.shape {
             Shape::Mesh(mesh) => {
                 let by = by.map_or(Ok(By::Exact), str::parse).map_err(|_| {
-                    input(format!(
-                        "by: there is no `{}` for meshes; there are {}",
-                        by.unwrap_or_default(),
-                        By::ALL.map(By::name).join(", ")
-                    ))
+                    let name = by.unwrap_or_default();
+                    let refusal = format!("by: there is no `{name}` for meshes");
+                    input(unknown_name(&refusal, name, &By::ALL.map(By::name)))
                 })?;
                 if !is_ground {
                     return in_pieces(pairs, |pairs| in_words(mesh.routes(pairs, by)));
@@ -177,9 +176,9 @@ impl RouteOptions {
                     (None | Some("line"), _) => NetBy::Line,
                     (_, Some(facets)) => NetBy::Facets(facets),
                     (Some(by), None) => {
-                        return Err(input(format!(
-                            "by: there is no `{by}` for nets; there are line, facets:N"
-                        )));
+                        let refusal = format!("by: there is no `{by}` for nets");
+                        let known = ["line", "facets:N"];
+                        return Err(input(unknown_name(&refusal, by, &known)));
                     }
                 };
                 in_pieces(pairs, |pairs| {

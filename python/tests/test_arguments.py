@@ -201,6 +201,53 @@ REFUSED = {
 }
 
 
+# Misspelt words of closed lists, each with the one that was meant.
+MISSPELT = {
+    "method": ("catmull_rom", "catmull-rom"),
+    "ends": ("parabollic", "parabolic"),
+    "layout": ("tracks", "track"),
+    "order": ("wxzy", "wxyz"),
+    "after": ("mirrored", "mirror"),
+    "speed": ("konstant", "constant"),
+    "path": ("shortst", "shortest"),
+}
+
+
+@pytest.mark.parametrize("keyword", MISSPELT)
+def test_a_similar_word_is_named(keyword):
+    word, meant = MISSPELT[keyword]
+    with pytest.raises(tumble.InputError) as caught:
+        call(**{keyword: word})
+    message = str(caught.value)
+    assert f"there is no {'method ' if keyword == 'method' else ''}`{word}`; there are " in message
+    assert message.endswith(f"; did you mean `{meant}`?"), message
+
+
+def test_a_similar_word_is_named_by_other_functions(tmp_path):
+    path = tmp_path / "a.tum"
+    tumble.save(path, tumble.Clip(TIMES, KEYS[0]))
+    engine = tumble.Engine("cpu")
+    points = np.zeros((4, 3)) + TIMES[:, None]
+    for wrong, meant, error in [
+        (lambda: tumble.load(path, format="parqet"), "parquet", tumble.InputError),
+        (lambda: tumble.load(path, duplicates="frist"), "first", tumble.InputError),
+        (lambda: tumble.load(path)["bodi"], None, KeyError),
+        (lambda: engine.velocity(CLIP, fps=10, axes="wrold"), "world", tumble.InputError),
+        (lambda: engine.encoded(CLIP, "axisangle", fps=10), "axis-angle", tumble.InputError),
+        (lambda: engine.follow(TIMES, points, fps=10, method="liner"), "linear", tumble.InputError),
+        (lambda: CLIP.evaluate(fps=10, metod="slerp"), "method", TypeError),
+    ]:
+        with pytest.raises(error) as caught:
+            wrong()
+        message = str(caught.value)
+        assert "there is no " in message and "; there are " in message
+        if meant is not None:
+            assert message.endswith(f"; did you mean `{meant}`?"), message
+    with pytest.raises(tumble.InputError) as caught:
+        call(method="xyz")
+    assert "did you mean" not in str(caught.value)
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_refused(case):
     options, code, pointer, words = REFUSED[case]

@@ -305,6 +305,19 @@ def scene(path):
     }))
 
 
+def test_one_of_several_clips_has_to_be_chosen(tmp_path):
+    path = tmp_path / "scene.gltf"
+    scene(path)
+    file = tumble.load(path)
+    with pytest.raises(tumble.InputError) as caught:
+        file.clip  # noqa: B018
+    words = 'has 2 clips: Nod, Turn; choose one by its name or index: `file["Nod"]` or `file[0]`'
+    assert str(caught.value) == f"{path}: {words}"
+    assert file["Nod"].keys("head").shape == file[0].keys("head").shape
+    with pytest.raises(KeyError, match="there is no clip `Nodd`; there are Nod, Turn; did you mean `Nod`"):
+        file["Nodd"]
+
+
 BESIDE = "meshes, cameras, extensionsUsed, channels of `pointer`, channels of `weights`"
 
 

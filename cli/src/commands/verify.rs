@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::verify::{Verdict, Verification};
+use tumble::verify::{SamplePosition, Verdict, Verification};
 use tumble::{Method, TrackSet};
+use tumble_formats::printable::printable;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
@@ -65,6 +66,9 @@ struct VerificationLine {
     input: String,
     #[serde(flatten)]
     found: Verification,
+    /// The names of their tracks, where they have one.
+    worst_track_name: Option<String>,
+    first_difference_track_name: Option<String>,
     /// A Vulkan device gives the CPU's bits, near the reference.
     pass: bool,
     verdict: Verdict,
@@ -148,8 +152,13 @@ impl Arguments {
             }
             let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
+            let track_name = |position: Option<SamplePosition>| {
+                position.and_then(|position| set.track(position.track).name.map(str::to_owned))
+            };
             lines.push(VerificationLine {
                 input: name.to_owned(),
+                worst_track_name: track_name(found.worst),
+                first_difference_track_name: track_name(found.first_difference),
                 pass: found.passes(),
                 verdict: found.verdict(),
                 found,
@@ -185,8 +194,9 @@ fn report(lines: &[VerificationLine], device: &OpenedDevice) -> String {
     let _ = if device.is_vulkan() {
         writeln!(
             text,
-            "total: {rotations} rotations, and {values} values that follow from them, compared \
-             between {} and the CPU, {differing} differ",
+            "total: {rotations} rotations, and {values} values derived from them (velocities, \
+             accelerations, poses, encodings), compared between {} and the \
+             CPU: {differing} differ",
             device.label
         )
     } else {
@@ -236,14 +246,20 @@ impl VerificationLine {
                 output.error_bound
             );
         }
-        for (label, sample) in [
-            ("worst", found.worst),
-            ("first difference", found.first_difference),
+        for (label, sample, name) in [
+            ("worst", found.worst, &self.worst_track_name),
+            (
+                "first difference",
+                found.first_difference,
+                &self.first_difference_track_name,
+            ),
         ] {
             if let Some(position) = sample {
+                let name = name.as_deref().map(printable);
+                let name = name.map_or(String::new(), |name| format!(" ({name})"));
                 let _ = writeln!(
                     text,
-                    "{:width$}  {label}: track {}, frame {}, at {:.4} s",
+                    "{:width$}  {label}: track {}{name}, frame {}, at {:.4} s",
                     "", position.track, position.frame, position.time
                 );
             }

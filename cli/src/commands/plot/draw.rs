@@ -1,6 +1,7 @@
 //! Draws a figure as SVG or PNG.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -113,17 +114,28 @@ fn header(legend_lines: usize) -> f64 {
     62.0 + 22.0 * legend_lines as f64
 }
 
+/// The height of the letters of a panel's title, where it has room for them.
+const PANEL_TITLE: f64 = 13.0;
 const LEGEND_MARK: f64 = 26.0;
 const LEGEND_TEXT: f64 = 13.0;
 const LEGEND_GAP: f64 = 22.0;
 
 /// How wide an entry of the legend is, with the gap after it.
 fn entry_width(entry: &LegendEntry) -> f64 {
-    let font = FontDesc::new(FontFamily::SansSerif, 100.0, FontStyle::Normal);
-    let text = font
-        .box_size(&entry.label)
-        .map_or(0.0, |(width, _)| f64::from(width) / 100.0);
-    LEGEND_MARK + 6.0 + text * LEGEND_TEXT + LEGEND_GAP
+    LEGEND_MARK + 6.0 + text_width(&entry.label, FontStyle::Normal) * LEGEND_TEXT + LEGEND_GAP
+}
+
+/// How wide a text is, for a letter height of 1.
+fn text_width(text: &str, style: FontStyle) -> f64 {
+    let font = FontDesc::new(FontFamily::SansSerif, 100.0, style);
+    let size = font.box_size(text);
+    size.map_or(0.0, |(width, _)| f64::from(width) / 100.0)
+}
+
+/// The height of letters with which a panel's title fits into a width, in the pixels of SVG.
+fn title_height(title: &str, width: f64) -> f64 {
+    let needed = text_width(title, FontStyle::Bold);
+    PANEL_TITLE.min(width / needed.max(1.0))
 }
 
 fn legend_lines(figure: &Figure, width: f64) -> usize {
@@ -172,6 +184,13 @@ impl Brush {
     fn text(&self, size: f64, style: FontStyle, colour: Colour) -> TextStyle<'static> {
         let font = FontDesc::new(FontFamily::SansSerif, size * self.scale, style);
         font.color(&rgb(colour))
+    }
+
+    /// How a panel's title is written: no wider than the panel.
+    fn title<DB: DrawingBackend>(&self, title: &str, area: &Area<'_, DB>) -> TextStyle<'static> {
+        let (width, _) = area.dim_in_pixel();
+        let room = f64::from(width) / self.scale - MARGIN;
+        self.text(title_height(title, room), FontStyle::Bold, INK)
     }
 
     fn figure<DB: DrawingBackend>(
@@ -244,7 +263,7 @@ impl Brush {
         y: &PlotAxis,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
         let mut chart = ChartBuilder::on(area)
-            .caption(&panel.title, self.text(13.0, FontStyle::Bold, INK))
+            .caption(&panel.title, self.title(&panel.title, area))
             .margin(self.px(6.0))
             .margin_right(self.px(14.0))
             .x_label_area_size(self.px(34.0))
@@ -315,13 +334,14 @@ impl Brush {
         let aspect = f64::from(width) / (f64::from(height) - room).max(1.0);
         let (x, y) = (1.1 * aspect.max(1.0), 1.1 * (1.0 / aspect).max(1.0));
         let mut chart = ChartBuilder::on(area)
-            .caption(&panel.title, self.text(13.0, FontStyle::Bold, INK))
+            .caption(&panel.title, self.title(&panel.title, area))
             .build_cartesian_2d(-x..x, -y..y)?;
         self.contents(&mut chart, panel)
     }
 }
 
-/// A tick's label: no more digits than it has; of powers of ten, whole ones only.
+/// A tick's label: no more digits than it has; of powers of ten, whole ones only. Where all values are small, they
+/// have an exponent.
 fn label(axis: &PlotAxis, value: f64) -> String {
     if axis.powers {
         let whole = (value - value.round()).abs() < 1e-6;
@@ -331,7 +351,74 @@ fn label(axis: &PlotAxis, value: f64) -> String {
             String::new()
         };
     }
-    let text = format!("{value:.4}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0" } else { text }.to_owned()
+    let trimmed = |text: &str| text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    let Range { start, end } = axis.range;
+    let (largest, width) = (start.abs().max(end.abs()), end - start);
+    if value.abs() < 1e-6 * width {
+        return "0".to_owned();
+    }
+    if largest < SMALL {
+        let text = format!("{value:.2e}");
+        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{power}", trimmed(digits));
+    }
+    // As many as tell neighbours apart.
+    let decimals = (2.0 - width.log10()).clamp(4.0, 15.0) as usize;
+    trimmed(&format!("{value:.decimals$}"))
+}
+
+/// Axes whose values are all below it have labels with exponents.
+const SMALL: f64 = 0.005;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_tell_neighbours_apart_in_few_letters() {
+        for (range, values, expected) in [
+            (-1.0..1.0, [-0.5, -1e-17, 0.5], ["-0.5", "0", "0.5"]),
+            (0.0..20.0, [0.0, 10.0, 12.5], ["0", "10", "12.5"]),
+            (
+                0.0..1e-6,
+                [0.0, 2e-7, 0.3e-6 + 1e-22],
+                ["0", "2e-7", "3e-7"],
+            ),
+            (-1e-3..1e-3, [-5e-4, 0.0, 2.5e-4], ["-5e-4", "0", "2.5e-4"]),
+            (
+                0.49995..0.50005,
+                [0.49996, 0.5, 0.50004],
+                ["0.49996", "0.5", "0.50004"],
+            ),
+            (
+                1e4..1.0001e4,
+                [10_000.0, 10_000.2, 10_000.4],
+                ["10000", "10000.2", "10000.4"],
+            ),
+        ] {
+            let axis = PlotAxis {
+                label: String::new(),
+                range: range.clone(),
+                powers: false,
+            };
+            assert_eq!(
+                values.map(|value| label(&axis, value)),
+                expected,
+                "{range:?}"
+            );
+        }
+    }
+
+    /// Would catch a title that runs into the panel beside it.
+    #[test]
+    fn a_long_title_is_written_smaller() {
+        plotters::style::register_font(FONT, FontStyle::Bold, dejavu::sans::bold())
+            .map_err(|_| "the font is refused")
+            .unwrap();
+        assert_eq!(title_height("hips: dimensions 1 to 4", 384.0), PANEL_TITLE);
+        let long = format!("…{}: dimensions 121 to 124", "M".repeat(27));
+        let height = title_height(&long, 384.0);
+        assert!((8.0..PANEL_TITLE).contains(&height), "{height}");
+        assert!(height * text_width(&long, FontStyle::Bold) <= 384.0);
+    }
 }

@@ -88,9 +88,49 @@ pub(crate) fn range_of(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     if low > high {
         return 0.0..1.0;
     }
+    if low == 0.0 && high == 0.0 {
+        return -1.0..1.0;
+    }
     // Of something constant, its surroundings.
     let room = ((high - low) * 0.05).max(high.abs().max(1e-3) * 1e-3);
     low - room..high + room
+}
+
+/// An axis of times, and the time that is its 0.
+pub(crate) struct TimeAxis {
+    pub(crate) axis: PlotAxis,
+    pub(crate) origin: f64,
+}
+
+impl TimeAxis {
+    /// Times with more digits than this before the point, such as those since 1970, are drawn from a whole second on:
+    /// their labels would lie on each other.
+    const LONGEST: f64 = 1e5;
+
+    /// The axis of the times from the first to the last, with a little room.
+    pub(crate) fn of(first: f64, last: f64) -> Self {
+        let is_long = first.abs().max(last.abs()) >= Self::LONGEST;
+        let (origin, label) = match is_long {
+            true => (
+                first.floor(),
+                format!("time, s after {:.0} s", first.floor()),
+            ),
+            false => (0.0, "time, s".to_owned()),
+        };
+        let (low, high) = (first - origin, last - origin);
+        let room = match high - low {
+            span if span > 0.0 => span * 0.05,
+            _ => 0.5,
+        };
+        Self {
+            axis: PlotAxis {
+                label,
+                range: low - room..high + room,
+                powers: false,
+            },
+            origin,
+        }
+    }
 }
 
 /// At most four points for each of `columns` columns, which look the same: the first, the
@@ -143,6 +183,30 @@ mod tests {
             assert!(range.start < range.end, "{values:?}: {range:?}");
             let finite = values.iter().filter(|value| value.is_finite());
             assert!(finite.into_iter().all(|value| range.contains(value)));
+        }
+        assert_eq!(range_of([0.0, 0.0, -0.0]), -1.0..1.0);
+    }
+
+    /// Would catch times that fill a part of the axis only, and labels of ten digits.
+    #[test]
+    fn times_fill_their_axis_whatever_they_count_from() {
+        for (first, last, label, origin, range) in [
+            (0.0, 20.0, "time, s", 0.0, -1.0..21.0),
+            (-2.0, 8.0, "time, s", 0.0, -2.5..8.5),
+            (9000.0, 9002.0, "time, s", 0.0, 8999.9..9002.1),
+            (3.0, 3.0, "time, s", 0.0, 2.5..3.5),
+            (
+                1_700_000_000.5,
+                1_700_000_002.5,
+                "time, s after 1700000000 s",
+                1_700_000_000.0,
+                0.4..2.6,
+            ),
+        ] {
+            let TimeAxis { axis, origin: from } = TimeAxis::of(first, last);
+            assert_eq!((&*axis.label, from), (label, origin));
+            let off = (axis.range.start - range.start).abs() + (axis.range.end - range.end).abs();
+            assert!(off < 1e-6, "{first} to {last}: {:?}", axis.range);
         }
     }
 }

@@ -27,7 +27,7 @@ use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::PlotSubject;
-use crate::commands::plot::subjects::{PlotQuantity, Subjects, together};
+use crate::commands::plot::subjects::{PlotQuantity, Subjects, moving_boxes, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
@@ -38,7 +38,7 @@ use crate::messages::{names, words};
 #[command(after_help = "\
 A set of N boxes (tracks, joints) has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so
 on, counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a
-key. For files of paths, the speed, the angular speed of the direction and the roll are drawn for
+key. Boxes that never turn are left out unless they are chosen. For files of paths, the speed, the angular speed of the direction and the roll are drawn for
 each --frame.
 
 Examples:
@@ -369,8 +369,8 @@ impl Arguments {
         };
         let dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
         let mut selected = chosen("box", &self.boxes, 0..boxes)?;
-        if selected.is_empty() {
-            selected = tracks.unwrap_or_else(|| (0..boxes).collect());
+        if selected.is_empty() && dimensions.is_empty() {
+            selected = tracks.unwrap_or_else(|| moving_boxes(set, name));
         }
         Ok(Subjects {
             boxes: selected,

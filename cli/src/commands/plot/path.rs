@@ -5,7 +5,7 @@ use tumble::SampleTimes;
 
 use crate::arguments::device::OpenedDevice;
 use crate::commands::plot::figure::{
-    Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of,
+    Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, TimeAxis, range_of,
 };
 use crate::commands::travel::{Maker, Travel, TravelSource};
 use crate::messages::colours::Colour;
@@ -60,7 +60,11 @@ pub(super) fn figure(
     let colours: Vec<Colour> = makers.iter().map(|maker| maker.colour()).collect();
     let forward = source.body_rotation() * Vec3::Z;
     let keys = source.key_times();
-    let uprights = if keys.len() > UPRIGHTS { vec![] } else { keys };
+    let time = TimeAxis::of(first, last);
+    let uprights = match keys.len() {
+        0..=UPRIGHTS => keys.iter().map(|key| key - time.origin).collect(),
+        _ => vec![],
+    };
     let tracks = set.track_count();
     let panels = (0..tracks).flat_map(|track| ALL.map(|show| (track, show)));
     let panels = panels.map(|(track, (show, caption, unit))| {
@@ -68,7 +72,7 @@ pub(super) fn figure(
             colour,
             width: 1.6 + 1.4 * (travels.len() - 1 - order).min(3) as f64,
             opacity: 1.0,
-            pieces: vec![points(travel, track, show, forward)],
+            pieces: vec![points(travel, track, show, forward, time.origin)],
         };
         let curves: Vec<PlotCurve> = travels
             .iter()
@@ -88,19 +92,18 @@ pub(super) fn figure(
             [0.0, 0.0]
         };
         let range = range_of(all().map(|point| point.1).chain(least));
-        let axis = |label: &str, range| PlotAxis {
-            label: label.to_owned(),
-            range,
-            powers: false,
-        };
         Panel {
             title: match tracks {
                 1 => caption.to_owned(),
                 _ => format!("{}: {caption}", set.track_name(track)),
             },
             axes: PanelAxes::Plane {
-                x: axis("time, s", range_of([first, last])),
-                y: axis(unit, range),
+                x: time.axis.clone(),
+                y: PlotAxis {
+                    label: unit.to_owned(),
+                    range,
+                    powers: false,
+                },
             },
             curves,
             dots: Vec::new(),
@@ -126,8 +129,14 @@ pub(super) fn figure(
     })
 }
 
-/// The curve of one body, a point in the middle of each step.
-fn points(travel: &Travel, track: usize, show: PathQuantity, forward: Vec3) -> Vec<(f64, f64)> {
+/// The curve of one body, a point in the middle of each step. Times count from `origin`.
+fn points(
+    travel: &Travel,
+    track: usize,
+    show: PathQuantity,
+    forward: Vec3,
+    origin: f64,
+) -> Vec<(f64, f64)> {
     let velocities = travel.velocities();
     let positions: Vec<Vec3> = travel.line(track).collect();
     let mut rolled = 0.0;
@@ -144,7 +153,7 @@ fn points(travel: &Travel, track: usize, show: PathQuantity, forward: Vec3) -> V
             PathQuantity::Turning => f64::from((turning - forward * roll).length()),
             PathQuantity::Roll => rolled.to_degrees(),
         };
-        ((pair[0] + pair[1]) / 2.0, value)
+        ((pair[0] + pair[1]) / 2.0 - origin, value)
     };
     steps.map(point).collect()
 }
@@ -174,7 +183,7 @@ mod tests {
                 .collect(),
             times,
         };
-        let last = |show| *points(&travel, 0, show, Vec3::Z).last().unwrap();
+        let last = |show| *points(&travel, 0, show, Vec3::Z, 0.0).last().unwrap();
         for (show, value, bound) in [
             (PathQuantity::Speed, 3.0, 2e-3),
             (PathQuantity::Turning, 0.75, 1e-3),

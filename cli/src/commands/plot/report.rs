@@ -13,7 +13,7 @@ use crate::batch::target::Destination;
 use crate::commands::info::Steps;
 use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::{NAMES, PlotSubject};
-use crate::commands::plot::subjects::PANELS;
+use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
@@ -51,13 +51,16 @@ pub(crate) fn write(
     let outcome = for_each(&inputs, |path| {
         let only = progress.suspend(|| arguments.inputs.load_one(path))?;
         let set = only.clip.set;
-        progress.suspend(|| note_curves(&names::input(path), &set, interpolations));
+        let name = names::input(path);
+        progress.suspend(|| note_curves(&name, &set, interpolations));
+        let mut boxes = progress.suspend(|| moving_boxes(&set, &name));
+        boxes.truncate(PANELS);
         let chapter = Chapter {
             title: names::file(path),
             facts: facts(&set),
             figures: figures(
                 writer,
-                (path, &set),
+                (path, &set, boxes),
                 interpolations,
                 samples,
                 folder,
@@ -88,7 +91,7 @@ fn figures_of_one(methods: usize) -> usize {
 /// Draws all figures of one input.
 fn figures(
     writer: &mut FigureWriter,
-    (path, set): (&PathBuf, &TrackSet),
+    (path, set, boxes): (&PathBuf, &TrackSet, Vec<usize>),
     interpolations: &[Interpolation],
     samples: &SampleRequest,
     folder: &Path,
@@ -130,7 +133,6 @@ fn figures(
             draw(writer, interpolations, &label, caption, &subject)?;
         }
     }
-    let boxes: Vec<usize> = (0..set.track_count().min(PANELS)).collect();
     for (label, caption, subject) in [
         (
             "speed",

@@ -8,7 +8,7 @@ use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::time::SampleRequest;
 use crate::batch::room;
-use crate::commands::plot::figure::{PlotAxis, range_of};
+use crate::commands::plot::figure::TimeAxis;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -22,9 +22,7 @@ pub(crate) struct PlotSource<'a> {
     pub(crate) interpolations: &'a [Interpolation],
     pub(crate) frames: SampleTimes,
     pub(crate) timeline: Timeline,
-    pub(crate) x: PlotAxis,
-    /// Where a time lies on that axis.
-    pub(crate) x_of: Box<dyn Fn(f64) -> f64>,
+    pub(crate) x: TimeAxis,
     pub(crate) about: String,
 }
 
@@ -51,29 +49,21 @@ impl<'a> PlotSource<'a> {
                 "{name}: there are no samples to plot"
             )));
         }
-        let start = timeline.time(0, 0).unwrap_or_default();
-        let count = words::count(timeline.len(), "frame");
-        let (label, x_of, about): (_, Box<dyn Fn(f64) -> f64>, _) = match samples {
+        let about = match samples {
             SampleRequest::Rate { rate, .. } => {
-                let per_second = rate.per_second();
-                (
-                    format!("frame ({rate} per second)"),
-                    Box::new(move |time| (time - start) * per_second),
-                    format!("{count}, {rate} per second"),
-                )
+                let count = words::count(timeline.len(), "frame");
+                format!("{count}, {rate} per second")
             }
-            SampleRequest::Times(_) | SampleRequest::Keys(_) => (
-                "time, s".to_owned(),
-                Box::new(|time| time),
-                words::count(timeline.len(), "time"),
-            ),
+            SampleRequest::Times(_) | SampleRequest::Keys(_) => {
+                words::count(timeline.len(), "time")
+            }
         };
-        let range = range_of(timeline.times(0).map(&x_of));
-        let x = PlotAxis {
-            label,
-            range,
-            powers: false,
-        };
+        let (first, last) = timeline
+            .times(0)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), time| {
+                (time.min(first), time.max(last))
+            });
+        let x = TimeAxis::of(first, last);
         Ok(Self {
             name,
             set,
@@ -81,7 +71,6 @@ impl<'a> PlotSource<'a> {
             frames,
             timeline,
             x,
-            x_of,
             about,
         })
     }
@@ -142,7 +131,7 @@ impl<'a> PlotSource<'a> {
 
     /// Points over the samples.
     pub(crate) fn points(&self, values: impl IntoIterator<Item = f64>) -> Vec<(f64, f64)> {
-        let x = self.timeline.times(0).map(&self.x_of);
+        let x = self.timeline.times(0).map(|time| time - self.x.origin);
         x.zip(values).collect()
     }
 
@@ -161,7 +150,7 @@ impl<'a> PlotSource<'a> {
             let after = times.partition_point(|&sample| sample < time);
             let near = rotations[after.min(rotations.len() - 1)];
             let key = if key.dot(near) < 0.0 { -key } else { key };
-            ((self.x_of)(time), key)
+            (time - self.x.origin, key)
         });
         placed.collect()
     }
@@ -171,7 +160,9 @@ impl<'a> PlotSource<'a> {
         if times.len() > UPRIGHTS {
             return Vec::new();
         }
-        let positions = times.iter().map(|&time| (self.x_of)(time));
-        positions.filter(|x| self.x.range.contains(x)).collect()
+        let positions = times.iter().map(|&time| time - self.x.origin);
+        positions
+            .filter(|x| self.x.axis.range.contains(x))
+            .collect()
     }
 }

@@ -1,10 +1,12 @@
 //! Which boxes and dimensions of a set are drawn, and how they are shared out over pictures.
 
 use clap::ValueEnum;
-use glam::Vec3;
+use glam::{DVec3, Quat, Vec3};
+use tumble::{Track, TrackSet};
 
-use crate::commands::plot::source::curves::PlotSubject;
+use crate::commands::plot::source::curves::{PlotSubject, box_name};
 use crate::messages::exit::Failure;
+use crate::messages::words;
 
 /// A picture with more panels than this cannot be read.
 pub(super) const PANELS: usize = 64;
@@ -12,11 +14,11 @@ pub(super) const PANELS: usize = 64;
 /// What is drawn of a set over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum PlotQuantity {
-    /// w x y z over frames
+    /// w x y z over time
     Components,
-    /// angular speed over frames, rad/s
+    /// angular speed over time, rad/s
     Speed,
-    /// the angle to the f64 reference over frames, radians
+    /// the angle to the f64 reference over time, radians
     Error,
     /// the path of an axis of a box on the sphere
     Sphere,
@@ -73,6 +75,39 @@ impl Subjects {
             self.dimensions.iter().map(dimension).collect()
         }
     }
+}
+
+/// Whether a track has the same rotation at all times.
+fn is_still(track: &Track<'_>) -> bool {
+    let first = track.keys.first().copied().unwrap_or_default();
+    track.keys.iter().all(|&key| key == first || key == -first)
+        && track.velocities.iter().all(|&v| v == DVec3::ZERO)
+        && track.tangents.as_flattened().iter().all(|&t| t == ZERO)
+}
+
+const ZERO: Quat = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+
+/// The boxes of a set that are drawn if none are chosen: those that move, or all if none does. A note names the others.
+pub(super) fn moving_boxes(set: &TrackSet, name: &str) -> Vec<usize> {
+    let all = 0..set.track_count();
+    let (still, moving): (Vec<usize>, Vec<usize>) =
+        all.clone().partition(|&index| is_still(&set.track(index)));
+    if moving.is_empty() {
+        return still;
+    }
+    if !still.is_empty() {
+        let names = still.iter().map(|&index| box_name(set, index));
+        let names: Vec<String> = names.collect();
+        let (subject, object) = match still.len() {
+            1 => ("it does", "it"),
+            _ => ("they do", "them"),
+        };
+        words::note(&format!(
+            "{name}: not drawn, {subject} not turn: {}; --tracks or --box draws {object}",
+            names.join(", ")
+        ));
+    }
+    moving
 }
 
 /// Everything in one picture, if that can be read.

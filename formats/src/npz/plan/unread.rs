@@ -49,10 +49,13 @@ impl ArchivePlan {
         if let Some(names) = listed(quoted.collect()) {
             let has_shape = others.iter().any(|&index| SHAPE.contains(&name(index)));
             let hint = match self.is_body && has_shape {
-                true => "; the shape of a body is used with --body-model",
+                true => "; --body-model uses the shape of the body",
                 false => "",
             };
-            let message = format!("not read: {names}; say what arrays are with --map{hint}");
+            let message = format!(
+                "not read: {names}; this is no error, the rotations are in other arrays; to read \
+                 these too, name all arrays of the motion with --map{hint}"
+            );
             warnings.warn(Code::ArraysNotRead, || (None, message));
         }
         for member in &archive.members {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::error_bound;
-use tumble::{Axes, Interpolation, Quantity};
+use tumble::{Axes, Interpolation, Quantity, TrackSet};
 use tumble_formats::printable::printable;
 
 use crate::arguments::device::OpenedDevice;
@@ -81,8 +81,12 @@ impl PlotSource<'_> {
         let columns = match (subject, panels.len()) {
             (PlotSubject::Components(_), _) if self.interpolations.len() > 1 => 4,
             (PlotSubject::Sphere(..), 2) => 2,
+            // As many rows: these panels are as broad as high.
+            (PlotSubject::Sphere(..), panels @ 9..) => (panels - 1).isqrt() + 1,
             (_, 0..3) => 1,
-            _ => 2,
+            (_, 3..9) => 2,
+            (_, 9..19) => 3,
+            _ => 4,
         };
         let by_component = match (subject, self.interpolations) {
             (PlotSubject::Components(_), [one]) => Some(one.method),
@@ -126,17 +130,14 @@ impl PlotSource<'_> {
         legend
     }
 
-    /// The name of its track, such as a joint's; `box 1` where it has none. Of long names the end tells joints apart.
+    /// The name of a box, of which a panel has room for the end alone if it is long: the end tells joints apart.
     fn box_name(&self, index: usize) -> String {
         /// Characters for which a panel has room.
         const LONGEST: usize = 28;
-        let Some(name) = self.set.track(index).name.filter(|name| !name.is_empty()) else {
-            return format!("box {}", index + 1);
-        };
-        let name = printable(name);
+        let name = box_name(self.set, index);
         match name.chars().count().checked_sub(LONGEST) {
             Some(over @ 1..) => format!("…{}", name.chars().skip(over + 1).collect::<String>()),
-            _ => name.into_owned(),
+            _ => name,
         }
     }
 
@@ -215,7 +216,7 @@ impl PlotSource<'_> {
         Panel {
             title,
             axes: PanelAxes::Plane {
-                x: self.x.clone(),
+                x: self.x.axis.clone(),
                 y: PlotAxis {
                     label: label.to_owned(),
                     range,
@@ -341,6 +342,14 @@ impl PlotSource<'_> {
             uprights: Vec::new(),
             level: None,
         })
+    }
+}
+
+/// The name of its track, such as a joint's; `box 1` where it has none.
+pub(crate) fn box_name(set: &TrackSet, index: usize) -> String {
+    match set.track(index).name.filter(|name| !name.is_empty()) {
+        Some(name) => printable(name).into_owned(),
+        None => format!("box {}", index + 1),
     }
 }
 
