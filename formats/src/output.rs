@@ -584,8 +584,15 @@ mod tests {
         let first = named_in(directory.path(), "shard1-").unwrap();
         let second = named_in(directory.path(), "shard2-").unwrap();
         remove_marked(directory.path(), "shard1-");
-        assert_eq!(names(directory.path()).len(), 1);
-        assert!(first.persist(&directory.path().join("out"), false).is_err());
+        if cfg!(unix) {
+            assert_eq!(names(directory.path()).len(), 1);
+            assert!(first.persist(&directory.path().join("out"), false).is_err());
+        } else {
+            // Windows keeps the name of an open file until it is closed.
+            drop(first);
+            remove_marked(directory.path(), "shard1-");
+            assert_eq!(names(directory.path()).len(), 1);
+        }
         second
             .persist(&directory.path().join("out"), false)
             .unwrap();

@@ -38,8 +38,8 @@ use crate::messages::{names, words};
 #[command(after_help = "\
 A set of N boxes (tracks, joints) has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so
 on, counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a
-key. Boxes that never turn are left out unless they are chosen. For files of paths, the speed, the angular speed of the direction and the roll are drawn for
-each --frame.
+key. Boxes that never turn are left out unless they are chosen. For files of paths, the speed,
+the angular speed of the direction and the roll are drawn for each --frame.
 
 Examples:
   tumble plot data/pendulum.dat -o pendulum.svg
