@@ -32,7 +32,8 @@ pub(crate) fn verdict(path: &Path) -> String {
             text = format!("refused\n{error}\n");
         }
     }
-    text.replace(&format!("{}/", folder.display()), "")
+    // With the separator of this system.
+    text.replace(&folder.join("").display().to_string(), "")
 }
 
 /// Set `UPDATE_EXPECTED=1` to write the verdicts of now into the tables, then read the difference.
