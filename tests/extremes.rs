@@ -46,7 +46,11 @@ const COUNTS: [usize; 9] = [
     2,
     3,
     5,
-    usize::MAX >> 24,
+    if usize::BITS == 64 {
+        (1_u64 << 40) as usize
+    } else {
+        1 << 16
+    },
     usize::MAX / 16,
     usize::MAX - 1,
     usize::MAX,

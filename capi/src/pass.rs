@@ -7,7 +7,7 @@ use glam::Quat;
 use tumble::vulkan::{PassRequest, PassTarget, PosePass, VulkanBuffer};
 use tumble::{Error, Skeleton};
 
-use crate::arguments::{Out, constant, list, needed, product, vulkan};
+use crate::arguments::{Out, list, needed, option, product, vulkan};
 use crate::engine::TumbleEngine;
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
@@ -107,8 +107,7 @@ impl TumblePass {
             TumblePassOperation::Add,
             TumblePassOperation::World,
         ];
-        let operations = operations.map(|operation| (operation as u32, operation));
-        let operation = constant(structure.operation, &operations, "pass->operation")?;
+        let operation = option(structure.operation, &operations, "pass->operation")?;
         let layout = layout(structure.layout)?;
         // SAFETY: as the caller promises.
         let (inputs, weights) = unsafe {

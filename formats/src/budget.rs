@@ -118,8 +118,8 @@ mod tests {
             memory: Some(1000),
             ..Limits::default()
         };
-        let budget = Budget::of(1 << 30, limits);
-        budget.add_input(1 << 30);
+        let budget = Budget::of(usize::MAX / 2, limits);
+        budget.add_input(usize::MAX / 2);
         budget.take(100, 6).unwrap();
         let borrowed = budget.borrow(1, 400).unwrap();
         let over = budget.take(1, 1).unwrap_err();

@@ -49,7 +49,7 @@ pub(crate) fn refuse_more_than_there_is<T>(
     purpose: &'static str,
 ) -> Result<(), OutOfMemoryError> {
     let asked = OutOfMemoryError::new::<T>(purpose, count);
-    if asked.bytes >= LARGE && available_memory().is_some_and(|bytes| asked.bytes > bytes.into()) {
+    if asked.bytes >= LARGE && left(Swap::Counts).is_some_and(|bytes| asked.bytes > bytes.into()) {
         return Err(asked);
     }
     match isize::try_from(asked.bytes) {
@@ -58,27 +58,42 @@ pub(crate) fn refuse_more_than_there_is<T>(
     }
 }
 
-/// The memory that this process can still get, bytes: of the system's memory what is free or can be freed, and its free
-/// swap space; in a container at most what its limit leaves. `None` where the system does not say, such as in a browser.
+/// The memory that this process can still get without swap space, bytes: what the system has free or can free; in a
+/// container at most what its limit leaves. `None` where the system does not say, such as in a browser.
 ///
-/// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less is available. Systems may promise
-/// memory that they do not have, and then end the process that uses it.
+/// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less than they need is available, swap
+/// space included. Systems may promise memory that they do not have, and then end the process that uses it.
 #[must_use]
 pub fn available_memory() -> Option<u64> {
-    #[cfg(target_family = "wasm")]
-    return None;
-    #[cfg(not(target_family = "wasm"))]
-    {
-        let mut system = sysinfo::System::new();
-        system.refresh_memory();
-        if system.total_memory() == 0 {
-            return None;
-        }
-        let free = system.available_memory().saturating_add(system.free_swap());
-        let limits = system.cgroup_limits();
-        let limits = limits.map(|limits| (limits.total_memory, limits.rss));
-        Some(within_limits(free, system.total_memory(), limits))
+    left(Swap::LeftOut)
+}
+
+/// Whether free swap space counts as memory.
+enum Swap {
+    Counts,
+    LeftOut,
+}
+
+#[cfg(target_family = "wasm")]
+fn left(_: Swap) -> Option<u64> {
+    None
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn left(swap: Swap) -> Option<u64> {
+    let mut system = sysinfo::System::new();
+    system.refresh_memory();
+    if system.total_memory() == 0 {
+        return None;
     }
+    let swap = match swap {
+        Swap::Counts => system.free_swap(),
+        Swap::LeftOut => 0,
+    };
+    let free = system.available_memory().saturating_add(swap);
+    let limits = system.cgroup_limits();
+    let limits = limits.map(|limits| (limits.total_memory, limits.rss));
+    Some(within_limits(free, system.total_memory(), limits))
 }
 
 /// Of the memory that a system has free, what a container's limit leaves: the limit without what its processes use.
@@ -98,7 +113,7 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_refused_and_named() {
         for count in [
-            isize::MAX as usize >> if usize::BITS == 64 { 17 } else { 2 },
+            usize::try_from(1_u64 << 46).unwrap_or(usize::MAX / 4),
             usize::MAX / 16,
             usize::MAX,
         ] {
@@ -130,6 +145,7 @@ mod tests {
     #[test]
     fn the_system_says_what_is_free() {
         let free = available_memory().unwrap();
+        assert!(left(Swap::Counts).unwrap() > 1 << 20);
         assert!(free > 1 << 20, "{free}");
         assert!(free < 1 << 50, "{free}");
     }

@@ -104,7 +104,7 @@ mod tests {
             );
         }
         for rotations in [
-            isize::MAX as usize >> if usize::BITS == 64 { 17 } else { 2 },
+            usize::try_from(1_u64 << 44).unwrap_or(usize::MAX / 4),
             usize::MAX / 16,
             usize::MAX,
         ] {
