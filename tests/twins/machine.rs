@@ -108,6 +108,9 @@ enum End {
     Return(usize),
 }
 
+/// The loops of a call of any kernel take a few hundred iterations.
+const MAX_ITERATIONS: usize = 1 << 16;
+
 /// Memory: the frames of the functions that run, and a buffer for each global variable.
 ///
 /// A pointer's upper half is 0 for the stack and 1 + its index for a global; its lower half is the
@@ -122,6 +125,8 @@ pub(super) struct Machine<'a> {
     iterations: usize,
     /// Whether anything was read or written outside the memory, or past the end of an array.
     is_outside: bool,
+    /// Whether its loops took more than [`MAX_ITERATIONS`].
+    is_endless: bool,
 }
 
 /// A load or a store of a global variable.
@@ -164,18 +169,19 @@ impl<'a> Machine<'a> {
             touches: None,
             iterations: 0,
             is_outside: false,
+            is_endless: false,
         }
     }
 
-    /// Calls a function; returns its result, or `None` if it went outside the memory.
+    /// Calls a function; returns its result, or `None` if it went outside the memory or did not end.
     pub(super) fn call(&mut self, function: usize, arguments: &[u64]) -> Option<&[u64]> {
         self.stack.clear();
         self.stack.extend_from_slice(arguments);
-        (self.is_outside, self.iterations) = (false, 0);
+        (self.is_outside, self.is_endless, self.iterations) = (false, false, 0);
         let indices: Vec<CellIndex> = (0..arguments.len()).collect();
         let first = self.enter(function, 0, &indices, arguments.len());
         let count = self.program.functions[function].result;
-        (!self.is_outside).then(|| &self.stack[first..first + count])
+        (!self.is_outside && !self.is_endless).then(|| &self.stack[first..first + count])
     }
 
     /// Runs a function with arguments from the frame at `caller`, in a frame at `base`. Returns
@@ -356,6 +362,10 @@ impl<'a> Machine<'a> {
                     }
                     self.run(continuing, base, top);
                     self.iterations += 1;
+                    self.is_endless |= self.iterations > MAX_ITERATIONS;
+                    if self.is_endless {
+                        return End::Return(base);
+                    }
                 },
                 MachineStep::Break => return End::Break,
                 MachineStep::Return { from } => return End::Return(base + from),

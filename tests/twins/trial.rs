@@ -132,7 +132,7 @@ impl Twin {
                     kernel, function, ..
                 } = self;
                 return Err(format!(
-                    "{function} of {kernel} reads or writes outside a buffer"
+                    "{function} of {kernel} reads or writes outside a buffer, or does not end"
                 ));
             };
             let found = match trial.output {
