@@ -75,14 +75,14 @@ fetch_validator() {
 # of today (tests/mesa), come with scripts/mesa.sh.
 fetch() {
     [ $# -eq 0 ] || install_packages "$@"
-    fetching=()
+    running=()
     for part in fetch_peers fetch_validator ./scripts/mesa.sh './scripts/python.sh --environment' \
         './scripts/aarch64.sh --fetch'; do
         $part &
-        fetching+=($!)
+        running+=($!)
     done
     failed=0
-    for part in "${fetching[@]}"; do wait "$part" || failed=$?; done
+    for part in "${running[@]}"; do wait "$part" || failed=$?; done
     return $failed
 }
 
