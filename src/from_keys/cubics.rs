@@ -69,7 +69,7 @@ impl InLanes for CubicBlock {
 }
 
 impl CubicBlock {
-    /// As [`TwoKeyBlock::push`], with the tangent weights of the keys.
+    /// As [`push`](super::arcs::TwoKeyBlock::push) of two keys, with the tangent weights of the keys.
     #[inline(always)]
     pub(super) fn push(
         &mut self,

@@ -133,7 +133,7 @@ impl DeviceSetting {
     }
 }
 
-/// How many of [`Setting::all`] share out the recorded results in the first round.
+/// How many of [`DeviceSetting::all`] share out the recorded results in the first round.
 const FIRST_SETTINGS: usize = 4;
 
 /// A run in progress.
