@@ -144,6 +144,45 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
     }
 }
 
+/// Keys as dense as frames would hide the curve; a few lie on it.
+#[test]
+fn dots_cover_a_curve_only_where_they_are_apart() {
+    let folder = sample_folder();
+    for (keys, is_covered) in [("20", true), ("400", false)] {
+        let line = [
+            "generate",
+            "--boxes",
+            "1",
+            "--keys",
+            keys,
+            "-o",
+            "a.dat",
+            "--overwrite",
+        ];
+        succeed(folder.path(), &line);
+        let options = [
+            "plot",
+            "a.dat",
+            "--dimension",
+            "1",
+            "-m",
+            "slerp",
+            "-o",
+            "out.svg",
+            "--overwrite",
+        ];
+        succeed(folder.path(), &options);
+        let text = fs::read_to_string(folder.path().join("out.svg")).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let drawn = document.descendants().filter(|node| {
+            let is_curve = node.has_tag_name("polyline") && node.attribute("stroke") == Some(SLERP);
+            is_curve || node.has_tag_name("circle")
+        });
+        let last = drawn.last().unwrap();
+        assert_eq!(last.has_tag_name("circle"), is_covered, "{keys} keys");
+    }
+}
+
 #[test]
 fn every_box_has_a_panel_and_every_method_a_curve() {
     let folder = sample_folder();

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::batch::target::Destination;
 use crate::commands::picture;
-use crate::commands::plot::figure::{Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis};
+use crate::commands::plot::figure::{Dots, Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis};
 use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};
 use crate::messages::exit::Failure;
 
@@ -302,12 +302,18 @@ impl Brush {
         self.contents(&mut chart, panel)
     }
 
-    /// Curves, and dots over them.
+    /// Curves, and dots over them; smaller ones below them where dots would cover the curves.
     fn contents<DB: DrawingBackend>(
         &self,
         chart: &mut Chart<'_, DB>,
         panel: &Panel,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let width = f64::from(chart.plotting_area().dim_in_pixel().0) / self.scale;
+        let (close, apart): (Vec<_>, Vec<_>) = panel
+            .dots
+            .iter()
+            .partition(|dots| width / (dots.points.len() as f64) < CLOSE_DOTS);
+        self.dots(chart, &close, 1.5)?;
         for curve in &panel.curves {
             let mut style = self.line(curve.colour, curve.width);
             style.color = style.color.mix(curve.opacity);
@@ -315,9 +321,18 @@ impl Brush {
                 chart.draw_series([PathElement::new(piece.clone(), style)])?;
             }
         }
-        for dots in &panel.dots {
+        self.dots(chart, &apart, 3.0)
+    }
+
+    fn dots<DB: DrawingBackend>(
+        &self,
+        chart: &mut Chart<'_, DB>,
+        all: &[&Dots],
+        radius: f64,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        for dots in all {
             let style = rgb(dots.colour).mix(dots.opacity).filled();
-            let dot = |&point: &(f64, f64)| Circle::new(point, self.px(3.0), style);
+            let dot = |&point: &(f64, f64)| Circle::new(point, self.px(radius), style);
             chart.draw_series(dots.points.iter().map(dot))?;
         }
         Ok(())
@@ -366,6 +381,9 @@ fn label(axis: &PlotAxis, value: f64) -> String {
     let decimals = (2.0 - width.log10()).clamp(4.0, 15.0) as usize;
     trimmed(&format!("{value:.decimals$}"))
 }
+
+/// Pixels between dots of which less leaves nothing of the curve to be seen.
+const CLOSE_DOTS: f64 = 10.0;
 
 /// Axes whose values are all below it have labels with exponents.
 const SMALL: f64 = 0.005;
