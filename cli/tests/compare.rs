@@ -284,7 +284,7 @@ fn an_estimate_beside_its_reference() {
     );
     assert!(
         run.words
-            .contains("outside them tracks keep their end values"),
+            .contains("--before and --after say what tracks do outside them"),
         "{}",
         run.words
     );

@@ -188,7 +188,8 @@ fn times_in_gaps_are_left_out_held_or_refused() {
         &format!("{eval} --in-gaps hold --output world -o held.csv"),
     );
     let text = fs::read_to_string(at.join("held.csv")).unwrap();
-    assert!(text.lines().nth(3).unwrap().starts_with("2,0.9"), "{text}");
+    let third = text.lines().nth(3).unwrap();
+    assert!(third.starts_with("2,1305031098.9,"), "{text}");
     refused(
         at,
         &format!("{eval} --in-gaps refuse -o no.tum"),
@@ -205,4 +206,154 @@ fn times_in_gaps_are_left_out_held_or_refused() {
         "--max-gap",
     );
     assert!(!at.join("no.tum").exists() && !at.join("no.npy").exists());
+}
+
+/// Gaps are gaps however the times are chosen.
+#[test]
+fn frames_and_listed_times_lie_in_gaps_too() {
+    let folder = sample_folder();
+    let at = folder.path();
+    let keys = "t,x,y,z,w\n0,0,0,0,1\n1,0,0,0.6,0.8\n4,0,0,1,0\n5,0,0,1,0\n";
+    fs::write(at.join("gap.csv"), keys).unwrap();
+    fs::write(at.join("times.txt"), "0.5\n1\n2.5\n3\n4\n").unwrap();
+    let column = |file: &str| -> Vec<(String, String)> {
+        let text = fs::read_to_string(at.join(file)).unwrap();
+        let rows = text.lines().skip(1).map(|row| {
+            let cells: Vec<&str> = row.split(',').collect();
+            (cells[1].to_owned(), cells[5].to_owned())
+        });
+        rows.collect()
+    };
+    let times = |file: &str| -> Vec<String> { column(file).into_iter().map(|(t, _)| t).collect() };
+    let eval = "eval gap.csv -m slerp --max-gap 1.5";
+    line(at, &format!("{eval} --fps 2 -o rate.csv"));
+    assert_eq!(times("rate.csv"), ["0", "0.5", "1", "4", "4.5", "5"]);
+    line(at, &format!("{eval} --times times.txt -o listed.csv"));
+    assert_eq!(times("listed.csv"), ["0.5", "1", "4"]);
+    line(at, &format!("{eval} --fps 1 --in-gaps hold -o held.csv"));
+    let held = column("held.csv");
+    assert_eq!(held.len(), 6);
+    assert_eq!(held[1].1, "0.6");
+    assert_eq!(held[2], ("2".to_owned(), "0.6".to_owned()));
+    assert_eq!(held[3], ("3".to_owned(), "0.6".to_owned()));
+    let refuse = format!("{eval} --fps 1 --in-gaps refuse -o no.csv");
+    refused(at, &refuse, "2 of 6 times lie between keys");
+    // Without a frame in a gap they are the same frames.
+    line(
+        at,
+        "eval gap.csv -m slerp --fps 3 --start 0 --end 1 --max-gap 1 -o with.csv",
+    );
+    line(
+        at,
+        "eval gap.csv -m slerp --fps 3 --start 0 --end 1 -o without.csv",
+    );
+    let read = |file: &str| fs::read_to_string(at.join(file)).unwrap();
+    assert_eq!(read("with.csv"), read("without.csv"));
+}
+
+/// Would catch times since 1970 that lose their date in some formats or some quantities.
+#[test]
+fn times_since_1970_are_kept_by_every_table() {
+    let folder = sample_folder();
+    let at = folder.path();
+    let keys = "t,x,y,z,w\n1700000000.123456789,0,0,0,1\n1700000000.623456789,0,0,0.6,0.8\n\
+                1700000001.123456789,0,0,1,0\n";
+    fs::write(at.join("keys.csv"), keys).unwrap();
+    fs::write(at.join("path.tum"), PATH).unwrap();
+    for (command, first) in [
+        ("eval keys.csv --fps 4 -m slerp", "1700000000.123456789"),
+        (
+            "eval keys.csv --fps 4 -m slerp --output euler",
+            "1700000000.123456789",
+        ),
+        (
+            "eval keys.csv --fps 4 -m slerp --output velocity",
+            "1700000000.123456789",
+        ),
+        ("eval path.tum --fps 10", "1305031098.6"),
+        ("eval path.tum --fps 10 --output world", "1305031098.6"),
+        ("eval path.tum --fps 10 --output transform", "1305031098.6"),
+        ("smooth keys.csv --kernel linear", "1700000000.123456789"),
+        ("convert keys.csv", "1700000000.123456789"),
+    ] {
+        line(at, &format!("{command} --to csv --overwrite -o out.csv"));
+        let text = fs::read_to_string(at.join("out.csv")).unwrap();
+        let mut rows = text.lines().map(|row| row.split(',').collect::<Vec<_>>());
+        let titles = rows.next().unwrap();
+        let time = titles
+            .iter()
+            .position(|title| matches!(*title, "time" | "t"));
+        let row = rows.next().unwrap();
+        assert_eq!(row[time.unwrap()], first, "{command}: {text}");
+        // Only poses are read again.
+        if ["euler", "velocity"]
+            .iter()
+            .any(|quantity| command.ends_with(quantity))
+        {
+            continue;
+        }
+        line(
+            at,
+            &format!("{command} --to parquet --overwrite -o out.parquet"),
+        );
+        let said = line(at, "info out.parquet --json");
+        let found: Value = serde_json::from_slice(&said.out).unwrap();
+        let whole: i64 = first.split('.').next().unwrap().parse().unwrap();
+        assert_eq!(found[0]["time_offset"], whole, "{command}: {found}");
+    }
+}
+
+/// A time is asked for as the file has it, or counted from the second that its times are counted from.
+#[test]
+fn times_of_the_file_may_be_asked_for() {
+    let folder = sample_folder();
+    let at = folder.path();
+    let keys = "t,x,y,z,w\n1700000000.25,0,0,0,1\n1700000000.75,0,0,0.6,0.8\n1700000001.25,0,0,0.96,0.28\n";
+    fs::write(at.join("keys.csv"), keys).unwrap();
+    fs::write(at.join("files.txt"), "1700000000.75\n1700000001\n").unwrap();
+    fs::write(at.join("counted.txt"), "0.75\n1\n").unwrap();
+    let made = |options: &str| {
+        let said = line(
+            at,
+            &format!("eval keys.csv -m slerp {options} --to csv --overwrite -o out.csv"),
+        );
+        assert!(
+            !said.words.contains("asked for"),
+            "{options}: {}",
+            said.words
+        );
+        fs::read_to_string(at.join("out.csv")).unwrap()
+    };
+    let listed = made("--times files.txt");
+    assert_eq!(listed, made("--times counted.txt"));
+    assert!(
+        listed.contains("\n0,1700000000.75,0.8,0,0,0.6\n"),
+        "{listed}"
+    );
+    let part = made("--fps 2 --start 1700000000.75 --end 1700000001.25");
+    assert_eq!(part, made("--fps 2 --start 0.75 --end 1.25"));
+    assert!(part.contains("\n1,1700000001.25,"), "{part}");
+    line(at, "convert keys.csv --start 1700000000.75 -o part.tum");
+    let text = fs::read_to_string(at.join("part.tum")).unwrap();
+    let rows = text.lines().filter(|row| !row.starts_with('#'));
+    assert!(rows.last().unwrap().starts_with("1700000001.25"), "{text}");
+    let said = line(at, "eval keys.csv --start 1699999999 --fps 1 -o before.csv");
+    let words =
+        "asked for 1699999999 to 1700000001.25 s, keys lie from 1700000000.25 to 1700000001.25 s";
+    assert!(said.words.contains(words), "{}", said.words);
+    // Times near 0 are the file's.
+    fs::write(
+        at.join("late.tum"),
+        "5.25 0 0 0 0 0 0 1\n7.25 2 0 0 0 0 0 1\n",
+    )
+    .unwrap();
+    line(
+        at,
+        "eval late.tum -m slerp --fps 1 --start 6.25 -o late.csv",
+    );
+    let text = fs::read_to_string(at.join("late.csv")).unwrap();
+    assert!(
+        text.contains("6.25,") && text.lines().count() == 3,
+        "{text}"
+    );
 }

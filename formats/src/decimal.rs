@@ -13,6 +13,26 @@ const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Decimal(i128);
 
+/// If the first time is at least this many seconds from 0, times count from its whole second: the step of an f64 of
+/// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
+pub(crate) const OFFSET_LIMIT: u64 = 1_000_000;
+
+/// The whole second from which times count whose first one has the whole second `first`.
+pub(crate) fn offset_of(first: i64) -> i64 {
+    match first.unsigned_abs() < OFFSET_LIMIT {
+        true => 0,
+        false => first,
+    }
+}
+
+/// Seconds after a whole second as text, with their shortest decimals.
+pub(crate) fn time_text(whole: i64, time: f64) -> String {
+    match Decimal::of(whole, time).filter(|_| whole != 0) {
+        Some(sum) => sum.to_string(),
+        None => (whole as f64 + time).to_string(),
+    }
+}
+
 impl Decimal {
     /// Parses a number as [`parse`](crate::text::number::parse) does, without digits after the 24th decimal. `None`
     /// outside ±1e14.

@@ -82,8 +82,8 @@ fn open_euroc(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
 }
 
 /// Reads poses; `name` is the input's name in messages. The only track is named `body`. Times are nanoseconds unless
-/// the options specify another unit. They count from the whole second at or before the first time, which is the
-/// clip's [`time_offset`](crate::motion::Motion::time_offset).
+/// the options specify another unit. Times from a million seconds on count from the whole second at or before the
+/// first time, which is the clip's [`time_offset`](crate::motion::Motion::time_offset).
 ///
 /// # Errors
 /// When the input is invalid; the first error is returned.

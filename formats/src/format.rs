@@ -395,6 +395,9 @@ pub struct ResultShape<'a> {
     pub set: &'a TrackSet,
     /// The sample times.
     pub timeline: &'a Timeline,
+    /// The seconds to add to them to get the times in the file: the clip's
+    /// [`time_offset`](crate::motion::Motion::time_offset).
+    pub time_offset: i64,
     /// The order of tracks and samples.
     pub layout: Layout,
     /// The order of a quaternion's components [default: CSV w x y z, the others x y z w].

@@ -65,6 +65,19 @@ impl Motion {
         }
     }
 
+    /// The time in the set of a time that somebody asks for. If the times of the set are counted from a
+    /// [`time_offset`](Self::time_offset), a time that is nearer to it than to 0 is one of the file, for example
+    /// 1700000000.5; others count from it.
+    #[must_use]
+    pub fn time_in_set(&self, time: f64) -> f64 {
+        let offset = self.time_offset as f64;
+        let after = time - offset;
+        match after.abs() < time.abs() {
+            true => after,
+            false => time,
+        }
+    }
+
     /// Whether a joint has a parent, or a rest translation other than 0.
     #[must_use]
     pub fn has_hierarchy(&self) -> bool {

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 use tumble::{Timeline, TrackSet};
 
+use crate::decimal::time_text;
 use crate::npz::header::{ArrayHeader, Element};
 use crate::origin::coordinate;
 use crate::text::cell::text_cell;
@@ -22,6 +23,9 @@ pub struct Poses<'a> {
     pub set: &'a TrackSet,
     /// The times of the frames.
     pub timeline: &'a Timeline,
+    /// The seconds to add to them to get the times in the file: the clip's
+    /// [`time_offset`](crate::motion::Motion::time_offset).
+    pub time_offset: i64,
     /// The names of the components of one track at one frame.
     pub components: &'a [&'a str],
     /// The numbers, in the order `[frame][track][component]`.
@@ -103,7 +107,7 @@ impl Poses<'_> {
         for (frame, time) in self.timeline.times(0).enumerate() {
             row.clear();
             row.push(frame.to_string());
-            row.push(time.to_string());
+            row.push(time_text(self.time_offset, time));
             let of_frame = numbers.by_ref().take(each);
             row.extend(of_frame.map(|(track, component, number)| match component {
                 0..3 => coordinate(self.origin(track)[component], number),
@@ -140,6 +144,7 @@ mod tests {
         let poses = Poses {
             set: &set,
             timeline: &timeline,
+            time_offset: 0,
             components: &WORLD,
             numbers: &numbers,
             origins: &[],

@@ -1,4 +1,5 @@
-//! Lists of times: numbers of seconds, separated by blanks, commas or line ends, with `#` comments.
+//! Lists of times: numbers of seconds, separated by blanks, commas or line ends, with `#` comments. A line such as `0,5`
+//! is refused: it may be one time with a decimal comma.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -33,7 +34,16 @@ pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnost
     let mut lines = Lines::new(name, reader, Limits::default())?;
     let mut times = Vec::new();
     while let Some(line) = lines.next()? {
-        let plain = line.split('#').next().unwrap_or_default().replace(',', " ");
+        let plain = line.split('#').next().unwrap_or_default();
+        if let Some((whole, rest)) = two_meanings(plain) {
+            let column = 1 + plain.chars().take_while(|c| c.is_whitespace()).count() as u64;
+            let message = format!(
+                "`{whole},{rest}` may be one time with a decimal comma or two times; write `{whole}.{rest}` or \
+                 `{whole} {rest}`"
+            );
+            return Err(lines.refuse(column, Code::Number, message));
+        }
+        let plain = plain.replace(',', " ");
         for (column, token) in tokens(&plain) {
             let number = number::parse(token)
                 .map_err(|(code, message)| lines.refuse(column, code, message))?;
@@ -46,6 +56,14 @@ pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnost
         return Err(lines.refuse_whole(Code::Time, message));
     }
     Ok(times)
+}
+
+/// The parts of a line of two whole numbers with nothing but a comma between them.
+fn two_meanings(line: &str) -> Option<(&str, &str)> {
+    let (whole, rest) = line.trim().split_once(',')?;
+    let is_whole = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let digits = whole.strip_prefix(['-', '+']).unwrap_or(whole);
+    (is_whole(digits) && is_whole(rest)).then_some((whole, rest))
 }
 
 #[cfg(test)]
@@ -69,5 +87,17 @@ mod tests {
             read_times("t", "#\n".as_bytes()).unwrap_err().code,
             Code::Time
         );
+    }
+
+    #[test]
+    fn a_decimal_comma_is_not_taken_for_two_times() {
+        for (text, line) in [("0,5\n1,5\n", 1), ("0\n -1,25 # s\n", 2)] {
+            let error = read_times("t", text.as_bytes()).unwrap_err();
+            let location = Location::Text { line, column: line };
+            assert_eq!((error.location, error.code), (Some(location), Code::Number));
+        }
+        for text in ["0, 5", "0,5,7", "0.0,5"] {
+            assert!(read_times("t", text.as_bytes()).is_ok(), "{text}");
+        }
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, offset_of};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{
@@ -84,8 +84,9 @@ pub fn open_tum(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
     })
 }
 
-/// Reads poses; `name` is the input's name in messages. The only track is named `body`. Times count from the whole
-/// second at or before the first time, which is the clip's [`time_offset`](Motion::time_offset).
+/// Reads poses; `name` is the input's name in messages. The only track is named `body`. Times from a million
+/// seconds on, such as times since 1970, count from the whole second at or before the first time, which is the clip's
+/// [`time_offset`](Motion::time_offset).
 ///
 /// # Errors
 /// When the input is invalid; the first error is returned.
@@ -213,14 +214,14 @@ impl TrajectoryPoses {
         Ok(())
     }
 
-    /// The clip. Times count from the whole second at or before the first.
+    /// The clip. Times since 1970 count from the whole second at or before the first.
     pub(crate) fn into_clip(
         self,
         name: &str,
         of_lines: Vec<Diagnostic>,
         options: &ReadOptions,
     ) -> Result<Loaded, Diagnostic> {
-        let offset = self.times[0].whole_seconds();
+        let offset = offset_of(self.times[0].whole_seconds());
         let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
         let rate = match options.raw_times {
             true => None,

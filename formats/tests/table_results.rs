@@ -243,6 +243,7 @@ impl Shape {
             name: "t",
             set: &self.set,
             timeline: &self.timeline,
+            time_offset: 0,
             layout,
             order: Some(ComponentOrder::Xyzw),
             encoding,
@@ -374,6 +375,7 @@ fn poses_are_written_as_transforms_that_are_read() {
     let poses = Poses {
         set: &shape.set,
         timeline: &shape.timeline,
+        time_offset: 0,
         components: &TRANSFORM,
         numbers: &numbers,
         origins: &[],

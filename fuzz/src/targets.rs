@@ -154,7 +154,7 @@ pub(crate) fn outputs(bytes: &[u8]) -> u64 {
     let written = CsvWriter::new(
         &mut text,
         &set,
-        &timeline,
+        (&timeline, 0),
         ComponentOrder::Wxyz,
         Encoding::F32,
     )

@@ -209,8 +209,8 @@ impl Clip {
         self.motion.set.key_count()
     }
 
-    /// Whole seconds that all times of the clip are to be moved by, such as those of clocks that
-    /// count from 1970; 0 for most files.
+    /// The whole second from which the times of the clip are counted where the file's clock counts
+    /// from 1970 or so; 0 for most files. `at`, `start` and `end` accept times of the file, too.
     #[getter]
     fn time_offset(&self) -> i64 {
         self.motion.time_offset
@@ -353,7 +353,7 @@ impl Clip {
     /// 60
     fn frames(&self, fps: &Bound<'_, PyAny>) -> PyResult<usize> {
         let rate = crate::options::SampleRequest::Rate(frame_rate(fps)?, None, None);
-        Ok(rate.resolved(&self.motion.set)?.1)
+        Ok(rate.resolved(&self.motion)?.1)
     }
 
     /// As `Engine.evaluate`, by an engine that is shared by all calls and chooses its device.

@@ -819,7 +819,7 @@ impl Engine {
     ) -> PyResult<Verification> {
         let request = Request::new(options)?;
         let (motion, samples) = (&clip.get().motion, request.samples()?);
-        let (_, count) = samples.resolved(&motion.set)?;
+        let (_, count) = samples.resolved(motion)?;
         let engine = self.engine_for(motion.set.track_count() * count)?;
         let motion = Arc::clone(motion);
         interruptible(clip.py(), move || {

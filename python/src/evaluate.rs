@@ -143,7 +143,7 @@ impl OutputRequest {
             }
             return self.ragged(py, engine, clip, request, lists);
         }
-        let (frames, count) = samples.resolved(&clip.set)?;
+        let (frames, count) = samples.resolved(clip)?;
         let shape = self.shape(samples, tracks, count, self.encoding.shape());
         if self.on_card {
             let engine = engine((tracks * count).max(MIN_DEVICE_ROTATIONS))?;
@@ -232,7 +232,7 @@ impl OutputRequest {
             }
             return Ok(results.into_any());
         }
-        let (_, count) = samples.resolved(&clip.set)?;
+        let (_, count) = samples.resolved(clip)?;
         let shape = self.shape(samples, clip.set.track_count(), count, &[3]);
         let array = array(py, &shape, out, inputs)?;
         let found = rotations.of(py, engine, clip, request, None, &[])?;
@@ -338,7 +338,7 @@ impl OutputRequest {
             };
             // Tracks of other methods lie between these.
             let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
-            let frames = samples.frames(&clip.set, Some(&group))?;
+            let frames = samples.frames(clip, Some(&group))?;
             // As the results in NumPy's memory are aligned.
             let mut found = vec![0_u32; (group.len() * count * size).div_ceil(4)];
             let found: &mut [u8] = bytemuck::cast_slice_mut(&mut found);
@@ -485,7 +485,7 @@ impl OutputRequest {
                         times: list.as_slice().into(),
                         is_one: false,
                     };
-                    let frames = samples.frames(&one.set, None)?;
+                    let frames = samples.frames(&one, None)?;
                     let work = Work {
                         engine: &engine,
                         clip: &one,

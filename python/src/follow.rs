@@ -245,7 +245,7 @@ pub(crate) fn follow<'py>(
     let origin = made.origin(0);
     let follow = options.follow(origin)?;
     let is_one_time = matches!(moments, SampleRequest::Shared { is_one: true, .. });
-    let (frames, count) = moments.resolved(&made.set)?;
+    let (frames, count) = moments.resolved(&made)?;
     let engine = engine.engine_for(tracks * count)?;
     let found = interruptible(py, move || {
         let found = engine.follow(&made.set, &follow, &frames, layout);

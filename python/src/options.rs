@@ -10,9 +10,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
     Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
-    TrackSet, UnknownNameError, WrapMode,
+    UnknownNameError, WrapMode,
 };
 use tumble_cli::host;
+use tumble_formats::motion::Motion;
 
 use crate::arrays;
 use crate::errors::{input, of_engine};
@@ -139,14 +140,18 @@ impl Request {
 }
 
 impl SampleRequest {
-    /// The samples of some tracks of a set as the engine takes them.
-    pub(crate) fn frames(&self, set: &TrackSet, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
+    /// The samples of some tracks of a clip as the engine takes them.
+    pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
+        let set = &clip.set;
+        let in_set = |time: f64| clip.time_in_set(time);
+        let all = |times: &[f64]| times.iter().copied().map(in_set).collect();
         Ok(match self {
             &Self::Rate(rate, start, end) => {
                 let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-                SampleTimes::rate(rate).between(start.unwrap_or(first), end.unwrap_or(last))
+                SampleTimes::rate(rate)
+                    .between(start.map_or(first, in_set), end.map_or(last, in_set))
             }
-            Self::Shared { times, .. } => SampleTimes::at(times.to_vec()),
+            Self::Shared { times, .. } => SampleTimes::at(all(times)),
             Self::Each { times, count } => {
                 let list_count = times.len() / (*count).max(1);
                 if list_count != set.track_count() && !times.is_empty() {
@@ -156,10 +161,11 @@ impl SampleRequest {
                     )));
                 }
                 match tracks {
-                    None => SampleTimes::at_each(times.to_vec()),
+                    None => SampleTimes::at_each(all(times)),
                     Some(tracks) => {
                         let row = |&track: &usize| &times[track * count..(track + 1) * count];
-                        SampleTimes::at_each(tracks.iter().flat_map(row).copied().collect())
+                        let of_tracks = tracks.iter().flat_map(row).copied();
+                        SampleTimes::at_each(of_tracks.map(in_set).collect())
                     }
                 }
             }
@@ -173,10 +179,10 @@ impl SampleRequest {
     }
 
     /// As [`Samples::frames`], and how many there are.
-    pub(crate) fn resolved(&self, set: &TrackSet) -> PyResult<(SampleTimes, usize)> {
-        let frames = self.frames(set, None)?;
+    pub(crate) fn resolved(&self, clip: &Motion) -> PyResult<(SampleTimes, usize)> {
+        let frames = self.frames(clip, None)?;
         let timeline = frames
-            .resolve(set.track_count(), set.time_span())
+            .resolve(clip.set.track_count(), clip.set.time_span())
             .map_err(|error| of_engine(&error.into()))?;
         Ok((frames, timeline.len()))
     }

@@ -408,7 +408,7 @@ impl Save {
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
-        let frames = clips.iter().map(|clip| Ok(samples.resolved(&clip.set)?.0));
+        let frames = clips.iter().map(|clip| Ok(samples.resolved(clip)?.0));
         let frames: Vec<SampleTimes> = frames.collect::<PyResult<_>>()?;
         let rate = match samples {
             SampleRequest::Rate(rate, ..) => Some(*rate),
@@ -464,7 +464,7 @@ impl Save {
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let (frames, count) = samples.resolved(&clip.set)?;
+        let (frames, count) = samples.resolved(clip)?;
         let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
         let timeline = timeline.map_err(|error| of_engine(&error.into()))?;
         let mut notes = vec![("method", self.request.method_name().to_owned())];
@@ -476,6 +476,7 @@ impl Save {
             name: &self.motion.name,
             set: &clip.set,
             timeline: &timeline,
+            time_offset: clip.time_offset,
             layout,
             order: self.motion.order,
             encoding: Encoding::F32,

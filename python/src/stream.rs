@@ -63,7 +63,7 @@ impl Chunks {
         chunk: usize,
         (order, layout): (Order, Layout),
     ) -> PyResult<Self> {
-        let (frames, samples) = request.samples()?.resolved(&motion.set)?;
+        let (frames, samples) = request.samples()?.resolved(motion)?;
         if chunk == 0 {
             return Err(input(
                 "chunk: give the number of rotations of a piece, over 0",
@@ -84,7 +84,7 @@ impl Chunks {
                     let clip = engine.upload(&set, with(method));
                     Ok(PreparedTracks {
                         clip: clip.map_err(|error| of_engine(&error))?,
-                        frames: requested.frames(&motion.set, tracks.as_deref())?,
+                        frames: requested.frames(motion, tracks.as_deref())?,
                         tracks,
                     })
                 };

@@ -447,6 +447,22 @@ def test_the_script_is_the_program():
     assert done.stdout == f"tumble {tumble.__version__}\n"
 
 
+def test_times_since_1970_may_be_asked_for(tmp_path):
+    file = tmp_path / "keys.csv"
+    file.write_text("t,x,y,z,w\n1700000000.25,0,0,0,1\n1700000000.75,0,0,0.6,0.8\n1700000001.25,0,0,1,0\n")
+    clip = tumble.load(file).clip
+    assert clip.time_offset == 1_700_000_000
+    counted = clip.evaluate(at=[0.5, 0.75], method="slerp")
+    assert np.array_equal(clip.evaluate(at=[1700000000.5, 1700000000.75], method="slerp"), counted)
+    assert np.array_equal(counted[0, 1], np.float32([0, 0, 0.6, 0.8]))
+    part = clip.evaluate(fps=4, start=0.5, end=1, method="slerp")
+    of_file = clip.evaluate(fps=4, start=1700000000.5, end=1700000001, method="slerp")
+    assert np.array_equal(part, of_file)
+    times = tmp_path / "out.csv"
+    tumble.save(times, clip, at=[1700000000.5], method="slerp")
+    assert times.read_text().splitlines()[1].startswith("0,1700000000.5,")
+
+
 def test_trajectories_have_their_times_apart(tmp_path, rng):
     times = np.cumsum(rng.uniform(0.05, 0.2, 20))
     clip = tumble.Clip(times, unit(rng, 20))

@@ -31,7 +31,7 @@ pub(crate) struct ResultArguments {
     /// the same options
     #[arg(long)]
     resume: bool,
-    /// The format of the results [default: by the name of the output, else npy]
+    /// The format of the results [default: by the name of the output; to standard output npy]
     #[arg(long, visible_alias = "to", value_parser = target::format())]
     format: Option<&'static Format>,
     /// KITTI, which stores no times: also write the times of the poses to this file, in seconds, one per

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use tumble::{FrameRate, SampleTimes, TrackSet};
+use tumble::{FrameRate, SampleTimes};
 use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
@@ -65,9 +65,27 @@ pub(crate) struct KeyTimes {
     /// Seconds, increasing, counted from a whole second.
     times: Vec<f64>,
     from: i64,
-    /// Seconds between neighbouring keys of a clip beyond which it is not interpolated in between.
+}
+
+/// `--max-gap`: between which keys a clip is not interpolated.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GapArguments {
+    /// The longest gap, seconds: keys that are further apart are not interpolated
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     max_gap: Option<f64>,
+    /// What to do with times in such gaps
+    #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
     in_gaps: InGaps,
+}
+
+impl GapArguments {
+    /// What is done with times in gaps, in words.
+    pub(crate) fn done_in_gaps(&self) -> &'static str {
+        match self.in_gaps {
+            InGaps::Hold => "held",
+            InGaps::LeaveOut | InGaps::Refuse => "left out",
+        }
+    }
 }
 
 /// What to do with times between two keys that are too far apart.
@@ -102,35 +120,26 @@ impl From<SampleTimes> for ClipFrames {
 }
 
 impl ClipFrames {
+    /// Whether frames of a rate are missing.
+    pub(crate) fn is_gappy(&self) -> bool {
+        self.in_gaps > 0 && self.held.is_none()
+    }
+
     /// The times written with the results.
     pub(crate) fn written_times(&self) -> &SampleTimes {
         self.held.as_ref().unwrap_or(&self.frames)
     }
 }
 
-/// `--at`, `--max-gap`: the times of another file.
+/// `--at`: the times of another file.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct AtKeysArguments {
     /// Evaluate at the key times of another motion file instead
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "times", "start", "end", "from_zero"])]
     at: Option<PathBuf>,
-    /// The longest gap, seconds: keys that are further apart are not interpolated
-    #[arg(long, value_name = "SECONDS", requires = "at", value_parser = not_negative)]
-    max_gap: Option<f64>,
-    /// What to do with times in such gaps
-    #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
-    in_gaps: InGaps,
 }
 
 impl AtKeysArguments {
-    /// What is done with times in gaps, in words.
-    pub(crate) fn done_in_gaps(&self) -> &'static str {
-        match self.in_gaps {
-            InGaps::Hold => "held",
-            InGaps::LeaveOut | InGaps::Refuse => "left out",
-        }
-    }
-
     /// The times of the file; `None` without `--at`.
     pub(crate) fn samples(&self) -> Result<Option<SampleRequest>, Failure> {
         let Some(path) = &self.at else {
@@ -145,8 +154,6 @@ impl AtKeysArguments {
         Ok(Some(SampleRequest::Keys(KeyTimes {
             times: clip.key_times(),
             from: clip.time_offset,
-            max_gap: self.max_gap,
-            in_gaps: self.in_gaps,
         })))
     }
 }
@@ -186,16 +193,10 @@ impl SampleRequest {
                 let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
                 digest::of_bytes([&*bytes])
             }
-            Self::Keys(KeyTimes {
-                times,
-                from,
-                max_gap,
-                in_gaps,
-            }) => {
+            Self::Keys(KeyTimes { times, from }) => {
                 let numbers = times.iter().map(|time| time.to_le_bytes());
                 let bytes: Vec<u8> = numbers.flatten().chain(from.to_le_bytes()).collect();
-                let gap = max_gap.unwrap_or(f64::INFINITY);
-                digest::of_bytes([&*bytes, &gap.to_le_bytes(), &[*in_gaps as u8]])
+                digest::of_bytes([&*bytes])
             }
             Self::Rate { .. } => String::new(),
         }
@@ -205,68 +206,78 @@ impl SampleRequest {
     ///
     /// # Errors
     /// When one is in a gap, and such are refused.
-    pub(crate) fn of_clip(&self, clip: &Motion, name: &str) -> Result<ClipFrames, Failure> {
-        let Self::Keys(keys) = self else {
-            return Ok(self.of(&clip.set, name).into());
+    pub(crate) fn of_clip(
+        &self,
+        clip: &Motion,
+        gaps: &GapArguments,
+        name: &str,
+    ) -> Result<ClipFrames, Failure> {
+        let frames = self.of(clip, name);
+        let Some(max_gap) = gaps.max_gap else {
+            return Ok(frames.into());
         };
-        // Each clip has its own time offset, in whole seconds.
-        let shift = (keys.from - clip.time_offset) as f64;
-        let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
+        let timeline = frames
+            .resolve(clip.set.track_count(), clip.set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let times: Vec<f64> = timeline.times(0).collect();
         let known = clip.key_times();
         // The key before a gap.
         let held = |time: f64| {
             let next = known.partition_point(|&key| key < time);
             let before = known[next.checked_sub(1)?];
             let after = *known.get(next).filter(|&&key| key != time)?;
-            (after - before > keys.max_gap?).then_some(before)
+            (after - before > max_gap).then_some(before)
         };
         let held: Vec<Option<f64>> = times.iter().map(|&time| held(time)).collect();
+        let Some(first) = held.iter().position(Option::is_some) else {
+            return Ok(frames.into());
+        };
         let in_gaps = held.iter().flatten().count();
+        let all = words::count(times.len(), "time");
+        let found = format!(
+            "{name}: {in_gaps} of {all} lie between keys that are more than {max_gap} s apart"
+        );
+        let each = times.iter().zip(&held);
         let mut samples = ClipFrames {
             in_gaps,
-            ..SampleTimes::at(times.clone()).into()
+            ..frames.into()
         };
-        if let Some(first) = held.iter().position(Option::is_some) {
-            let all = words::count(times.len(), "time");
-            let found = format!(
-                "{name}: {in_gaps} of {all} lie between keys that are more than {} s apart",
-                keys.max_gap.unwrap_or_default()
-            );
-            let each = times.iter().zip(&held);
-            let done = match keys.in_gaps {
-                InGaps::Refuse => {
-                    let time = times[first];
-                    let from = match clip.time_offset {
-                        0 => String::new(),
-                        second => format!(" (counted from second {second})"),
-                    };
-                    let message = format!(
-                        "{found}, the first at {time} s{from}; continue with --in-gaps leave-out or hold"
-                    );
-                    return Err(Failure::new(ALL_INPUTS, message));
-                }
-                InGaps::LeaveOut => {
-                    let outside = each.filter(|(_, held)| held.is_none());
-                    samples.frames = SampleTimes::at(outside.map(|(&time, _)| time).collect());
-                    "left out"
-                }
-                InGaps::Hold => {
-                    let evaluated = each.map(|(&time, held)| held.unwrap_or(time));
-                    let evaluated = SampleTimes::at(evaluated.collect());
-                    samples.held = Some(std::mem::replace(&mut samples.frames, evaluated));
-                    "held at the key before"
-                }
-            };
-            words::warning(&format!("{found}; they are {done}"));
-        }
-        if let [first, .., last] = times[..] {
-            warn_outside_keys(first, last, &clip.set, name);
-        }
+        let done = match gaps.in_gaps {
+            InGaps::Refuse => {
+                let time = times[first];
+                let from = match clip.time_offset {
+                    0 => String::new(),
+                    second => format!(" (counted from second {second})"),
+                };
+                let message = format!(
+                    "{found}, the first at {time} s{from}; continue with --in-gaps leave-out or hold"
+                );
+                return Err(Failure::new(ALL_INPUTS, message));
+            }
+            InGaps::LeaveOut => {
+                let outside = each.filter(|(_, held)| held.is_none());
+                samples.frames = SampleTimes::at(outside.map(|(&time, _)| time).collect());
+                "left out"
+            }
+            InGaps::Hold => {
+                let evaluated = each.map(|(&time, held)| held.unwrap_or(time));
+                let evaluated = SampleTimes::at(evaluated.collect());
+                samples.held = Some(std::mem::replace(&mut samples.frames, evaluated));
+                "held at the key before"
+            }
+        };
+        words::warning(&format!("{found}; they are {done}"));
         Ok(samples)
     }
 
-    /// The samples for one set; warns when they exceed its keys.
-    pub(crate) fn of(&self, set: &TrackSet, name: &str) -> SampleTimes {
+    /// The samples for one clip; warns when they exceed its keys.
+    pub(crate) fn of(&self, clip: &Motion, name: &str) -> SampleTimes {
+        let at = |times: Vec<f64>| {
+            let start = times.iter().copied().fold(f64::INFINITY, f64::min);
+            let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            warn_outside_keys(start, end, clip, name);
+            SampleTimes::at(times)
+        };
         match self {
             Self::Rate {
                 rate,
@@ -274,19 +285,19 @@ impl SampleRequest {
                 from_zero: true,
                 ..
             } => {
-                let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-                let end = end.unwrap_or(last);
-                warn_outside_keys(first, end, set, name);
+                let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
+                let end = end.map_or(last, |end| clip.time_in_set(end));
+                warn_outside_keys(first, end, clip, name);
                 SampleTimes::rate(*rate).between(first.min(0.0), end)
             }
             Self::Rate {
                 rate, start, end, ..
-            } => in_frames(*rate, *start, *end, set, name),
-            Self::Keys(KeyTimes { times, .. }) | Self::Times(times) => {
-                let start = times.iter().copied().fold(f64::INFINITY, f64::min);
-                let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                warn_outside_keys(start, end, set, name);
-                SampleTimes::at(times.clone())
+            } => in_frames(*rate, *start, *end, clip, name),
+            Self::Times(times) => at(times.iter().map(|&time| clip.time_in_set(time)).collect()),
+            Self::Keys(keys) => {
+                // Each clip has its own time offset, in whole seconds.
+                let shift = (keys.from - clip.time_offset) as f64;
+                at(keys.times.iter().map(|time| time + shift).collect())
             }
         }
     }
@@ -297,24 +308,27 @@ pub(crate) fn in_frames(
     rate: FrameRate,
     start: Option<f64>,
     end: Option<f64>,
-    set: &TrackSet,
+    clip: &Motion,
     name: &str,
 ) -> SampleTimes {
     if (start, end) == (None, None) {
         return SampleTimes::rate(rate);
     }
-    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-    let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
-    warn_outside_keys(start, end, set, name);
+    let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
+    let in_set = |time: f64| clip.time_in_set(time);
+    let (start, end) = (start.map_or(first, in_set), end.map_or(last, in_set));
+    warn_outside_keys(start, end, clip, name);
     SampleTimes::rate(rate).between(start, end)
 }
 
-fn warn_outside_keys(start: f64, end: f64, set: &TrackSet, name: &str) {
-    let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
+fn warn_outside_keys(start: f64, end: f64, clip: &Motion, name: &str) {
+    let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
     if start < first || end > last {
+        let [start, end, first, last] =
+            [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(
             "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             outside them tracks keep their end values, or follow --before and --after"
+             --before and --after say what tracks do outside them (by default they hold their first and last key)"
         ));
     }
 }

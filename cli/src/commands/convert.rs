@@ -98,7 +98,11 @@ impl Arguments {
             error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
         };
         let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
-        let (start, end) = (self.start.unwrap_or(first), self.end.unwrap_or(last));
+        let in_set = |time: f64| clip.time_in_set(time);
+        let (start, end) = (
+            self.start.map_or(first, in_set),
+            self.end.map_or(last, in_set),
+        );
         trim(&clip, start, end, &engine)
             .map(Cow::Owned)
             .map_err(failed)

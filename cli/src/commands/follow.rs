@@ -112,7 +112,7 @@ impl Arguments {
             return Err(Failure::usage("give a single --frame"));
         };
         let follow = self.path.follow(paths, name, frame)?;
-        let frames = samples.of(set, name);
+        let frames = samples.of(paths, name);
         let found = followed(device, name, set, &follow, &frames)?;
         let written = write(paths, &frames, samples, &found, target, name)?;
         let done = format!(
@@ -185,6 +185,7 @@ fn write(
         let poses = Poses {
             set,
             timeline: &timeline,
+            time_offset: paths.time_offset,
             components: &WORLD,
             numbers: &numbers,
             origins: &paths.origins,
@@ -203,6 +204,7 @@ fn write(
         set: set.clone(),
         skeleton: vec![rest; set.track_count()],
         rate,
+        time_offset: paths.time_offset,
         origins: paths.origins.clone(),
         ..Motion::default()
     };

@@ -245,11 +245,14 @@ impl TravelSource {
         Ok(Self::Paths(Box::new(paths), Box::new(arguments.clone())))
     }
 
-    pub(crate) fn set(&self) -> &TrackSet {
+    pub(crate) fn clip(&self) -> &Motion {
         match self {
-            Self::Paths(paths, _) => &paths.set,
-            Self::Clip(clip) => &clip.set,
+            Self::Paths(clip, _) | Self::Clip(clip) => clip,
         }
+    }
+
+    pub(crate) fn set(&self) -> &TrackSet {
+        &self.clip().set
     }
 
     /// The origin that all positions are relative to.

@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
+use tumble::Method;
 use tumble::verify::{SamplePosition, Verdict, Verification};
-use tumble::{Method, TrackSet};
+use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
@@ -97,8 +98,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 _ => format!("{name} {}", names::clip(clip)),
             };
             let clip = arguments.inputs.tracks.select(clip, &name)?;
-            let set = (&*name, &clip.set);
-            let found = arguments.compare(&device, &samples, set, &methods, &mut progress)?;
+            let clip = (&*name, &*clip);
+            let found = arguments.compare(&device, &samples, clip, &methods, &mut progress)?;
             let is_nothing = found.iter().any(|line| line.verdict == Verdict::Nothing);
             lines.extend(found);
             if is_nothing {
@@ -137,11 +138,12 @@ impl Arguments {
         &self,
         device: &OpenedDevice,
         samples: &SampleRequest,
-        (name, set): (&str, &TrackSet),
+        (name, clip): (&str, &Motion),
         methods: &[Method],
         progress: &mut Progress,
     ) -> Result<Vec<VerificationLine>, Failure> {
-        let frames = progress.suspend(|| samples.of(set, name));
+        let set = &clip.set;
+        let frames = progress.suspend(|| samples.of(clip, name));
         // Two results are in memory at once.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();

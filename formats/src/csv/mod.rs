@@ -11,8 +11,9 @@ use glam::Quat;
 
 use tumble::{Encoding, Layout, Timeline, TrackSet};
 
+use crate::decimal::time_text;
 use crate::feature::Feature;
-use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
+use crate::format::{Format, FormatOption, ResultWriter, WriteResults};
 use crate::quaternion::ComponentOrder;
 use crate::text::cell::text_cell;
 
@@ -36,16 +37,13 @@ pub static FORMAT: Format = Format {
         layout: Some(Layout::FrameMajor),
         rotation_bytes: |_| 8.0, // four times a digit and a comma
         rotations: |out, result| {
-            let &ResultShape {
-                set,
-                timeline,
-                encoding,
-                order,
-                ..
-            } = result;
-            let order = order.unwrap_or(ORDER);
+            let order = result.order.unwrap_or(ORDER);
             Ok(Box::new(CsvWriter::new(
-                out, set, timeline, order, encoding,
+                out,
+                result.set,
+                (result.timeline, result.time_offset),
+                order,
+                result.encoding,
             )?))
         },
         poses: |poses, mut out| poses.write_csv(&mut out),
@@ -79,6 +77,7 @@ impl<W: Write> ResultWriter for CsvWriter<'_, W> {
 pub struct CsvWriter<'a, W: Write> {
     csv: ::csv::Writer<W>,
     timeline: &'a Timeline,
+    time_offset: i64,
     order: ComponentOrder,
     encoding: Encoding,
     tracks: usize,
@@ -89,7 +88,8 @@ pub struct CsvWriter<'a, W: Write> {
 }
 
 impl<'a, W: Write> CsvWriter<'a, W> {
-    /// Writes the header of a result: the rotations of `set` at the samples of `timeline`. `order` is that of
+    /// Writes the header of a result: the rotations of `set` at the samples of a timeline, whose times are written with
+    /// these whole seconds added (a clip's [`time_offset`](crate::motion::Motion::time_offset)). `order` is that of
     /// quaternions; other encodings have only one. The encodings F16 and Snorm16 are written as F32, because rounded
     /// numbers would not be shorter.
     ///
@@ -98,13 +98,14 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     pub fn new(
         writer: W,
         set: &TrackSet,
-        timeline: &'a Timeline,
+        (timeline, time_offset): (&'a Timeline, i64),
         order: ComponentOrder,
         encoding: Encoding,
     ) -> io::Result<Self> {
         let mut writer = Self {
             csv: ::csv::Writer::from_writer(writer),
             timeline,
+            time_offset,
             order,
             encoding,
             tracks: set.track_count(),
@@ -170,7 +171,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     fn row(&mut self, frame: &[Quat]) -> ::csv::Result<()> {
         self.csv.write_field(self.frame.to_string())?;
         let time = self.timeline.time(0, self.frame).unwrap_or(f64::NAN);
-        self.csv.write_field(time.to_string())?;
+        self.csv.write_field(time_text(self.time_offset, time))?;
         let mut bytes = vec![0; self.encoding.bytes()];
         for q in frame {
             let mut numbers = q.to_array().to_vec();

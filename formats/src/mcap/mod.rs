@@ -14,7 +14,7 @@ use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
 use crate::budget::{Budget, OverBudget};
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, offset_of};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
@@ -359,7 +359,7 @@ impl Log<'_> {
                 refused.remove(0)
             });
         };
-        let offset = first.div_euclid(1_000_000_000);
+        let offset = offset_of(first.div_euclid(1_000_000_000));
         let mut used = std::collections::HashSet::new();
         let mut clip = Motion {
             set: TrackSet::new(),

@@ -43,6 +43,7 @@ pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
         sink,
         batch,
         timeline: result.timeline,
+        time_offset: result.time_offset as f64,
         layout: result.layout,
         encoding: result.encoding,
         is_w_first,
@@ -56,6 +57,7 @@ struct Rotations<'a, S> {
     sink: S,
     batch: Batch,
     timeline: &'a Timeline,
+    time_offset: f64,
     layout: Layout,
     encoding: Encoding,
     /// Whether w is the first component of quaternions.
@@ -86,7 +88,7 @@ impl<S: RowSink> ResultWriter for Rotations<'_, S> {
                 Layout::FrameMajor => (self.written % self.tracks, self.written / self.tracks),
             };
             let time = self.timeline.time(track, frame).unwrap_or(f64::NAN);
-            self.batch.row(frame, time, track);
+            self.batch.row(frame, time + self.time_offset, track);
             let mut numbers = q.to_array();
             if self.is_w_first {
                 numbers.rotate_right(1);
@@ -140,7 +142,7 @@ pub(crate) fn write_poses<S: RowSink>(
     {
         let (frame, track) = (index / tracks, index % tracks);
         let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
-        batch.row(frame, time, track);
+        batch.row(frame, time + poses.time_offset as f64, track);
         let origin = poses.origin(track);
         for (i, (column, &number)) in batch.numbers.iter_mut().zip(pose).enumerate() {
             let moved = if i < 3 { origin[i] } else { 0.0 };

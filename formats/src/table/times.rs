@@ -1,5 +1,6 @@
 //! Converts a column of times to seconds.
 
+use crate::decimal::{OFFSET_LIMIT, offset_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
 use crate::rate::Precision;
@@ -17,10 +18,6 @@ pub(crate) struct RowTimes {
 
 /// Integers above this are not seconds: it is the year 5138 as a Unix time.
 const MAX_SECONDS: u64 = 100_000_000_000;
-
-/// If the first stamp is at least this many seconds from 0, stamps count from its whole second: the step of an f64 of
-/// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
-const OFFSET_LIMIT: u64 = 1_000_000;
 
 /// The times of a table's rows.
 ///
@@ -70,12 +67,7 @@ pub(crate) fn times(
             Ok(doubles(seconds.collect()))
         }
         (ColumnValues::Decimals(times, decimals), _) => {
-            let first = times.iter().min().map_or(0, |first| first.whole_seconds());
-            let offset = if first.unsigned_abs() < OFFSET_LIMIT {
-                0
-            } else {
-                first
-            };
+            let offset = offset_of(times.iter().min().map_or(0, |first| first.whole_seconds()));
             Ok(RowTimes {
                 seconds: times.iter().map(|time| time.since(offset)).collect(),
                 precision: Some(Precision::Decimals(*decimals)),
@@ -132,12 +124,7 @@ fn doubles(mut seconds: Vec<f64>) -> RowTimes {
 fn stamps(times: &[i64], unit: TimeUnit) -> RowTimes {
     let per_second = i128::from(unit.per_second());
     let first = times.iter().min().copied().map_or(0, i128::from);
-    let whole = first.div_euclid(per_second) as i64;
-    let offset = if whole.unsigned_abs() < OFFSET_LIMIT {
-        0
-    } else {
-        whole
-    };
+    let offset = offset_of(first.div_euclid(per_second) as i64);
     let start = i128::from(offset) * per_second;
     let seconds = times
         .iter()

@@ -294,9 +294,11 @@ impl Arguments {
         if let Some(warning) = &common.warning {
             words::warning(warning);
         }
+        // The times are those of the first clip.
+        let in_set = |time: f64| pair.clips[0].time_in_set(time);
         let (start, end) = (
-            self.start.unwrap_or(common.start),
-            self.end.unwrap_or(common.end),
+            self.start.map_or(common.start, in_set),
+            self.end.map_or(common.end, in_set),
         );
         let frames = match self.fps {
             Some(rate) => SampleTimes::rate(rate).between(start, end),

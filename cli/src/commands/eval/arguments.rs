@@ -15,7 +15,7 @@ use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, me
 use crate::arguments::options::{AppliesTo, CommandLine, OPTIONS, ResultKind, ResultRequest};
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
-use crate::arguments::time::{AtKeysArguments, SampleRequest, SamplingArguments};
+use crate::arguments::time::{AtKeysArguments, GapArguments, SampleRequest, SamplingArguments};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -61,6 +61,8 @@ pub(crate) struct Arguments {
     pub(super) sampling: SamplingArguments,
     #[command(flatten)]
     pub(super) at_keys: AtKeysArguments,
+    #[command(flatten)]
+    pub(super) gaps: GapArguments,
     #[command(flatten)]
     pub(super) interpolation: InterpolationArguments,
     #[command(flatten)]

@@ -270,10 +270,7 @@ impl EvaluationJob<'_> {
         let (work, device) = (self.work, &self.device.label);
         let in_gaps = match self.in_gaps {
             0 => String::new(),
-            count => format!(
-                " ({count} in gaps {})",
-                self.arguments.at_keys.done_in_gaps()
-            ),
+            count => format!(" ({count} in gaps {})", self.arguments.gaps.done_in_gaps()),
         };
         let done = format!(
             "{} × {}{in_gaps}, {method}",
@@ -334,12 +331,13 @@ impl EvaluationJob<'_> {
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let times: Vec<ClipFrames> = clips
             .iter()
-            .map(|clip| self.samples.of_clip(clip, name))
+            .map(|clip| self.samples.of_clip(clip, &self.arguments.gaps, name))
             .collect::<Result<_, _>>()?;
         self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
+        let is_gappy = times.iter().any(ClipFrames::is_gappy);
         let rate = match self.samples {
-            SampleRequest::Rate { rate, .. } => Some(*rate),
-            SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
+            SampleRequest::Rate { rate, .. } if !is_gappy => Some(*rate),
+            _ => None,
         };
         self.written(name, clips, &times, rate, target, None)
     }
@@ -367,6 +365,12 @@ impl EvaluationJob<'_> {
                  write another format"
             )));
         };
+        if self.arguments.command_line.has("max_gap") {
+            return Err(Failure::usage(format!(
+                "{name}: the animations of a file that is kept keep all frames; leave out --max-gap, or write \
+                 another format"
+            )));
+        }
         let at = |clip: &&Motion| {
             let times = document.times(clip.index, rate);
             times.map(|times| SampleTimes::at(times).into())
@@ -464,7 +468,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let samples = self.samples.of_clip(clip, name)?;
+        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
         self.in_gaps = samples.in_gaps;
         if samples.held.is_some() && arguments.output.quantity() != Quantity::Rotation {
             return Err(Failure::usage(format!(
@@ -480,7 +484,9 @@ impl EvaluationJob<'_> {
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
         let requested = arguments.layout;
         let mut notes = self.notes(name)?;
-        if let SampleRequest::Rate { rate, .. } = self.samples {
+        if let SampleRequest::Rate { rate, .. } = self.samples
+            && !samples.is_gappy()
+        {
             notes.push(("rate", rate.to_string()));
         }
         let format = target.results()?;
@@ -491,6 +497,7 @@ impl EvaluationJob<'_> {
             name,
             set,
             timeline: &timeline,
+            time_offset: clip.time_offset,
             layout: format.layout.unwrap_or(requested),
             order,
             encoding,
@@ -546,7 +553,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let set = &clip.set;
-        let samples = self.samples.of_clip(clip, name)?;
+        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
         self.in_gaps = samples.in_gaps;
         let frames = &samples.frames;
         let timeline = samples
@@ -599,6 +606,7 @@ impl EvaluationJob<'_> {
         let poses = Poses {
             set,
             timeline: &timeline,
+            time_offset: clip.time_offset,
             components: &components,
             numbers: &numbers,
             origins: &origins,

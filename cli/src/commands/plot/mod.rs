@@ -212,10 +212,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         let input::OnlyClip { clip, rest } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
-        let set = clip.set;
-        note_curves(&name, &set, &interpolations);
-        let source = PlotSource::new(names::file(path), &set, &interpolations, &samples)?;
-        let subjects = arguments.subjects(&set, tracks, &name)?;
+        note_curves(&name, &clip.set, &interpolations);
+        let source = PlotSource::new(names::file(path), &clip, &interpolations, &samples)?;
+        let subjects = arguments.subjects(&clip.set, tracks, &name)?;
         let pictures = match &out {
             PlotOutput::One(file) => vec![(
                 file.clone(),

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
+use tumble_formats::motion::Motion;
 
 use crate::arguments::time::SampleRequest;
 use crate::batch::target::Destination;
@@ -50,17 +51,17 @@ pub(crate) fn write(
     let mut chapters = Vec::new();
     let outcome = for_each(&inputs, |path| {
         let only = progress.suspend(|| arguments.inputs.load_one(path))?;
-        let set = only.clip.set;
+        let (clip, set) = (&only.clip, &only.clip.set);
         let name = names::input(path);
-        progress.suspend(|| note_curves(&name, &set, interpolations));
-        let mut boxes = progress.suspend(|| moving_boxes(&set, &name));
+        progress.suspend(|| note_curves(&name, set, interpolations));
+        let mut boxes = progress.suspend(|| moving_boxes(set, &name));
         boxes.truncate(PANELS);
         let chapter = Chapter {
             title: names::file(path),
-            facts: facts(&set),
+            facts: facts(set),
             figures: figures(
                 writer,
-                (path, &set, boxes),
+                (path, clip, boxes),
                 interpolations,
                 samples,
                 folder,
@@ -91,7 +92,7 @@ fn figures_of_one(methods: usize) -> usize {
 /// Draws all figures of one input.
 fn figures(
     writer: &mut FigureWriter,
-    (path, set, boxes): (&PathBuf, &TrackSet, Vec<usize>),
+    (path, clip, boxes): (&PathBuf, &Motion, Vec<usize>),
     interpolations: &[Interpolation],
     samples: &SampleRequest,
     folder: &Path,
@@ -101,7 +102,7 @@ fn figures(
     let mut shown = Vec::new();
     let mut draw =
         |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
-            let source = PlotSource::new(name.clone(), set, methods, samples)?;
+            let source = PlotSource::new(name.clone(), clip, methods, samples)?;
             let figure = source.figure(&mut writer.device, subject)?;
             let file = format!(
                 "{}-{label}.{}",
@@ -115,7 +116,7 @@ fn figures(
         };
     // Those of the original's report; of a smaller set, its last instead.
     let mut dimensions = DIMENSIONS
-        .map(|dimension| dimension.min(4 * set.track_count()))
+        .map(|dimension| dimension.min(4 * clip.set.track_count()))
         .to_vec();
     dimensions.dedup();
     for dimension in dimensions {

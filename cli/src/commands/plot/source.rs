@@ -4,6 +4,7 @@ pub(crate) mod curves;
 
 use glam::Quat;
 use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
+use tumble_formats::motion::Motion;
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::time::SampleRequest;
@@ -29,11 +30,12 @@ pub(crate) struct PlotSource<'a> {
 impl<'a> PlotSource<'a> {
     pub(crate) fn new(
         name: String,
-        set: &'a TrackSet,
+        clip: &'a Motion,
         interpolations: &'a [Interpolation],
         samples: &SampleRequest,
     ) -> Result<Self, Failure> {
-        let mut frames = samples.of(set, &name);
+        let set = &clip.set;
+        let mut frames = samples.of(clip, &name);
         if let SampleRequest::Rate { .. } = samples
             && let Some(span) = set.time_span()
         {

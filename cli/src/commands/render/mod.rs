@@ -188,7 +188,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let name = names::input(path);
     let (source, rest) = arguments.source(path, &name)?;
     let set = source.set();
-    let mut frames = samples.of(set, &name);
+    let mut frames = samples.of(source.clip(), &name);
     let mut timeline = frames
         .resolve(set.track_count(), set.time_span())
         .map_err(|error| Failure::evaluating(&name, &error.into()))?;

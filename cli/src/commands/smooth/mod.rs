@@ -257,6 +257,7 @@ fn write(
             name,
             set: &clip.set,
             timeline: &timeline,
+            time_offset: clip.time_offset,
             layout: Layout::TrackMajor,
             order: None,
             encoding: tumble::Encoding::F32,

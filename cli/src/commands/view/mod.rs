@@ -247,7 +247,7 @@ impl Arguments {
     /// shown as it is.
     fn sampled(&self, one: ShownClip) -> Result<ShownClip, Failure> {
         let name = &one.name;
-        let frames = in_frames(self.fps, self.start, self.end, &one.clip.set, name);
+        let frames = in_frames(self.fps, self.start, self.end, &one.clip, name);
         let timeline = one.timeline(&frames)?;
         if one.bytes(timeline.len()) > MAX_PAGE_BYTES {
             return Err(Failure::usage(format!(
