@@ -124,16 +124,25 @@ fn files_are_known_by_their_heading_or_ending() {
 
 #[test]
 fn times_on_frames_are_frames_of_a_rate() {
+    let rate = FrameRate::new(25, 1).ok();
     let clip = read("7.04 0 0 0 0 0 0 1\n7.08 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n");
-    assert_eq!(
-        (clip.time_offset, clip.rate),
-        (0, FrameRate::new(25, 1).ok())
+    assert_eq!((clip.time_offset, clip.rate), (0, rate));
+    assert_eq!(clip.set.track(0).times, [176.0 / 25.0, 177.0 / 25.0, 8.0]);
+    // Far from 0 they are counted from a second.
+    let clip = read(
+        "1700000007.04 0 0 0 0 0 0 1\n1700000007.08 0 0 0 0 0 0 1\n1700000008 0 0 0 0 0 0 1\n",
     );
+    assert_eq!((clip.time_offset, clip.rate), (1_700_000_007, rate));
     assert_eq!(clip.set.track(0).times, [1.0 / 25.0, 2.0 / 25.0, 1.0]);
+    let before = read("-1700000000.75 0 0 0 0 0 0 1\n-1699999999.5 0 0 0 0 0 0 1\n");
+    assert_eq!(
+        (before.time_offset, before.set.track(0).times),
+        (-1_700_000_001, &[0.25, 1.5][..])
+    );
     let before = read("-0.75 0 0 0 0 0 0 1\n.5 0 0 0 0 0 0 1\n");
     assert_eq!(
         (before.time_offset, before.set.track(0).times),
-        (-1, &[0.25, 1.5][..])
+        (0, &[-0.75, 0.5][..])
     );
 }
 
