@@ -44,6 +44,44 @@ fn columns_hold_rotation_vectors_angles_and_matrices() {
     assert!(found.to_string().starts_with("a.csv:3:"), "{found}");
 }
 
+/// A `--map` cannot help there.
+#[test]
+fn headings_without_names_are_told_apart_from_other_names() {
+    for (text, words) in [
+        ("t;x;y;z;w\n0;0;0;0;1\n", "columns are separated by commas"),
+        (
+            "t\tx\ty\tz\tw\n0\t0\t0\t0\t1\n",
+            "columns are separated by commas",
+        ),
+        (
+            "0,0,0,0,1\n1,0,0,0,1\n",
+            "the first line has the names of the columns",
+        ),
+        (
+            "# pose\nt,x,y,z,w\n0,0,0,0,1\n",
+            "the first line has the names of the columns",
+        ),
+        ("T,X,Y,Z,W\n0,0,0,0,1\n", "--map time=NAME"),
+    ] {
+        let refused = read(text, None, false).unwrap_err();
+        assert_eq!(refused.code, Code::NoTimes, "{refused}");
+        assert!(refused.message.contains(words), "{refused}");
+    }
+}
+
+#[test]
+fn a_track_without_a_name_is_called_as_in_results() {
+    let text = "t,x,y,z,w\n0,0,0,0,1\n1,0,0,nan,1\n2,0,0,1,0\n";
+    let loaded = read(text, None, true).unwrap();
+    let said = &loaded.warnings[0];
+    assert_eq!(said.code, Code::Bridged);
+    assert!(
+        said.message
+            .contains("the track `box1` lacks 1 of its keys"),
+        "{said}"
+    );
+}
+
 #[test]
 fn gaps_are_refused_or_bridged() {
     let text = "time,knee.x,knee.y,knee.z,knee.w,hip.x,hip.y,hip.z,hip.w,hip.tx,hip.ty,hip.tz\n\

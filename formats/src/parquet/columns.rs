@@ -202,13 +202,17 @@ fn is_plain(schema: &SchemaDescriptor, leaf: usize, data_type: &DataType) -> boo
 
 #[cfg(test)]
 mod tests {
-    use arrow_array::{ArrayRef, Float32Array, Float64Array, Int64Array, RecordBatch, StringArray};
+    use arrow_array::{
+        ArrayRef, DurationMillisecondArray, Float32Array, Float64Array, Int64Array, RecordBatch,
+        StringArray,
+    };
     use parquet::arrow::ArrowWriter;
     use parquet::arrow::arrow_reader::ArrowReaderOptions;
     use parquet::basic::{Compression, Encoding, ZstdLevel};
     use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 
     use super::*;
+    use crate::format::ReadOptions;
     use crate::table::columns::ColumnNeed;
 
     /// A file of several groups of rows and several pages each: `time`, `track`, `x` and `count`,
@@ -297,6 +301,22 @@ mod tests {
             file.read_apart(&typed),
             file.read_together(&typed, gather).unwrap(),
         )
+    }
+
+    /// Parquet has whole numbers for durations; only the schema of Arrow beside them has the unit.
+    #[test]
+    fn durations_have_their_unit() {
+        let numbers = |number: f32| Arc::new(Float32Array::from(vec![number; 3])) as ArrayRef;
+        let times: ArrayRef = Arc::new(DurationMillisecondArray::from(vec![0, 100, 250]));
+        let columns = ["x", "y", "z", "w"].map(|name| (name, numbers(f32::from(name == "w"))));
+        let batch =
+            RecordBatch::try_from_iter([("time", times)].into_iter().chain(columns)).unwrap();
+        let mut bytes = Vec::new();
+        let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let loaded = crate::parquet::read_parquet("t", bytes, &ReadOptions::default()).unwrap();
+        assert_eq!(loaded.clips[0].set.track(0).times, [0.0, 0.1, 0.25]);
     }
 
     #[test]

@@ -155,7 +155,19 @@ fn read_table(
         }
         _ => Arc::clone(field),
     };
-    let fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
+    let mut fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
+    // Only that schema tells durations from other whole numbers.
+    let is_time = |column: &&RequestedColumn| column.need == ColumnNeed::Time;
+    if let Some(time) = plan.columns.iter().find(is_time)
+        && *fields[time.index].data_type() == DataType::Int64
+        && let Ok(other) =
+            ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), ArrowReaderOptions::new())
+        && let Some(field) = other.schema().fields().get(time.index)
+        && let DataType::Duration(_) = field.data_type()
+    {
+        let duration = fields[time.index].as_ref().clone();
+        fields[time.index] = Arc::new(duration.with_data_type(field.data_type().clone()));
+    }
     let requested = plan.columns.iter();
     let requested: Vec<(&RequestedColumn, &DataType)> = requested
         .map(|column| (column, fields[column.index].data_type()))

@@ -239,7 +239,11 @@ impl TableClip<'_> {
             if missing.is_empty() {
                 continue;
             }
-            let name = printable(&shared.tracks[track].name).into_owned();
+            // As a set names tracks without a name.
+            let name = match &*shared.tracks[track].name {
+                "" => format!("box{}", track + 1),
+                name => printable(name).into_owned(),
+            };
             if there.is_empty() {
                 let message = format!("the track `{name}` has no key without a gap; remove it");
                 return Err(self.table.refuse(Code::Null, message));

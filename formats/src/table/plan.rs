@@ -399,11 +399,28 @@ fn time_column(
             names.file_columns[frames]
         ),
         (None, _) => format!(
-            "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; --map time=NAME",
-            names.list()
+            "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; {}",
+            names.list(),
+            heading_hint(&names.file_columns).unwrap_or("--map time=NAME")
         ),
     };
     Err(names.refuse(Code::NoTimes, message))
+}
+
+/// What to do about a heading that has no names in columns of its format, which no `--map` can change.
+fn heading_hint(columns: &[String]) -> Option<&'static str> {
+    let [first, ..] = columns else {
+        return None;
+    };
+    if columns.len() == 1 && first.contains([';', '\t']) {
+        return Some(
+            "columns are separated by commas, and numbers have decimal points: convert the file",
+        );
+    }
+    let is_number = |name: &String| name.trim().parse::<f64>().is_ok();
+    let is_heading = !first.starts_with('#') && !columns.iter().all(is_number);
+    (!is_heading)
+        .then_some("the first line has the names of the columns, such as time,x,y,z,w: add it")
 }
 
 /// Tracks in columns: `knee.x`, `knee.y`, `knee.z`, `knee.w`.

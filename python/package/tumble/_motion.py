@@ -155,8 +155,8 @@ class MotionLibrary:
         finite: bool = False,
         out: MotionState | None = None,
     ) -> MotionState:
-        """The states of N instances: `clip_ids` and `times`, (N,), say which clip each plays and the second
-        of it at which it stands.
+        """The states of N instances: `clip_ids` and `times`, (N,), say which clip each plays and how many
+        seconds after the clip's first key it stands. (`Clip` and `Engine` take the times of the keys.)
 
         `arrays`: the names of those to compute; rotations alone take a third of the time. `out`: a state
         whose arrays are filled again, those that it has. `finite`: velocities as differences of the two
@@ -221,7 +221,7 @@ class MotionLibrary:
             out.angular_velocities[...] = each * _rotation_vectors(before.world_rotations, after.world_rotations)
 
     def sample_times(self, clip_ids: ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
-        """A time within each of these clips, uniformly.
+        """A time within each of these clips, uniformly, in seconds after its first key.
 
         >>> import numpy as np, tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
