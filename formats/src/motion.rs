@@ -191,6 +191,26 @@ pub struct Joint {
     pub rest: Transform,
 }
 
+/// A track that is its own ancestor, by the parent of each track; `None` if there is none. Parents that do not exist
+/// count as none.
+#[must_use]
+pub fn circle(parents: &[Option<usize>]) -> Option<usize> {
+    let mut is_done = vec![false; parents.len()];
+    for track in 0..parents.len() {
+        let mut line = Vec::new();
+        let mut next = Some(track);
+        while let Some(joint) = next.filter(|&joint| is_done.get(joint) == Some(&false)) {
+            if line.len() == parents.len() {
+                return Some(joint);
+            }
+            line.push(joint);
+            next = parents[joint];
+        }
+        line.into_iter().for_each(|joint| is_done[joint] = true);
+    }
+    None
+}
+
 /// A transform: first the scale, then the rotation, then the translation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transform {

@@ -407,6 +407,36 @@ fn may_be_refused(clip: &Motion, format: &Format) -> bool {
     is_uneven || tracks != 1 && !format.supports(Feature::SeveralTracks)
 }
 
+/// No format that stores skeletons writes a file that none of them could read.
+#[test]
+fn parents_in_a_circle_are_not_written() {
+    let mut clip = Motion::default();
+    for (name, parent) in [("hip", None), ("knee", Some(2)), ("foot", Some(1))] {
+        clip.set
+            .push(name, &[0.0, 1.0], &[Quat::IDENTITY; 2])
+            .unwrap();
+        clip.skeleton.push(Joint {
+            parent,
+            rest: Transform::default(),
+        });
+    }
+    let samples = keyed(&clip).unwrap();
+    let with_skeletons = formats().filter(|(format, _)| format.supports(Feature::Skeleton));
+    for (format, name) in with_skeletons {
+        let options = MotionOptions {
+            format: name.to_owned(),
+            ..MotionOptions::default()
+        };
+        let mut bytes = Vec::new();
+        let written = format.write_clips(&[samples.of(&clip, None, &[])], &options, &mut bytes);
+        let Err(WriteError::Refused(why)) = written else {
+            panic!("{name}: {written:?}");
+        };
+        assert_eq!((why.code, bytes.len()), (Code::Parents, 0), "{name}");
+        assert!(why.message.contains("is its own ancestor"), "{name}: {why}");
+    }
+}
+
 #[test]
 fn what_is_written_is_read_again_from_every_format_into_every_other() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 use pyo3::prelude::*;
 use tumble::{Tcb, TrackError, TrackSet};
-use tumble_formats::motion::{Joint, Motion, Transform};
+use tumble_formats::motion::{Joint, Motion, Transform, circle};
 
 use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
 use crate::errors::{input, of_track};
@@ -250,6 +250,12 @@ impl ClipParts<'_, '_> {
                 .collect::<PyResult<_>>()?,
             Some(parents) => return Err(wrong("parents", parents.len())),
         };
+        if let Some(track) = circle(&parents) {
+            let name = clip.set.track_name(track);
+            return Err(input(format!(
+                "parents: track {track} (`{name}`) is its own ancestor; the parent of a root is None or -1"
+            )));
+        }
         let offsets = match self.offsets {
             None => vec![Vec3::ZERO; tracks],
             Some(value) => match doubles(value, "offsets")? {

@@ -303,9 +303,10 @@ def test_tracks_and_clips_that_are_not_there():
     for options in wrong:
         with pytest.raises(tumble.InputError):
             tumble.Clip(TIMES, KEYS, **options)
-    with pytest.raises(tumble.InputError, match="is its own ancestor"):
-        circle = tumble.Clip(TIMES, KEYS, parents=[1, 0, None])
-        tumble.Engine().world(circle, fps=1)
+    for parents in [[1, 0, None], [None, 2, 1], [1, 2, 0]]:
+        with pytest.raises(tumble.InputError, match="track . .`[abc]`. is its own ancestor"):
+            tumble.Clip(TIMES, KEYS, names=["a", "b", "c"], parents=parents)
+    assert tumble.Clip(TIMES, KEYS, parents=[1, 2, -1]).parents == [1, 2, None]
 
 
 def test_devices_that_are_not_there():

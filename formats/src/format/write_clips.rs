@@ -7,8 +7,9 @@ use glam::{Quat, Vec3};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Document, Format, MotionOptions, WriteError};
-use crate::motion::{ChannelInterpolation, SampledClip};
+use crate::motion::{ChannelInterpolation, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
+use crate::printable::printable;
 use crate::signs::{continue_signs, signs_jump};
 
 /// Scales this close to 1 count as 1, because of rounding.
@@ -31,6 +32,11 @@ impl Format {
             let message = format!("{} holds results, not clips", self.name);
             return Err(io::Error::new(io::ErrorKind::Unsupported, message).into());
         };
+        if self.supports(Feature::Skeleton) {
+            clips
+                .iter()
+                .try_for_each(|clip| check_parents(clip, options))?;
+        }
         let mut warnings = warnings(self, clips, options);
         let continued: Vec<Vec<Quat>> = clips
             .iter()
@@ -58,6 +64,19 @@ impl Format {
         warnings.extend(write(&clips, options, out)?);
         Ok(warnings)
     }
+}
+
+/// Refuses parents that are no hierarchy: no file with them could be read.
+fn check_parents(sampled: &SampledClip<'_>, options: &MotionOptions) -> Result<(), Diagnostic> {
+    let clip = sampled.clip;
+    let parents: Vec<Option<usize>> = clip.skeleton.iter().map(|joint| joint.parent).collect();
+    let Some(track) = circle(&parents) else {
+        return Ok(());
+    };
+    let name = printable(&clip.set.track_name(track)).into_owned();
+    let message =
+        format!("track {track} (`{name}`) is its own ancestor; the parent of a root is None");
+    Err(Diagnostic::new(&options.name, Code::Parents, message))
 }
 
 /// Warnings about the features of some clips that a format cannot store, and about names that it changes.

@@ -11,7 +11,7 @@ use tumble::{FrameRate, Layout};
 
 use crate::bvh::joint::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::motion::{Channels, Transform};
+use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
 use crate::npz::header::shape_text;
@@ -304,22 +304,4 @@ pub(crate) fn read_numbers(archive: &Archive, member: usize) -> Result<Vec<f64>,
         );
         archive.refuse(member, Code::ElementType, message)
     })
-}
-
-/// A track that is among its ancestors, if there is one.
-fn circle(parents: &[Option<usize>]) -> Option<usize> {
-    let mut is_done = vec![false; parents.len()];
-    for track in 0..parents.len() {
-        let mut line = Vec::new();
-        let mut next = Some(track);
-        while let Some(joint) = next.filter(|&joint| !is_done[joint]) {
-            if line.len() == parents.len() {
-                return Some(joint);
-            }
-            line.push(joint);
-            next = parents[joint];
-        }
-        line.into_iter().for_each(|joint| is_done[joint] = true);
-    }
-    None
 }

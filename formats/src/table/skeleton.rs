@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::motion::{Joint, Motion, SampledClip, Transform};
+use crate::motion::{Joint, Motion, SampledClip, Transform, circle};
 use crate::names::distinct_names;
 
 /// The key of the metadata; for one clip of several, its number may follow: `skeleton.1`.
@@ -81,7 +81,11 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
             },
         });
     }
-    if let Some(skeleton) = skeleton.into_iter().collect::<Option<Vec<Joint>>>() {
+    let Some(skeleton) = skeleton.into_iter().collect::<Option<Vec<Joint>>>() else {
+        return;
+    };
+    let parents: Vec<Option<usize>> = skeleton.iter().map(|joint| joint.parent).collect();
+    if circle(&parents).is_none() {
         motion.skeleton = skeleton;
     }
 }
@@ -130,6 +134,7 @@ mod tests {
             r#"{"tracks":["hip","knee"],"parents":[null,9],"offsets":[[0,0,0],[0,0,0]]}"#,
             r#"{"tracks":["hip","hip"],"parents":[null,0],"offsets":[[0,0,0],[0,0,0]]}"#,
             r#"{"tracks":["hip","knee"],"parents":[null,1],"offsets":[[0,0,0],[0,0,0]]}"#,
+            r#"{"tracks":["hip","knee"],"parents":[1,0],"offsets":[[0,0,0],[0,0,0]]}"#,
         ] {
             let mut read = clip(["hip", "knee"]);
             attach_skeleton(&mut read, 0, &[(KEY.to_owned(), text.to_owned())]);
