@@ -23,6 +23,9 @@ pub enum Feature {
     Scales,
     /// Channels that keep the value of each key until the next one.
     Steps,
+    /// Channels that join their keys by straight lines and the shorter arcs. The keys of a file without this feature
+    /// are interpolated by the method that the user chooses, by default a smooth one.
+    Lines,
     /// The order of channels and the End Sites of BVH.
     Bvh,
     /// Poses relative to the world. For a format without this feature they are converted to poses relative to the
@@ -42,7 +45,7 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -52,6 +55,7 @@ impl Feature {
         Self::Translations,
         Self::Scales,
         Self::Steps,
+        Self::Lines,
         Self::Bvh,
         Self::World,
         Self::BoxLength,
@@ -90,6 +94,7 @@ impl Feature {
             Self::Translations => "translations",
             Self::Scales => "scales",
             Self::Steps => "steps",
+            Self::Lines => "linear interpolation",
             Self::Bvh => "channel order and End Sites",
             Self::World => "poses in the world",
             Self::BoxLength => "length of boxes",

@@ -373,6 +373,18 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
             "{case}: {left_out}"
         );
     }
+    let is_linear = |of: &Motion| {
+        of.channels
+            .iter()
+            .any(|channels| channels.rotation == Some(ChannelInterpolation::Linear))
+    };
+    let bends = clip.set.tracks().any(|track| track.keys.len() > 2);
+    let says_so = is_linear(clip) && bends;
+    if supports(Feature::Lines) {
+        assert!(is_linear(&found) || !says_so, "{case}");
+    } else {
+        assert_eq!(is_reported("lines and arcs"), says_so, "{case}: {left_out}");
+    }
     if supports(Feature::Bvh) && !clip.is_world {
         if !clip.bvh.is_empty() {
             assert_eq!(found.bvh, clip.bvh, "{case}");

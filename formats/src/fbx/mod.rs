@@ -59,6 +59,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::Scales,
         Feature::Steps,
+        Feature::Lines,
         Feature::SeveralClips,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,

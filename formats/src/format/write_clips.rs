@@ -3,11 +3,12 @@
 use std::io::{self, Write};
 
 use glam::{Quat, Vec3};
+use tumble::Channel;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Document, Format, MotionOptions, WriteError};
-use crate::motion::{ChannelInterpolation, SampledClip, circle};
+use crate::motion::{ChannelInterpolation, Motion, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::printable::printable;
 use crate::signs::{continue_signs, signs_jump};
@@ -161,6 +162,10 @@ fn loss(
                 .any(|channels| channels.has(ChannelInterpolation::Step)),
             "that channels hold each key until the next one",
         ),
+        Feature::Lines => (
+            is_at_keys(sampled) && (0..clip.set.track_count()).any(|track| has_lines(clip, track)),
+            "that lines and arcs join the keys (evaluate them with the method slerp)",
+        ),
         Feature::Bvh => (
             !clip.bvh.is_empty() && !clip.is_world,
             "the order of the channels and the End Sites",
@@ -177,6 +182,28 @@ fn loss(
         }
     };
     has_it.then_some(loss)
+}
+
+/// Whether the samples are those of the clip's keys, which a reader interpolates again.
+fn is_at_keys(sampled: &SampledClip<'_>) -> bool {
+    sampled.is_at_keys || sampled.times == sampled.clip.key_times()
+}
+
+/// Whether a channel of a track is linear and would be another curve by a smooth method: two keys are joined by the
+/// same line, and equal keys do not move.
+fn has_lines(clip: &Motion, track: usize) -> bool {
+    fn bends<T: PartialEq>(keys: &[T]) -> bool {
+        keys.len() > 2 && keys.windows(2).any(|pair| pair[0] != pair[1])
+    }
+    let linear = Some(ChannelInterpolation::Linear);
+    let channels = clip.channel(track);
+    let vectors = |channel| clip.set.vector_keys(channel, track);
+    channels.rotation == linear && bends(clip.set.track(track).keys)
+        || [Channel::Translation, Channel::Scale]
+            .into_iter()
+            .filter(|&channel| channels.of(channel) == linear)
+            .filter_map(vectors)
+            .any(|vectors| bends(vectors.keys))
 }
 
 /// A message about the contents of a file that none of its clips contains, and that a new file made of these clips

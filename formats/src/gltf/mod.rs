@@ -76,6 +76,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::Scales,
         Feature::Steps,
+        Feature::Lines,
         Feature::Bvh,
         Feature::SeveralClips,
         Feature::TimesPerChannel,

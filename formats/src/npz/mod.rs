@@ -57,6 +57,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::Scales,
         Feature::Steps,
+        Feature::Lines,
         Feature::Bvh,
         Feature::World,
         Feature::UnevenTimes,
