@@ -26,6 +26,28 @@ const PATH: &str = "\
 1305031099.3 2 2 3 0.6 0 0 0.8
 ";
 
+/// A reader of clips would refuse them, so no file is written; the rows of tables have any order.
+#[test]
+fn samples_out_of_order_are_no_clip() {
+    let folder = sample_folder();
+    let at = folder.path();
+    fs::write(at.join("path.tum"), PATH).unwrap();
+    for (times, words) in [
+        ("1\n0.75\n", "time 1305031099 is followed by 1305031098.75"),
+        ("1\n1\n", "time 1305031099 is followed by 1305031099"),
+    ] {
+        fs::write(at.join("times.txt"), times).unwrap();
+        for ending in ["dat", "glb", "gltf", "bvh", "npz", "tum", "euroc", "kitti"] {
+            let words = format!("out.{ending}: error[E026]: {words}");
+            let output = format!("eval path.tum --times times.txt -o out.{ending}");
+            refused(at, &output, &words);
+            assert!(!at.join(format!("out.{ending}")).exists(), "{ending}");
+        }
+        line(at, "eval path.tum --times times.txt --overwrite -o out.npy");
+        line(at, "eval path.tum --times times.txt --overwrite -o out.csv");
+    }
+}
+
 #[test]
 fn every_trajectory_becomes_every_other() {
     let folder = sample_folder();

@@ -15,6 +15,7 @@ use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::Diagnostic;
 use crate::feature::Feature;
+pub(crate) use crate::format::write_clips::check_times;
 pub use crate::format::write_clips::left_behind;
 pub use crate::gltf::quantized::Quantization;
 use crate::keys::Duplicates;

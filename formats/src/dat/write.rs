@@ -8,7 +8,7 @@ use tumble::TrackSet;
 
 use crate::dat::MAX_BOXES;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError};
+use crate::format::{MotionOptions, WriteError, check_times};
 use crate::motion::SampledClip;
 
 /// Writes the samples of a clip.
@@ -32,13 +32,7 @@ pub(super) fn write_motion(
     }
     sampled.checked_len()?;
     let offset = sampled.clip.time_offset as f64;
-    if let Some(pair) = sampled.times.windows(2).find(|pair| pair[1] <= pair[0]) {
-        let message = format!(
-            "time {} is followed by {}; times must increase strictly",
-            pair[0], pair[1]
-        );
-        return Err(refuse(Code::TimeNotIncreasing, message).into());
-    }
+    check_times(sampled, &options.name)?;
     let times = sampled.times.iter().map(|time| time + offset);
     let rows = times.zip(sampled.rotations.chunks_exact(tracks));
     write_rows(out, tracks, options.box_length.unwrap_or(1.0), rows)?;

@@ -38,6 +38,12 @@ impl Format {
                 .iter()
                 .try_for_each(|clip| check_parents(clip, options))?;
         }
+        // Tables have rows in any order; what holds nothing but clips is read only with times that increase.
+        if self.write.is_none() {
+            clips
+                .iter()
+                .try_for_each(|clip| check_times(clip, &options.name))?;
+        }
         let mut warnings = warnings(self, clips, options);
         let continued: Vec<Vec<Quat>> = clips
             .iter()
@@ -65,6 +71,24 @@ impl Format {
         warnings.extend(write(&clips, options, out)?);
         Ok(warnings)
     }
+}
+
+/// Refuses samples whose times do not increase: no reader of clips takes such a file.
+pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
+    // Where a clip's keys are written, the samples are none.
+    let mut pairs = sampled.times.windows(2).filter(|_| !sampled.is_at_keys);
+    let Some(sample) = pairs.position(|pair| pair[1] <= pair[0]) else {
+        return Ok(());
+    };
+    let seconds = |sample: usize| {
+        let digits = sampled.time_digits(sample);
+        digits.unwrap_or_else(|| sampled.times[sample].to_string())
+    };
+    let (time, next) = (seconds(sample), seconds(sample + 1));
+    let message = format!(
+        "time {time} is followed by {next}; the times of a clip increase strictly: sort them, and give each once"
+    );
+    Err(Diagnostic::new(name, Code::TimeNotIncreasing, message))
 }
 
 /// Refuses parents that are no hierarchy: no file with them could be read.

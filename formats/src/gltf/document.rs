@@ -8,7 +8,7 @@ use tumble::FrameRate;
 
 use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Document, Format, MotionOptions, WriteError};
+use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
 use crate::gltf::bake::{AnimationBaker, is_cut};
@@ -134,6 +134,9 @@ impl Document for GltfDocument {
         path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
+        for (_, sampled) in clips {
+            check_times(sampled, &options.name)?;
+        }
         let json = Json::parse(&self.name, &self.container.text)?;
         let warnings = Warnings::new(&self.name);
         let folder = self.folder.as_deref();

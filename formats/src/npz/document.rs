@@ -8,7 +8,7 @@ use glam::Vec3;
 use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Document, Format, MotionOptions, WriteError};
+use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
@@ -318,6 +318,7 @@ impl Document for NpzDocument {
             let message = format!("{} clips; the file has the clip 0 alone", clips.len());
             return Err(self.refuse(Code::OneClip, message));
         };
+        check_times(sampled, &options.name)?;
         // `trans` counts from where the shape puts the pelvis.
         let pelvis = sampled
             .clip
