@@ -49,6 +49,28 @@ fn samples_out_of_order_are_no_clip() {
 }
 
 #[test]
+fn smoothed_positions_are_in_tables_and_npy_says_that_it_has_none() {
+    let folder = sample_folder();
+    let at = folder.path();
+    let path = "0 1 2 3 0 0 0 1\n1 2 2 3 0 0 0.6 0.8\n2 4 4 4 0 0.6 0 0.8\n3 4 5 6 0 0 0 1\n";
+    fs::write(at.join("path.tum"), path).unwrap();
+    for ending in ["csv", "parquet", "arrow", "npz"] {
+        let smooth = format!("smooth path.tum --kernel linear -o smooth.{ending}");
+        let words = line(at, &smooth).words;
+        assert!(!words.contains("warning"), "{words}");
+        line(at, &format!("convert smooth.{ending} -o {ending}.tum"));
+        let smooth = fs::read_to_string(at.join(format!("{ending}.tum"))).unwrap();
+        // (1 + 2 × 2 + 4) / 4, (2 + 2 × 2 + 4) / 4, (3 + 2 × 3 + 4) / 4
+        let mut lines = smooth.lines();
+        let expected = "1 2.25 2.5 3.25 ";
+        assert!(lines.any(|line| line.starts_with(expected)), "{smooth}");
+    }
+    let words = line(at, "smooth path.tum --kernel linear -o smooth.npy").words;
+    let left_out = "smooth.npy: warning[W208]: NPY cannot store this, left out: the translations";
+    assert!(words.contains(left_out), "{words}");
+}
+
+#[test]
 fn every_trajectory_becomes_every_other() {
     let folder = sample_folder();
     let at = folder.path();

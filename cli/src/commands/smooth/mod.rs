@@ -8,10 +8,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::TypedValueParser;
+use glam::Vec3;
 use tumble::{
     EulerSequence, FrameRate, Layout, SampleTimes, Smoothing, SmoothingEnds, SmoothingError,
     SmoothingKernel,
 };
+use tumble_formats::diagnostic::{Code, Diagnostic};
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
@@ -36,8 +38,9 @@ Kernels are linear, cubic, box:S and tent:S (S samples before and after), gaussi
 in samples), and savitzky-golay:RADIUS:ORDER. They filter the steps from sample to sample, so constant
 tracks keep their bits and uniform motion does not change. --low-pass HZ is the Gaussian that halves the
 power of motion at that frequency, at any rate of the samples. If keys are evenly spaced, they are the
-samples; otherwise give the rate by --fps. NPY and CSV contain only the rotations. If the output has the
-format of the input, everything else in the file is kept. Stepped channels stay stepped.
+samples; otherwise give the rate by --fps. NPY contains only the rotations; CSV, Parquet and Arrow contain
+positions too, as of `tumble eval`. If the output has the format of the input, everything else in the
+file is kept. Stepped channels stay stepped.
 
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
@@ -231,7 +234,7 @@ fn smoothed(
     })
 }
 
-/// Writes rotations as they come, or clips as a motion file.
+/// Writes the rotations of one clip that is nothing else, or clips as a motion file, as `tumble eval` does.
 fn write(
     name: &str,
     clips: &[&Motion],
@@ -248,7 +251,14 @@ fn write(
         ("input", name.to_owned()),
     ];
     let format = target.format();
-    if let ([clip], [Smoothed { after, .. }], Some(_)) = (clips, samples, &format.write) {
+    let has_clips = format.takes_motion(clips);
+    if !has_clips && let ([clip], [Smoothed { after, .. }]) = (clips, samples) {
+        if after.translations.iter().any(|it| *it != Vec3::ZERO) {
+            let name = format.name.to_uppercase();
+            let message = format!("{name} cannot store this, left out: the translations");
+            let left_out = Diagnostic::new(target.to_string(), Code::NoRoom, message);
+            words::note(&left_out.to_string());
+        }
         let tracks = clip.set.track_count();
         let timeline = SampleTimes::at(after.times.clone())
             .resolve(tracks, None)
