@@ -165,7 +165,7 @@ codes! {
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of 1 are normalised. Other norms are probably a mistake, such as a missing column.";
-    TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line.";
+    TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line, and so do the samples of a clip that is written (`--times`).";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
     Time = "E030" elsewhere, "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
@@ -233,7 +233,7 @@ codes! {
     TableClaims = "E402", "more than the file can hold", "The file states more rows or bytes than its length can contain; nothing was read.";
     Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
     NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
-    NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another.";
+    NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas separate columns, and the first line names them.";
     ColumnMissing = "E406", "a column is missing", "A column that `--map` names does not exist, or a group of columns such as `tx ty tz` is not complete.";
     ColumnTwice = "E407", "two columns of one name", "It is not clear which of them is meant; rename one.";
     ColumnType = "E408", "a column of another type", "Rotations, translations and scales are numbers, names are text or whole numbers, times are numbers or timestamps.";
