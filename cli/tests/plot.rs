@@ -174,11 +174,11 @@ fn dots_cover_a_curve_only_where_they_are_apart() {
         succeed(folder.path(), &options);
         let text = fs::read_to_string(folder.path().join("out.svg")).unwrap();
         let document = Document::parse(&text).unwrap();
-        let drawn = document.descendants().filter(|node| {
+        let mut drawn = document.descendants().filter(|node| {
             let is_curve = node.has_tag_name("polyline") && node.attribute("stroke") == Some(SLERP);
             is_curve || node.has_tag_name("circle")
         });
-        let last = drawn.last().unwrap();
+        let last = drawn.next_back().unwrap();
         assert_eq!(last.has_tag_name("circle"), is_covered, "{keys} keys");
     }
 }

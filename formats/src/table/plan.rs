@@ -401,7 +401,7 @@ fn time_column(
         (None, _) => format!(
             "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; {}",
             names.list(),
-            heading_hint(&names.file_columns).unwrap_or("--map time=NAME")
+            heading_hint(names.file_columns).unwrap_or("--map time=NAME")
         ),
     };
     Err(names.refuse(Code::NoTimes, message))
