@@ -55,11 +55,11 @@ fn headings_without_names_are_told_apart_from_other_names() {
         ),
         (
             "0,0,0,0,1\n1,0,0,0,1\n",
-            "the first line has the names of the columns",
+            "begin the file with the names of the columns",
         ),
         (
             "# pose\nt,x,y,z,w\n0,0,0,0,1\n",
-            "the first line has the names of the columns",
+            "begin the file with the names of the columns",
         ),
         ("T,X,Y,Z,W\n0,0,0,0,1\n", "--map time=NAME"),
     ] {

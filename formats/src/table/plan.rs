@@ -418,9 +418,9 @@ fn heading_hint(columns: &[String]) -> Option<&'static str> {
         );
     }
     let is_number = |name: &String| name.trim().parse::<f64>().is_ok();
-    let is_heading = !first.starts_with('#') && !columns.iter().all(is_number);
-    (!is_heading)
-        .then_some("the first line has the names of the columns, such as time,x,y,z,w: add it")
+    let is_comment = columns.len() == 1 && first.starts_with('#');
+    let has_names = !is_comment && !columns.iter().all(is_number);
+    (!has_names).then_some("begin the file with the names of the columns, such as time,x,y,z,w")
 }
 
 /// Tracks in columns: `knee.x`, `knee.y`, `knee.z`, `knee.w`.
