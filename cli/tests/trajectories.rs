@@ -282,6 +282,11 @@ fn frames_and_listed_times_lie_in_gaps_too() {
     assert_eq!(held[3], ("3".to_owned(), "0.6".to_owned()));
     let refuse = format!("{eval} --fps 1 --in-gaps refuse -o no.csv");
     refused(at, &refuse, "2 of 6 times lie between keys");
+    // A file that is kept keeps all frames.
+    line(at, "convert gap.csv -o kept.glb");
+    let kept = "eval kept.glb --max-gap 1.5 -m slerp -o no.glb";
+    refused(at, kept, "leave out --max-gap, or write another format");
+    assert!(!at.join("no.glb").exists() && !at.join("no.csv").exists());
     // Without a frame in a gap they are the same frames.
     line(
         at,

@@ -78,6 +78,18 @@ impl Motion {
         }
     }
 
+    /// The [times in the set](Self::time_in_set) of a start and an end; those of `whole` where none is asked for.
+    #[must_use]
+    pub fn range_in_set(
+        &self,
+        start: Option<f64>,
+        end: Option<f64>,
+        whole: (f64, f64),
+    ) -> (f64, f64) {
+        let in_set = |time| self.time_in_set(time);
+        (start.map_or(whole.0, in_set), end.map_or(whole.1, in_set))
+    }
+
     /// Whether a joint has a parent, or a rest translation other than 0.
     #[must_use]
     pub fn has_hierarchy(&self) -> bool {

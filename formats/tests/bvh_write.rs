@@ -154,7 +154,10 @@ fn what_bvh_cannot_hold_is_refused() {
     let mut circle = clip.clone();
     circle.skeleton[0].parent = Some(0);
     match write(&[sampled(&circle, &times, &rotations)], &options) {
-        Err(WriteError::Refused(error)) => assert_eq!(error.code, Code::Parents),
+        Err(WriteError::Refused(error)) => {
+            assert_eq!(error.code, Code::Parents);
+            assert!(error.message.contains("is its own ancestor"), "{error}");
+        }
         other => panic!("{other:?}"),
     }
     let empty = Motion::default();

@@ -332,17 +332,18 @@ fn of_clips(
     let common = pair.common_times().map_err(of_compare)?;
     let mut warning = common.warning.clone();
     // The times are those of the first clip.
-    let in_set = |time: f64| clips[0].time_in_set(time);
     let frames = match samples {
         None => pair.keys(&common),
-        Some(SampleRequest::Rate(rate, start, end)) => SampleTimes::rate(rate).between(
-            start.map_or(common.start, in_set),
-            end.map_or(common.end, in_set),
-        ),
+        Some(SampleRequest::Rate(rate, start, end)) => {
+            let whole = (common.start, common.end);
+            let (start, end) = clips[0].range_in_set(start, end, whole);
+            SampleTimes::rate(rate).between(start, end)
+        }
         Some(SampleRequest::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;
-            SampleTimes::at(times.iter().copied().map(in_set).collect())
+            let in_set = |&time: &f64| clips[0].time_in_set(time);
+            SampleTimes::at(times.iter().map(in_set).collect())
         }
         Some(_) => {
             return Err(input(

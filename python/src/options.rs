@@ -147,9 +147,9 @@ impl SampleRequest {
         let all = |times: &[f64]| times.iter().copied().map(in_set).collect();
         Ok(match self {
             &Self::Rate(rate, start, end) => {
-                let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-                SampleTimes::rate(rate)
-                    .between(start.map_or(first, in_set), end.map_or(last, in_set))
+                let whole = set.time_span().unwrap_or((0.0, 0.0));
+                let (start, end) = clip.range_in_set(start, end, whole);
+                SampleTimes::rate(rate).between(start, end)
             }
             Self::Shared { times, .. } => SampleTimes::at(all(times)),
             Self::Each { times, count } => {

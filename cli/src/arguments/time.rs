@@ -314,9 +314,8 @@ pub(crate) fn in_frames(
     if (start, end) == (None, None) {
         return SampleTimes::rate(rate);
     }
-    let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    let in_set = |time: f64| clip.time_in_set(time);
-    let (start, end) = (start.map_or(first, in_set), end.map_or(last, in_set));
+    let whole = clip.set.time_span().unwrap_or((0.0, 0.0));
+    let (start, end) = clip.range_in_set(start, end, whole);
     warn_outside_keys(start, end, clip, name);
     SampleTimes::rate(rate).between(start, end)
 }

@@ -87,7 +87,7 @@ impl Arguments {
     /// The requested part of a clip.
     fn part<'a>(&self, name: &str, clip: &'a Motion) -> Result<Cow<'a, Motion>, Failure> {
         let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
-        let Some((first, last)) = clip.set.time_span() else {
+        let Some(whole) = clip.set.time_span() else {
             return Ok(clip);
         };
         if (self.start, self.end) == (None, None) {
@@ -98,11 +98,7 @@ impl Arguments {
             error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
         };
         let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
-        let in_set = |time: f64| clip.time_in_set(time);
-        let (start, end) = (
-            self.start.map_or(first, in_set),
-            self.end.map_or(last, in_set),
-        );
+        let (start, end) = clip.range_in_set(self.start, self.end, whole);
         trim(&clip, start, end, &engine)
             .map(Cow::Owned)
             .map_err(failed)

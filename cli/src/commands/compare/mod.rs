@@ -295,11 +295,8 @@ impl Arguments {
             words::warning(warning);
         }
         // The times are those of the first clip.
-        let in_set = |time: f64| pair.clips[0].time_in_set(time);
-        let (start, end) = (
-            self.start.map_or(common.start, in_set),
-            self.end.map_or(common.end, in_set),
-        );
+        let whole = (common.start, common.end);
+        let (start, end) = pair.clips[0].range_in_set(self.start, self.end, whole);
         let frames = match self.fps {
             Some(rate) => SampleTimes::rate(rate).between(start, end),
             None => pair.keys(&common),
