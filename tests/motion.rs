@@ -7,6 +7,7 @@ use crate::support::{
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::ReferenceCurve;
+use tumble::verify::RATE_BOUND;
 use tumble::{
     Axes, Device, Ends, Engine, Error, Interpolation, Layout, METHODS, Quantity, SampleTimes,
     Track, TrackSet, method,
@@ -107,7 +108,7 @@ fn velocities_and_accelerations_are_those_of_the_reference() {
                 };
                 let error = largest_error(&set, interpolation, &frames);
                 println!("{method}, {quantity:?}: {error:e}");
-                assert!(error < 2e-6, "{method}, {quantity:?}: {error:e}");
+                assert!(error < RATE_BOUND, "{method}, {quantity:?}: {error:e}");
                 let column = match quantity {
                     Quantity::Acceleration(_) => Column::Acceleration,
                     _ => Column::Velocity,
@@ -134,7 +135,7 @@ fn ends_move_as_they_are_told() {
                 ..method.into()
             };
             let error = largest_error(&set, interpolation, &SampleTimes::fps(24));
-            assert!(error < 2e-6, "{method}, {ends:?}: {error:e}");
+            assert!(error < RATE_BOUND, "{method}, {ends:?}: {error:e}");
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::Quat;
 use tumble::method::SLERP;
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::{Agreement, Verdict, compare, error_bound, verify};
-use tumble::{Device, Engine, METHODS, SampleTimes, TrackSet, method::Form};
+use tumble::{Device, Ends, Engine, Interpolation, METHODS, SampleTimes, TrackSet, method::Form};
 
 fn set() -> TrackSet {
     let mut set = TrackSet::new();
@@ -118,6 +118,30 @@ fn half_turns_there_and_back_are_within_their_bounds() {
                     "{method}: {found:?}"
                 );
             }
+        }
+    }
+}
+
+/// Between far keys and two that are a thousandth of a second apart, curves turn hundreds of times within an interval.
+/// Catches derivatives of the reference by differences, whose step is then too long.
+#[test]
+fn rates_between_uneven_keys_are_within_their_bounds() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut set = TrackSet::new();
+    let far = [[0.1, -0.7, 0.4, 0.6], [0.5, 0.5, -0.5, 0.5]].map(Quat::from_array);
+    let near = [[-0.3, 0.2, 0.9, 0.1], [0.6, 0.3, 0.1, -0.7]].map(Quat::from_array);
+    let keys = [far[0], near[0], near[1], far[1]].map(Quat::normalize);
+    set.push("far", &[0.0, 0.5, 0.501, 1.0], &keys).unwrap();
+    let angles = [0.0, 0.8, 0.801, 0.2].map(Quat::from_rotation_y);
+    set.push("near", &[0.0, 0.5, 0.501, 1.0], &angles).unwrap();
+    for method in METHODS {
+        for ends in [method.ends, Ends::Natural] {
+            let interpolation = Interpolation {
+                ends,
+                ..method.into()
+            };
+            let found = verify(&engine, &set, interpolation, &SampleTimes::fps(25)).unwrap();
+            assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
         }
     }
 }

@@ -34,7 +34,7 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
             Ends::Parabolic => parabola(track, outermost, next),
             Ends::Natural => {
                 // The second derivatives of the two factors that bend there cancel.
-                let second = bends(basis, t);
+                let second = basis.second_derivatives(t);
                 step(outermost) * (-second[1] / second[outer])
             }
             Ends::Clamped { start, end } => {
@@ -68,19 +68,6 @@ fn parabola(track: &ReferenceTrack, end: usize, next: usize) -> DVec3 {
     let (h, next_h) = (track.step(end), track.step(next));
     let second_difference = (rate(next) - rate(end)) / (h + next_h);
     (rate(end) - second_difference * 2.0 * h) * h
-}
-
-/// Second derivatives of the basis functions at an end, from their slopes, which are parabolas.
-fn bends(basis: Basis, t: f64) -> [f64; 3] {
-    let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| basis.derivatives(t));
-    std::array::from_fn(|j| {
-        let (a, b, c) = (start[j], middle[j], end[j]);
-        if t == 0.0 {
-            -3.0 * a + 4.0 * b - c
-        } else {
-            a - 4.0 * b + 3.0 * c
-        }
-    })
 }
 
 /// `w₁` such that the curve starts with `rate = exp(-w₂ B₂) w₁ B₁' exp(w₂ B₂) + w₂ B₂'`.

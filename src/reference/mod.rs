@@ -28,6 +28,7 @@ pub(crate) mod curve_lengths;
 pub(crate) mod follow;
 pub(crate) mod handles;
 pub(crate) mod quaternion;
+mod rotation_vector;
 pub(crate) mod segment;
 pub(crate) mod track;
 pub(crate) mod two_keys;

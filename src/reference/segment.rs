@@ -6,6 +6,7 @@ use crate::curve::options::Ends;
 use crate::reference::quaternion::{
     exponential, from_parts, invert, logarithm, multiply, rotated, slerp, vector,
 };
+use crate::reference::rotation_vector::{acceleration, velocity_matrix};
 use crate::reference::track::ReferenceTrack;
 
 /// A curve for `t` from 0 to 1.
@@ -65,6 +66,26 @@ impl Basis {
                 let [_, n1, n2, n3] = b_spline(knots, 2, knots[2] + t * length);
                 let n = [n1, n2, n3];
                 std::array::from_fn(|j| 3.0 * length * n[j] / (knots[j + 3] - knots[j]))
+            }
+        }
+    }
+
+    pub(crate) fn second_derivatives(self, t: f64) -> [f64; 3] {
+        match self {
+            Self::Bernstein => [6.0 * t - 6.0, 6.0 - 12.0 * t, 6.0 * t],
+            Self::Knots(knots) => {
+                // The same rule once more, for the functions of degree 2 in the first derivatives:
+                // N_{j,2}' = 2 (N_{j,1}/(u_{j+2}-u_j) - N_{j+1,1}/(u_{j+3}-u_{j+1})).
+                let length = knots[3] - knots[2];
+                let [_, n0, n1, n2] = b_spline(knots, 1, knots[2] + t * length);
+                let n = [n0, n1, n2, 0.0];
+                std::array::from_fn(|j| {
+                    let part = |j: usize| match n[j] {
+                        0.0 => 0.0,
+                        n => n / (knots[j + 2] - knots[j]),
+                    };
+                    6.0 * length * length * (part(j) - part(j + 1)) / (knots[j + 3] - knots[j])
+                })
             }
         }
     }
@@ -143,8 +164,7 @@ impl Segment {
             }
             Self::Between(formula, controls) => formula(controls, t),
             Self::RotationVector { base, powers } => {
-                let v = powers[0] * t + powers[1] * (t * t) + powers[2] * (t * t * t);
-                multiply(base, exponential(v))
+                multiply(base, exponential(cubic(powers, t)[0]))
             }
         }
     }
@@ -154,25 +174,56 @@ impl Segment {
         match self {
             Self::Constant(_) => DVec3::ZERO,
             Self::Arc(from, to) => 2.0 * logarithm(multiply(invert(from), to)),
-            Self::Product { w, basis, .. } => {
-                let (b, slopes) = (basis.values(t), basis.derivatives(t));
-                (0..3).fold(DVec3::ZERO, |velocity, j| {
-                    let factor = exponential(w[j] * b[j]);
-                    rotated(velocity, invert(factor)) + 2.0 * w[j] * slopes[j]
-                })
-            }
-            _ => {
+            Self::Product { w, basis, .. } => product_rates(w, basis, t).0,
+            Self::Between(..) => {
                 let slope = differences(|t| self.rotation(t), t);
                 2.0 * vector(multiply(invert(self.rotation(t)), slope))
+            }
+            Self::RotationVector { powers, .. } => {
+                let [v, v1, _] = cubic(powers, t);
+                2.0 * (velocity_matrix(v) * v1)
             }
         }
     }
 
     /// The angular acceleration per unit of `t` squared, in the body frame.
     pub(crate) fn acceleration(self, t: f64) -> DVec3 {
-        // Central differences of the velocity, also of the formula beyond its interval.
-        vector(differences(|t| from_parts(0.0, self.velocity(t)), t))
+        match self {
+            Self::Constant(_) | Self::Arc(..) => DVec3::ZERO,
+            Self::Product { w, basis, .. } => product_rates(w, basis, t).1,
+            // Central differences of the velocity, also of the formula beyond its interval.
+            Self::Between(..) => vector(differences(|t| from_parts(0.0, self.velocity(t)), t)),
+            Self::RotationVector { powers, .. } => {
+                let [v, v1, v2] = cubic(powers, t);
+                acceleration(v, v1, v2)
+            }
+        }
     }
+}
+
+/// A rotation vector `a t + b t² + c t³`, and its first and second derivative.
+fn cubic([a, b, c]: [DVec3; 3], t: f64) -> [DVec3; 3] {
+    [
+        a * t + b * (t * t) + c * (t * t * t),
+        a + b * (2.0 * t) + c * (3.0 * t * t),
+        b * 2.0 + c * (6.0 * t),
+    ]
+}
+
+/// The angular velocity and acceleration of `Π exp(w_j B_j(t))` in the body frame, by the product rule: each factor
+/// turns the frame, in which the factors before it move, with the angular velocity `2 w_j B_j'`.
+fn product_rates(w: [DVec3; 3], basis: Basis, t: f64) -> (DVec3, DVec3) {
+    let (values, slopes) = (basis.values(t), basis.derivatives(t));
+    let bends = basis.second_derivatives(t);
+    (0..3).fold((DVec3::ZERO, DVec3::ZERO), |(velocity, bend), j| {
+        let back = invert(exponential(w[j] * values[j]));
+        let (velocity, bend) = (rotated(velocity, back), rotated(bend, back));
+        let turn = 2.0 * w[j] * slopes[j];
+        (
+            velocity + turn,
+            bend - turn.cross(velocity) + 2.0 * w[j] * bends[j],
+        )
+    })
 }
 
 /// The derivative by central differences of the eighth order.

@@ -38,6 +38,10 @@ use crate::tracks::set::{Track, TrackSet};
 /// The bound of a quaternion norm's distance from 1.
 pub const NORM_BOUND: f64 = 4e-7;
 
+/// The bound of errors of angular velocities and accelerations against the reference, relative to the largest value
+/// near them. At constant speed the bounds are larger ([`OutputVerification::error_bound`]).
+pub const RATE_BOUND: f64 = 2e-6;
+
 /// The bound of errors against the reference for a form, radians.
 #[must_use]
 pub fn error_bound(form: Form) -> f64 {

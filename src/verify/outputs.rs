@@ -17,7 +17,7 @@ use crate::reference::quaternion::angle_between;
 use crate::threads::{OutOfThreadsError, on_threads, stop};
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
-use crate::verify::{KeyTimes, differences, worse};
+use crate::verify::{KeyTimes, RATE_BOUND, differences, worse};
 
 /// The result of the verification of one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,7 +79,7 @@ pub(crate) fn verify(
             differing: differences(found.as_slice(), expected.as_slice(), 1).0,
             max_error: rate_error(set, interpolation, timeline, &found)?,
             error_bound: match (interpolation.speed, quantity) {
-                (Speed::AsKeyed, _) => 1e-6,
+                (Speed::AsKeyed, _) => RATE_BOUND,
                 // At constant speed a curve changes direction fast where it was slow as keyed.
                 (Speed::Constant, Quantity::Velocity(_)) => 1e-5,
                 (Speed::Constant, _) => 1e-3,
