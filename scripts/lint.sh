@@ -14,6 +14,8 @@ fi
 # What the dependencies may be (deny.toml), where the tool is installed.
 if cargo deny --version >/dev/null 2>&1; then
     cargo deny --log-level error check bans licenses sources
+else
+    echo "licences, sources and duplicates of dependencies are not checked: cargo-deny is not installed" >&2
 fi
 
 if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi

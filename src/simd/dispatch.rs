@@ -219,7 +219,8 @@ pub(crate) fn streaming_stores_from() -> Option<VectorWidth> {
 }
 
 fn detect_streaming_stores() -> Option<VectorWidth> {
-    #[cfg(target_arch = "x86_64")]
+    // Miri executes neither `cpuid` nor non-temporal stores.
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         use std::arch::x86_64::__cpuid;
         const ZEN_5: u32 = 26;
@@ -237,13 +238,13 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
             _ => None,
         }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(any(not(target_arch = "x86_64"), miri))]
     None
 }
 
 /// Orders this thread's non-temporal stores before its later stores, as other threads see them.
 pub(crate) fn fence() {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     // SAFETY: SSE is part of x86-64.
     unsafe {
         std::arch::x86_64::_mm_sfence();
