@@ -8,6 +8,7 @@ use crate::prepare::error::SetError;
 use crate::threads::OutOfThreadsError;
 use crate::threads::stop::StoppedError;
 use crate::time::wrap::WrapMode;
+use crate::tracks::joints::JointMatchError;
 
 /// The maximum number of clips of a library.
 pub(crate) const MAX_CLIPS: usize = 1 << 16;
@@ -36,6 +37,9 @@ pub enum CrowdError {
         /// Joints of the skeleton.
         joints: usize,
     },
+    /// The clip has other joints than the library.
+    #[error(transparent)]
+    OtherJoints(#[from] JointMatchError),
     /// The skeleton has no joints.
     #[error("the skeleton has no joints; a crowd has at least one")]
     NoJoints,

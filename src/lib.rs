@@ -150,6 +150,7 @@ pub use crate::time::frames::{SampleTimes, Timeline};
 pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::error::{NORM_TOLERANCE, TrackError};
+pub use crate::tracks::joints::{JointMatchError, JointPairs, Joints};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};

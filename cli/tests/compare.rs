@@ -175,6 +175,118 @@ fn what_cannot_be_compared_is_refused() {
     assert!(report.contains("only in a.dat: box2"), "{report}");
 }
 
+/// Joints are compared by name and parent; other names, other parents and other animations are refused.
+#[test]
+fn joints_are_matched_by_name_and_parent() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let joint = |kind: &str, name: &str, inside: &str| {
+        let channels = "CHANNELS 3 Zrotation Xrotation Yrotation";
+        format!("{kind} {name}\n{{\nOFFSET 1 0 0\n{channels}\n{inside}}}\n")
+    };
+    let end = "End Site\n{\nOFFSET 0 1 0\n}\n";
+    let write = |name: &str, inside: String, row: &str| {
+        let root = joint("ROOT", "hip", &inside);
+        let rows = format!("Frames: 2\nFrame Time: 0.5\n0 0 0 0 0 0 0 0 0\n{row}\n");
+        let text = format!("HIERARCHY\n{root}MOTION\n{rows}");
+        std::fs::write(folder.join(name), text).unwrap();
+    };
+    let of = |name: &str| joint("JOINT", name, end);
+    write("one.bvh", of("left") + &of("right"), "10 0 0 20 0 0 30 0 0");
+    write(
+        "other.bvh",
+        of("right") + &of("left"),
+        "10 0 0 30 0 0 20 0 0",
+    );
+    write(
+        "named.bvh",
+        of("Left") + &of("Right"),
+        "10 0 0 20 0 0 30 0 0",
+    );
+    let left = joint("JOINT", "left", &of("right"));
+    write("chain.bvh", left, "10 0 0 20 0 0 10 0 0");
+    let text = std::fs::read_to_string(folder.join("one.bvh")).unwrap();
+    let text = ["hip", "left", "right"].iter().fold(text, |text, name| {
+        text.replace(&format!(" {name}\n"), &format!(" rig_{name}\n"))
+    });
+    std::fs::write(folder.join("renamed.bvh"), text).unwrap();
+
+    succeed(
+        folder,
+        &["compare", "one.bvh", "other.bvh", "--tolerance", "0"],
+    );
+    succeed(
+        folder,
+        &[
+            "compare",
+            "one.bvh",
+            "other.bvh",
+            "--world",
+            "--tolerance",
+            "0",
+        ],
+    );
+    // One more file of the same motion, whose tracks a table sorts.
+    succeed(folder, &["convert", "other.bvh", "-o", "other.parquet"]);
+    succeed(
+        folder,
+        &["compare", "one.bvh", "other.parquet", "--tolerance", "1e-4"],
+    );
+    let chain = ["compare", "one.bvh", "chain.bvh", "--world"];
+    let compared = succeed(folder, &[&chain[..], &["--tolerance", "1e-4"]].concat());
+    assert!(compared.words.is_empty(), "{}", compared.words);
+    for (line, says) in [
+        (
+            "compare one.bvh renamed.bvh",
+            "none of the same name (`hip` and `rig_hip` are near, but only equal names match)",
+        ),
+        (
+            "compare one.bvh chain.bvh",
+            "`right` has the parent `hip` in one.bvh, but has the parent `left` in chain.bvh; compare them in the world \
+             with --world",
+        ),
+        (
+            "compare one.bvh chain.bvh --tracks right",
+            "`right` has the parent `hip` in one.bvh",
+        ),
+        (
+            "compare one.bvh a.dat",
+            "have 3 and 2 tracks, none of the same name",
+        ),
+    ] {
+        let run = run(folder, &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(run.code, 4, "{line}: {}", run.words);
+        assert!(run.words.contains(says), "{line}: {}", run.words);
+    }
+    // Of names that one file alone has, the others are compared.
+    let compared = succeed(folder, &["compare", "one.bvh", "named.bvh"]);
+    let report = String::from_utf8(compared.out).unwrap();
+    assert!(report.contains("only in one.bvh: left, right"), "{report}");
+    // Tracks without names keep those that they are selected by.
+    succeed(folder, &["convert", "a.dat", "-o", "a.bvh"]);
+    let line = [
+        "compare",
+        "a.dat",
+        "a.bvh",
+        "--tracks",
+        "box2",
+        "--tolerance",
+        "1e-4",
+    ];
+    succeed(folder, &line);
+    // Two paths of one body each need no name, and what is assumed is told.
+    let path =
+        |name: &str| format!("time,{name}.x,{name}.y,{name}.z,{name}.w\n0,0,0,0,1\n1,0,0,1,0\n");
+    std::fs::write(folder.join("odom.csv"), path("odom")).unwrap();
+    std::fs::write(folder.join("base.csv"), path("base")).unwrap();
+    let compared = succeed(
+        folder,
+        &["compare", "odom.csv", "base.csv", "--tolerance", "0"],
+    );
+    let words = "`odom` of odom.csv is compared with `base` of base.csv: each has one track";
+    assert!(compared.words.contains(words), "{}", compared.words);
+}
+
 /// A chain goes into another format and back, and a part of it into `.dat`, without a bit of
 /// difference; what `.dat` has no room for is named.
 #[test]

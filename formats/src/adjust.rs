@@ -1,12 +1,18 @@
 //! Converts clips to another unit of length or another up axis.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::io::BufRead;
+use std::path::Path;
 
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::{Channel, TrackError};
+use tumble::{Channel, JointMatchError, Joints, TrackError};
 
+use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, Space};
 use crate::motion::{Body, Motion, Transform, carry_key_data};
+use crate::source::Source;
+use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::number;
 
 /// The axis that points up after a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -171,6 +177,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         let name = clip.set.track_name(joint);
         return Err(OffsetsError::Moved { joint, name });
     }
+    let lacks_offsets = clip.lacks_offsets();
     // SMPL's `trans` counts from where the shape puts the pelvis.
     if let Some(body) = clip.body.clone()
         && let Some(&pelvis) = offsets.first()
@@ -187,6 +194,8 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
             pelvis: pelvis.as_vec3(),
             ..body
         });
+    }
+    if lacks_offsets {
         clip.no_world = None;
     }
     for (track, &offset) in offsets.iter().enumerate() {
@@ -195,6 +204,79 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         clip.skeleton[track].rest.translation = rest;
     }
     Ok(())
+}
+
+/// Offsets of joints, in the order of their file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointOffsets {
+    /// The name of each joint; empty if the file has none.
+    names: Vec<String>,
+    /// x, y, z of each joint.
+    numbers: Vec<f64>,
+}
+
+impl JointOffsets {
+    /// Reads the offsets of joints: a line with x y z for each, in the order of the tracks; or `name x y z`, in any
+    /// order. `#` begins a comment; `-` is standard input.
+    ///
+    /// # Errors
+    /// When the file cannot be opened or is invalid; the first error is returned.
+    pub fn open(path: &Path) -> Result<Self, Diagnostic> {
+        Source::read_by(path, true, |name, reader| Self::read(name, reader))
+    }
+
+    fn read(input: &str, reader: impl BufRead) -> Result<Self, Diagnostic> {
+        let mut lines = Lines::new(input, reader, Limits::default())?;
+        let (mut names, mut numbers) = (Vec::new(), Vec::new());
+        while let Some(line) = lines.next()? {
+            let plain = line.split('#').next().unwrap_or_default().replace(',', " ");
+            let parts: Vec<(u64, &str)> = tokens(&plain).collect();
+            let mut read = parts.as_slice();
+            // A name with blanks has more than one part.
+            if let [named @ .., _, _, _] = read
+                && let ([(_, first), ..], true) = (named, numbers.len() == 3 * names.len())
+                && number::parse(first).is_err()
+            {
+                let words: Vec<&str> = named.iter().map(|(_, word)| *word).collect();
+                names.push(words.join(" "));
+                read = &parts[named.len()..];
+            }
+            for &(column, token) in read {
+                let number = number::parse(token);
+                let number =
+                    number.map_err(|(code, message)| lines.refuse(column, code, message))?;
+                numbers.push(number.value);
+            }
+            if !names.is_empty() && numbers.len() != 3 * names.len() {
+                let message =
+                    "each line is a joint's name and x y z, as the first line is".to_owned();
+                return Err(lines.refuse(1, Code::Offsets, message));
+            }
+            lines.reuse(line);
+        }
+        match numbers.is_empty() {
+            true => {
+                let message = "no offsets; write x y z or `name x y z` of each joint, one a line";
+                Err(lines.refuse_whole(Code::Offsets, message.to_owned()))
+            }
+            false => Ok(Self { names, numbers }),
+        }
+    }
+
+    /// Sets them in a clip, as [`set_offsets`]; those with names by the names of the joints, else by their order.
+    ///
+    /// # Errors
+    /// As [`set_offsets`]; also when the names are not those of the clip.
+    pub fn set(&self, clip: &mut Motion) -> Result<(), OffsetsError> {
+        if self.names.is_empty() {
+            return set_offsets(clip, &self.numbers);
+        }
+        let joints = Joints::named(&self.names);
+        let order = clip.joints().order_of(&joints, ["the clip", "the file"])?;
+        let (offsets, _) = self.numbers.as_chunks::<3>();
+        let numbers: Vec<f64> = order.iter().flat_map(|&line| offsets[line]).collect();
+        set_offsets(clip, &numbers)
+    }
 }
 
 /// Why the offsets of joints cannot be set.
@@ -219,6 +301,9 @@ pub enum OffsetsError {
         /// Name of that joint.
         name: String,
     },
+    /// The names are not those of the clip's joints.
+    #[error(transparent)]
+    Joints(#[from] JointMatchError),
     /// A translation with the pelvis added is not a valid key.
     #[error(transparent)]
     Track(#[from] TrackError),
@@ -228,6 +313,55 @@ pub enum OffsetsError {
 mod tests {
     use super::*;
     use crate::motion::Joint;
+
+    #[test]
+    fn offsets_with_names_are_matched_by_name() {
+        let mut clip = Motion::default();
+        for (name, parent) in [
+            ("hip", None),
+            ("left knee", Some(0)),
+            ("right knee", Some(0)),
+        ] {
+            clip.set.push(name, &[0.0], &[Quat::IDENTITY]).unwrap();
+            let rest = Transform::default();
+            clip.skeleton.push(Joint { parent, rest });
+        }
+        let read = |text: &str| JointOffsets::read("offsets", text.as_bytes());
+        let placed = |text: &str| {
+            let mut placed = clip.clone();
+            let set = read(text).unwrap().set(&mut placed);
+            set.map(|()| {
+                placed
+                    .skeleton
+                    .iter()
+                    .map(|joint| joint.rest.translation.x)
+                    .collect::<Vec<_>>()
+            })
+        };
+        let in_order = vec![0.0, 1.0, -1.0];
+        assert_eq!(placed("0 0 0\n1 0 0 # left\n-1 0 0\n").unwrap(), in_order);
+        assert_eq!(
+            placed("right knee -1 0 0\nhip, 0 0 0\n\nleft knee 1 0 0\n").unwrap(),
+            in_order
+        );
+        let error = placed("hip 0 0 0\nLeftKnee 1 0 0\nright knee 0 0 0").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the clip has a joint `left knee`, the file has none of that name; `LeftKnee` is near, but only equal names \
+             match"
+        );
+        for (text, line) in [
+            ("hip 0 0 0\n1 0 0", 2),
+            ("0 0 0\nhip 0 0 0", 2),
+            ("hip 0 0", 1),
+        ] {
+            let location = read(text).unwrap_err().location;
+            assert!(
+                matches!(location, Some(crate::Location::Text { line: found, .. }) if found == line),
+                "{text}: {location:?}"
+            );
+        }
+    }
 
     /// An axis that is up goes where it is to be, from wherever it was.
     #[test]

@@ -13,7 +13,8 @@
 //! Formats of other files have tables of the same kind: [`SURFACES`] for meshes and nets of control points
 //! ([`surface`]), and [`PATHS`] for paths ([`path`]).
 //!
-//! Operations on clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`].
+//! Operations on clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`],
+//! [`skeleton`].
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -63,6 +64,7 @@ pub mod rotation_form;
 mod rotation_matrix;
 pub mod sample;
 pub mod signs;
+pub mod skeleton;
 pub mod smooth;
 mod source;
 pub mod surface;

@@ -8,7 +8,7 @@ use std::io;
 use std::ops::Range;
 
 use glam::{DVec3, Quat, Vec3};
-use tumble::{Channel, FrameRate, Track, TrackError, TrackSet};
+use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
 use crate::decimal::Decimal;
@@ -95,6 +95,38 @@ impl Motion {
     pub fn has_hierarchy(&self) -> bool {
         let moves = |joint: &Joint| joint.parent.is_some() || joint.rest.translation != Vec3::ZERO;
         self.skeleton.iter().any(moves)
+    }
+
+    /// The joints that the tracks are, with their parents if the clip has a skeleton.
+    #[must_use]
+    pub fn joints(&self) -> Joints {
+        let joints = Joints::of(&self.set);
+        match &self.skeleton[..] {
+            [] => joints,
+            all => joints.with_parents(all.iter().map(|joint| joint.parent).collect()),
+        }
+    }
+
+    /// Whether the clip has parents, but no offsets, so that the positions of joints in the world are unknown. An SMPL
+    /// body without a model of its shape is such a clip. Its rotations in the world are known.
+    #[must_use]
+    pub fn lacks_offsets(&self) -> bool {
+        self.no_world.is_some() && (self.body.is_some() || self.has_unplaced_joints())
+    }
+
+    /// Whether some joints have parents, but none of these has an offset, or translation keys other than 0.
+    #[must_use]
+    pub fn has_unplaced_joints(&self) -> bool {
+        let joints = self.skeleton.iter().enumerate();
+        let mut children = joints
+            .filter(|(_, joint)| joint.parent.is_some())
+            .peekable();
+        let is_placed = |(track, joint): (usize, &Joint)| {
+            let keys = self.set.vector_keys(Channel::Translation, track);
+            joint.rest.translation != Vec3::ZERO
+                || keys.is_some_and(|keys| keys.keys.iter().any(|&key| key != Vec3::ZERO))
+        };
+        children.peek().is_some() && !children.any(is_placed)
     }
 
     /// How the channels of a track are interpolated; `None` for each if the file does not specify it.

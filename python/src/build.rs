@@ -178,6 +178,9 @@ pub(crate) struct ClipParts<'a, 'py> {
     pub(crate) tcb: Option<&'a Bound<'py, PyAny>>,
 }
 
+/// Why positions of joints are unknown.
+pub(crate) const NO_OFFSETS: &str = "the joints have parents, but no offsets; give `offsets`";
+
 impl ClipParts<'_, '_> {
     /// Sets them in a clip; the tangents have their components in `order`.
     pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
@@ -197,6 +200,9 @@ impl ClipParts<'_, '_> {
                 let scaled = clip.set.set_scales(track, &times, &scales, &[]);
                 scaled.map_err(of_track)?;
             }
+        }
+        if self.offsets.is_none() && clip.has_unplaced_joints() {
+            clip.no_world = Some(NO_OFFSETS.to_owned());
         }
         let set = &mut clip.set;
         for (track, row) in rows(self.velocities, "velocities", tracks, &[3])? {

@@ -287,8 +287,8 @@ pub(crate) fn compare<'py>(
     };
     let clips = [one, other].map(|clip| Arc::clone(&clip.get().motion));
     let engine = engine_of(py, engine)?;
-    let (found, warning) = interruptible(py, move || of_clips(&engine, clips, samples, world))?;
-    if let Some(warning) = warning {
+    let (found, warnings) = interruptible(py, move || of_clips(&engine, clips, samples, world))?;
+    for warning in warnings {
         warn_of(py, &warning)?;
     }
     Ok(Bound::new(py, found)?.into_any())
@@ -324,7 +324,7 @@ fn of_clips(
     clips: [Arc<Motion>; 2],
     samples: Option<SampleRequest>,
     world: bool,
-) -> PyResult<(ClipDifference, Option<String>)> {
+) -> PyResult<(ClipDifference, Vec<String>)> {
     let pair = ClipPair {
         inputs: ["the first clip", "the second clip"],
         clips: [&clips[0], &clips[1]],
@@ -351,6 +351,7 @@ fn of_clips(
             ));
         }
     };
+    let warnings = warning.into_iter().chain(pair.assumption()).collect();
     let found = pair.differences(engine, &frames, world);
     let found = found.map_err(of_compare)?;
     let [first, second] = found.missing;
@@ -365,7 +366,7 @@ fn of_clips(
         translation: found.translation.map(ChannelDifference::from),
         scale: found.scale.map(ChannelDifference::from),
     };
-    Ok((difference, warning))
+    Ok((difference, warnings))
 }
 
 /// The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The

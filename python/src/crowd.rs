@@ -2,21 +2,20 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use glam::Vec3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
-use tumble::{ComponentType, Skeleton, WrapMode};
+use tumble::{ComponentType, WrapMode};
 
 use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input};
-use crate::motions::{of_crowd, push};
+use crate::motions::{ChosenSkeleton, SharedSkeleton, of_crowd, push};
 use crate::options::{method_named, one_of, option_named};
 use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
-use crate::samples::matrices;
+use crate::samples::{joint_offsets, joint_parents, matrices, skeleton};
 
 /// Ticks of a second, unless others are asked for.
 const TICKS: u32 = 705_600;
@@ -57,6 +56,8 @@ pub(crate) struct Crowd {
     joints: usize,
     layers: usize,
     clips: usize,
+    /// Why a clip has no positions.
+    unplaced: Option<String>,
 }
 
 /// Numbers for each of some instances: one for all, or a list.
@@ -117,22 +118,23 @@ impl Crowd {
         };
         let method = method_named(method)?;
         let joints = first.motion.set.track_count();
-        let skeleton = match parents {
-            Some(parents) => crate::samples::skeleton(&parents, offsets, joints)?,
+        let chosen = match parents {
+            Some(parents) => {
+                skeleton(&parents, offsets, joints)?;
+                let offsets = offsets.map(|value| joint_offsets(value, joints));
+                ChosenSkeleton::Arrays(joint_parents(&parents, joints)?, offsets.transpose()?)
+            }
             None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
-            None if first.motion.skeleton.is_empty() => {
-                return Err(input(
-                    "clips[0]: it has no skeleton; give `parents` and `offsets`",
-                ));
-            }
-            None => {
-                let all = first.motion.skeleton.iter();
-                let parents = all.clone().map(|joint| joint.parent).collect();
-                let offsets: Vec<Vec3> = all.map(|joint| joint.rest.translation).collect();
-                let skeleton = Skeleton::new(parents, offsets);
-                skeleton.map_err(|error| input(format!("clips[0]: {error}")))?
-            }
+            None => ChosenSkeleton::First,
         };
+        let Some(shared) = SharedSkeleton::new(&chosen, first)? else {
+            return Err(input(
+                "clips[0]: it has no skeleton; give `parents` and `offsets`",
+            ));
+        };
+        let skeleton = shared.of_engine()?;
+        let unplaced =
+            (clips.iter().enumerate()).find_map(|(index, it)| shared.unplaced(index, it));
         let inverse_bind = inverse_bind.map(|value| matrices(value, joints));
         let inverse_bind = inverse_bind.transpose()?;
         let mut poses: Vec<(usize, usize, f64)> = Vec::new();
@@ -149,8 +151,8 @@ impl Crowd {
             stoppable(|| {
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks_per_second);
                 let mut library = made.map_err(of_crowd)?;
-                for (index, clip) in clips.iter().enumerate() {
-                    push(&mut library, index, clip, method)?;
+                for clip in clips.iter().enumerate() {
+                    push(&mut library, &shared, clip, method, |_| Ok(()))?;
                 }
                 for (index, mask) in masks.iter().flatten().enumerate() {
                     library
@@ -175,6 +177,7 @@ impl Crowd {
             joints,
             layers,
             clips: count,
+            unplaced,
         })
     }
 
@@ -283,6 +286,13 @@ impl Crowd {
         out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let values = values_named(values)?;
+        if let Some(reason) = self
+            .unplaced
+            .as_ref()
+            .filter(|_| values != CrowdValues::Rotations)
+        {
+            return Err(input(format!("{reason}; or evaluate \"rotations\"")));
+        }
         let component = match dtype {
             None => ComponentType::F32,
             Some(dtype) => quaternions_of(dtype)?.component_type(),

@@ -541,7 +541,8 @@ impl Engine {
     }
 
     /// Layers of rotations blended into one: the weighted sum of each rotation, normalised, every layer with
-    /// the sign that is nearer to the first one's. Weights need not add up to 1.
+    /// the sign that is nearer to the first one's. Weights need not add up to 1. Arrays have no names, so tracks are
+    /// combined by index: bring those of clips into one order by `Clip.names` first.
     ///
     /// `blend(layers, weights=None, *, order="xyzw", out=None)`
     ///
@@ -564,7 +565,7 @@ impl Engine {
     }
 
     /// Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
-    /// from 0 to 1.
+    /// from 0 to 1. Tracks are combined by index, as in `blend`.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], 0.5).round(4)

@@ -130,7 +130,13 @@ pub(crate) fn in_python(message: &str) -> String {
         ("`--by edges`", r#"`by="edges"`"#),
         ("--weld DISTANCE", "weld=DISTANCE"),
     ];
-    const FLAGS: [&str; 4] = ["bridge_gaps", "keyframes", "overwrite", "raw_times"];
+    const FLAGS: [&str; 5] = [
+        "bridge_gaps",
+        "keyframes",
+        "overwrite",
+        "raw_times",
+        "world",
+    ];
     let message = WORDS
         .iter()
         .fold(message.to_owned(), |message, (program, python)| {

@@ -1,5 +1,7 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
+use std::borrow::Cow;
+
 use glam::Vec3;
 use numpy::{
     PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -11,10 +13,12 @@ use tumble::crowd::{CrowdError, CrowdLibrary, MotionStates, MotionTables, Motion
 use tumble::{Channel, Error, Interpolation, Method, Quantity, Skeleton};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
+use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
 
+use crate::build::NO_OFFSETS;
 use crate::clip::Clip;
 use crate::engine::Engine;
-use crate::errors::{guarded, input, of_engine};
+use crate::errors::{guarded, in_python, input, of_engine};
 use crate::options::method_named;
 use crate::run::stoppable;
 
@@ -36,6 +40,110 @@ pub(crate) struct Motions {
     tables: MotionTables,
     spans: Py<PyArray2<u32>>,
     cells: Py<PyArray2<f32>>,
+    /// Why a clip has no positions, empty for the others; no entries if all have some.
+    #[pyo3(get)]
+    unplaced: Vec<String>,
+    /// The names of the joints; no entries in files that do not store them.
+    #[pyo3(get)]
+    joint_names: Vec<String>,
+}
+
+/// The skeleton that the caller chose for all clips of a library or a crowd.
+pub(crate) enum ChosenSkeleton {
+    /// That of the first clip.
+    First,
+    /// That of another clip.
+    Clip(Clip),
+    /// Arrays, in the order of the tracks of the first clip; without offsets, each clip keeps its own.
+    Arrays(Vec<Option<usize>>, Option<Vec<Vec3>>),
+}
+
+/// The skeleton of a library or a crowd.
+pub(crate) struct SharedSkeleton {
+    skeleton: ClipSkeleton,
+    offsets: OffsetSource,
+}
+
+/// What the skeleton is called in messages.
+const SKELETON: &str = "the skeleton";
+
+impl SharedSkeleton {
+    /// The chosen skeleton; `None` if it is to be that of a clip that has none.
+    pub(crate) fn new(chosen: &ChosenSkeleton, first: &Clip) -> PyResult<Option<Self>> {
+        let (motion, offsets) = match chosen {
+            ChosenSkeleton::First => (&first.motion, OffsetSource::Clip),
+            ChosenSkeleton::Clip(clip) if clip.motion.lacks_offsets() => {
+                (&clip.motion, OffsetSource::Clip)
+            }
+            ChosenSkeleton::Clip(clip) => (&clip.motion, OffsetSource::Skeleton),
+            ChosenSkeleton::Arrays(parents, offsets) => {
+                let at_zero = || vec![Vec3::ZERO; parents.len()];
+                let positions = offsets.clone().unwrap_or_else(at_zero);
+                let names = [SKELETON, &*shown(0, first)];
+                let made = ClipSkeleton::of_arrays(parents, &positions, &first.motion, names);
+                return Ok(Some(Self {
+                    skeleton: made.map_err(|error| input(error.to_string()))?,
+                    offsets: match offsets {
+                        Some(_) => OffsetSource::Skeleton,
+                        None => OffsetSource::Clip,
+                    },
+                }));
+            }
+        };
+        let skeleton = || Self {
+            skeleton: ClipSkeleton::of(motion),
+            offsets,
+        };
+        Ok((!motion.skeleton.is_empty()).then(skeleton))
+    }
+
+    /// The skeleton of a library of the engine.
+    pub(crate) fn of_engine(&self) -> PyResult<Skeleton> {
+        let joints = self.skeleton.joints().iter();
+        let parents = joints.clone().map(|joint| joint.parent).collect();
+        let offsets = joints.map(|joint| joint.rest.translation).collect();
+        let made = Skeleton::new(parents, offsets)
+            .and_then(|skeleton| skeleton.with_names(self.skeleton.names()));
+        made.map_err(|error| input(format!("skeleton: {error}")))
+    }
+
+    /// The names of the joints.
+    pub(crate) fn names(&self) -> &[String] {
+        self.skeleton.names()
+    }
+
+    /// The tracks of a clip in the order of the joints.
+    fn tracks<'a>(&self, index: usize, clip: &'a Clip) -> PyResult<Cow<'a, tumble::TrackSet>> {
+        let name = shown(index, clip);
+        let matched = self.skeleton.all_pairs(&clip.motion, [SKELETON, &name]);
+        let matched = matched.map_err(|error| input(error.to_string()))?;
+        let fitted = (self.skeleton).tracks(&clip.motion, &matched, self.offsets, &name);
+        fitted.map_err(|error| input(in_python(&error.to_string())))
+    }
+
+    /// Why the positions of a clip's joints are unknown; `None` if they are known.
+    pub(crate) fn unplaced(&self, index: usize, clip: &Clip) -> Option<String> {
+        if self.offsets == OffsetSource::Skeleton {
+            return None;
+        }
+        let reason = match &clip.motion.no_world {
+            Some(reason) => in_python(reason),
+            None => {
+                let has_children = (self.skeleton.joints().iter()).any(|it| it.parent.is_some());
+                let is_unplaced = clip.motion.skeleton.is_empty() && has_children;
+                let moves = |track| {
+                    (clip.motion.set)
+                        .vector_keys(Channel::Translation, track)
+                        .is_some()
+                };
+                if !is_unplaced || (1..clip.motion.set.track_count()).any(moves) {
+                    return None;
+                }
+                NO_OFFSETS.to_owned()
+            }
+        };
+        Some(format!("{}: {reason}", shown(index, clip)))
+    }
 }
 
 pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
@@ -47,12 +155,13 @@ pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
     }
 }
 
-/// Adds a clip to a library.
+/// Adds a clip to a library. `check` refuses what the library cannot store.
 pub(crate) fn push(
     library: &mut CrowdLibrary,
-    index: usize,
-    clip: &Clip,
+    skeleton: &SharedSkeleton,
+    (index, clip): (usize, &Clip),
     method: Option<Method>,
+    check: impl Fn(&tumble::TrackSet) -> Result<(), &'static str>,
 ) -> PyResult<()> {
     let named = |error: &str| input(format!("{}: {error}", shown(index, clip)));
     let motion = &clip.motion;
@@ -71,7 +180,9 @@ pub(crate) fn push(
         quantity: Quantity::Rotation,
         ..Interpolation::from(of_rotations)
     };
-    let pushed = library.push(&motion.set, interpolation, of_vectors);
+    let tracks = skeleton.tracks(index, clip)?;
+    check(&tracks).map_err(named)?;
+    let pushed = library.push(&tracks, interpolation, of_vectors);
     pushed.map(drop).map_err(|error| match error {
         CrowdError::Stopped(_) => of_crowd(error),
         error => named(&error.to_string()),
@@ -80,22 +191,46 @@ pub(crate) fn push(
 
 #[pymethods]
 impl Motions {
-    /// Prepares clips by a method. All have the tracks of the skeleton that `parents` and `offsets` say.
+    /// Prepares clips by a method. All have the joints of `skeleton`, of the arrays `(parents, offsets)`, or of the first
+    /// clip.
     #[staticmethod]
     fn of_clips(
         py: Python<'_>,
         clips: Vec<Clip>,
-        parents: Vec<i64>,
-        offsets: Vec<[f32; 3]>,
+        skeleton: Option<Clip>,
+        arrays: Option<(Vec<i64>, Vec<[f32; 3]>)>,
         method: &str,
     ) -> PyResult<Self> {
         let method = method_named(method)?;
-        let prepared = py.detach(|| {
-            stoppable(|| {
+        let chosen = match (skeleton, arrays) {
+            (Some(clip), _) => ChosenSkeleton::Clip(clip),
+            (None, None) => ChosenSkeleton::First,
+            (None, Some((parents, offsets))) => {
                 let parents = parents.iter().map(|&parent| usize::try_from(parent).ok());
                 let offsets = offsets.into_iter().map(Vec3::from_array).collect();
-                let skeleton = Skeleton::new(parents.collect(), offsets);
-                let skeleton = skeleton.map_err(|error| input(format!("skeleton: {error}")))?;
+                ChosenSkeleton::Arrays(parents.collect(), Some(offsets))
+            }
+        };
+        let Some(first) = clips.first() else {
+            return Err(input("clips: give at least one"));
+        };
+        let Some(shared) = SharedSkeleton::new(&chosen, first)? else {
+            return Err(input(
+                "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, or (parents, offsets)",
+            ));
+        };
+        let reasons = clips.iter().enumerate();
+        let reasons: Vec<_> = reasons
+            .map(|(index, clip)| shared.unplaced(index, clip))
+            .collect();
+        let unplaced = match reasons.iter().any(Option::is_some) {
+            true => reasons.into_iter().map(Option::unwrap_or_default).collect(),
+            false => Vec::new(),
+        };
+        let joint_names = shared.names().to_vec();
+        let prepared = py.detach(|| {
+            stoppable(|| {
+                let skeleton = shared.of_engine()?;
                 let longest = clips.iter().map(|clip| length(&clip.motion));
                 let longest = longest.fold(1e-3, f64::max);
                 let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
@@ -105,10 +240,8 @@ impl Motions {
                 };
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks);
                 let mut library = made.map_err(of_crowd)?;
-                for (index, clip) in clips.iter().enumerate() {
-                    check(&clip.motion)
-                        .map_err(|error| input(format!("{}: {error}", shown(index, clip))))?;
-                    push(&mut library, index, clip, method)?;
+                for clip in clips.iter().enumerate() {
+                    push(&mut library, &shared, clip, method, check)?;
                 }
                 Ok(library.into_tables())
             })
@@ -121,6 +254,8 @@ impl Motions {
             tables,
             spans: spans.unbind(),
             cells: cells.unbind(),
+            unplaced,
+            joint_names,
         })
     }
 
@@ -159,10 +294,16 @@ impl Motions {
             }
             guarded(|| MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd))?
         };
+        let texts = |name: &str| match arrays.get_item(name)? {
+            Some(array) => array.call_method0("tolist")?.extract::<Vec<String>>(),
+            None => Ok(Vec::new()),
+        };
         Ok(Self {
             tables,
             spans: spans.unbind(),
             cells: cells.unbind(),
+            unplaced: texts("unplaced")?,
+            joint_names: texts("joint_names")?,
         })
     }
 
@@ -215,6 +356,9 @@ impl Motions {
         angular_velocities: Option<&Bound<'_, PyArrayDyn<f32>>>,
     ) -> PyResult<()> {
         let at = self.instances(&clip_ids, &times)?;
+        if positions.is_some() || velocities.is_some() {
+            self.check_placed(&at)?;
+        }
         let (spans, cells) = (
             self.spans.bind(py).try_readonly()?,
             self.cells.bind(py).try_readonly()?,
@@ -258,6 +402,17 @@ impl Motions {
 }
 
 impl Motions {
+    /// Refuses positions of clips whose joints have none.
+    fn check_placed(&self, at: &[(u32, u32)]) -> PyResult<()> {
+        let reasons = at.iter().map(|&(clip, _)| self.unplaced.get(clip as usize));
+        match reasons.flatten().find(|reason| !reason.is_empty()) {
+            None => Ok(()),
+            Some(reason) => Err(input(format!(
+                "{reason}; or give `skeleton`, or `arrays` without positions and velocities"
+            ))),
+        }
+    }
+
     /// The clip and the tick of each instance; times outside of a clip are its ends.
     fn instances(
         &self,
@@ -321,17 +476,13 @@ fn length(motion: &Motion) -> f64 {
         .map_or(0.0, |(first, last)| last - first)
 }
 
-/// Refuses what positions along the skeleton would leave out without a word.
-fn check(motion: &Motion) -> Result<(), &'static str> {
-    let has_scales = |track| motion.set.vector_keys(Channel::Scale, track).is_some();
-    if motion.is_world {
-        return Err("its rotations are relative to the world, not to the parents");
-    }
-    if !motion.origins.is_empty() {
-        return Err("its positions count from an origin (`clip.origins`); subtract it first");
-    }
-    match (0..motion.set.track_count()).any(has_scales) {
-        true => Err("it has scale keys, which a motion library cannot store"),
+/// Refuses scales, which positions along the skeleton would leave out without a word.
+fn check(set: &tumble::TrackSet) -> Result<(), &'static str> {
+    let has_scales = |track| set.vector_keys(Channel::Scale, track).is_some();
+    match (0..set.track_count()).any(has_scales) {
+        true => {
+            Err("it has scale keys or joints that rest scaled, which a motion library cannot store")
+        }
         false => Ok(()),
     }
 }

@@ -14,7 +14,7 @@ use tumble_formats::world::world;
 
 use crate::clip::Clip;
 use crate::engine::Engine;
-use crate::errors::{input, of_engine};
+use crate::errors::{in_python, input, of_engine};
 use crate::options::{Request, SampleRequest};
 use crate::run::interruptible;
 
@@ -72,7 +72,7 @@ pub(crate) fn in_world<'py>(
     let motion = &clip.get().motion;
     let (count, motion) = (samples.times.len(), Arc::clone(motion));
     let poses = interruptible(py, move || {
-        world(&motion, &samples).map_err(|error| input(error.to_string()))
+        world(&motion, &samples).map_err(|error| input(in_python(&error.to_string())))
     })?;
     let points = poses.iter().map(|pose| pose.position);
     let positions = positions(py, &clip.get().motion, points, (tracks, count, 3), layout)?;

@@ -490,31 +490,43 @@ pub(crate) fn skeleton(
     offsets: Option<&Bound<'_, PyAny>>,
     tracks: usize,
 ) -> PyResult<Skeleton> {
+    let parents = joint_parents(parents, tracks)?;
+    let offsets = match offsets {
+        None => vec![Vec3::ZERO; tracks],
+        Some(value) => joint_offsets(value, tracks)?,
+    };
+    let skeleton = Skeleton::new(parents, offsets);
+    skeleton.map_err(|error| input(format!("parents: {error}")))
+}
+
+/// The parent of each track.
+pub(crate) fn joint_parents(
+    parents: &[Option<i64>],
+    tracks: usize,
+) -> PyResult<Vec<Option<usize>>> {
     if parents.len() != tracks {
         return Err(input(format!(
             "parents: there are {} for {tracks} tracks",
             parents.len()
         )));
     }
-    let offsets = match offsets {
-        None => vec![Vec3::ZERO; tracks],
-        Some(value) => match vectors(value, "offsets")? {
-            (shape, offsets) if *shape == [tracks] => offsets,
-            (shape, _) => {
-                return Err(input(format!(
-                    "offsets: the shape is {:?}; give ({tracks}, 3)",
-                    [&shape[..], &[3]].concat()
-                )));
-            }
-        },
-    };
-    let parents = parents.iter().map(|parent| match parent {
+    let parent = |parent: &Option<i64>| match parent {
         None | Some(-1) => None,
         // What is no track is refused as one.
         Some(parent) => Some(usize::try_from(*parent).unwrap_or(usize::MAX)),
-    });
-    let skeleton = Skeleton::new(parents.collect(), offsets);
-    skeleton.map_err(|error| input(format!("parents: {error}")))
+    };
+    Ok(parents.iter().map(parent).collect())
+}
+
+/// The offset of each track.
+pub(crate) fn joint_offsets(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec3>> {
+    match vectors(value, "offsets")? {
+        (shape, offsets) if *shape == [tracks] => Ok(offsets),
+        (shape, _) => Err(input(format!(
+            "offsets: the shape is {:?}; give ({tracks}, 3)",
+            [&shape[..], &[3]].concat()
+        ))),
+    }
 }
 
 /// Affine matrices, (tracks, 3, 4) or (tracks, 4, 4).

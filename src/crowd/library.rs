@@ -12,6 +12,7 @@ use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
 use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
+use crate::tracks::joints::Joints;
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
@@ -58,6 +59,8 @@ pub struct CrowdLibrary {
     /// The reference poses, `[clip][joint]`: a rotation, a translation and the reciprocals of a scale.
     references: Vec<[f32; 4]>,
     ticks_per_second: u32,
+    /// The names of the joints: those of the skeleton, else those of the first clip; `None` until one is known.
+    joints: Option<Joints>,
 }
 
 impl CrowdLibrary {
@@ -111,6 +114,10 @@ impl CrowdLibrary {
             bind: Vec::new(),
             references: Vec::new(),
             ticks_per_second,
+            joints: match skeleton.names() {
+                [] => None,
+                names => Some(Joints::named(names)),
+            },
         })
     }
 
@@ -124,6 +131,13 @@ impl CrowdLibrary {
     #[must_use]
     pub fn joint_count(&self) -> usize {
         self.offsets.len()
+    }
+
+    /// The name of each joint; empty until the skeleton or the first clip determines them. A joint without a name is
+    /// `box1`, `box2` … by its index.
+    #[must_use]
+    pub fn joint_names(&self) -> &[String] {
+        self.joints.as_ref().map_or(&[], Joints::names)
     }
 
     /// Number of clips.
@@ -147,14 +161,16 @@ impl CrowdLibrary {
 
     /// Adds a clip and returns its index.
     ///
-    /// The set has one track for each joint. Rotations are interpolated by `interpolation`, translations and scales
+    /// The set has one track for each joint, of the same name, in any order. The joints have the names of the skeleton
+    /// ([`Skeleton::with_names`]), else those of the first clip, whose tracks are then in the order of the skeleton. Sets
+    /// without names are matched by index. Rotations are interpolated by `interpolation`, translations and scales
     /// by `vectors`. Joints without translations stay at their offsets in the skeleton. The wrap modes of
     /// `interpolation` are ignored, because each layer of an instance has its wrap mode. The reference pose of the
     /// clip, for additive layers, is its pose at its start ([`CrowdLibrary::set_reference`]).
     ///
     /// # Errors
-    /// When the set has not one track for each joint, a track cannot be interpolated as requested, the interpolation
-    /// computes velocities or accelerations, a curve rotates so fast that no polynomial fits it, the clip has too
+    /// When the set has not one track for each joint, a track has the name of no joint, a track cannot be interpolated
+    /// as requested, the interpolation computes velocities or accelerations, a curve rotates so fast that no polynomial fits it, the clip has too
     /// many ticks, the library is full, or there is not enough memory.
     pub fn push(
         &mut self,
@@ -163,9 +179,22 @@ impl CrowdLibrary {
         vectors: VectorMethod,
     ) -> Result<usize, CrowdError> {
         let (tracks, joints) = (set.track_count(), self.joint_count());
+        let named = Joints::of(set);
+        let order = match &self.joints {
+            Some(known) if known.is_named() || named.is_named() => {
+                Some(known.order_of(&named, ["the library", "the clip"])?)
+            }
+            _ => None,
+        };
         if tracks != joints {
             return Err(CrowdError::Tracks { tracks, joints });
         }
+        let in_order = |order: &Vec<usize>| !order.iter().copied().eq(0..joints);
+        let selected = order.filter(in_order).map(|order| set.select(order));
+        let selected = selected
+            .transpose()
+            .map_err(|_| CrowdError::Tracks { tracks, joints })?;
+        let set = selected.as_ref().unwrap_or(set);
         let clip = self.clip_count();
         if clip == MAX_CLIPS {
             return Err(CrowdError::TooManyClips);
@@ -175,6 +204,7 @@ impl CrowdLibrary {
             .push(set, interpolation.into(), vectors, ticks, offsets)?;
         self.references
             .extend(self.tables.reference(joints, clip, 0));
+        self.joints.get_or_insert(named);
         Ok(clip)
     }
 

@@ -211,6 +211,14 @@ pub enum SkeletonError {
         /// The index of a track in the cycle, or of a descendant of one.
         track: usize,
     },
+    /// There is not one name for each track.
+    #[error("{names} names for {tracks} tracks; give one for each")]
+    Names {
+        /// The number of names.
+        names: usize,
+        /// The number of tracks.
+        tracks: usize,
+    },
     /// An offset is NaN or infinite.
     #[error("the offset of track {track} is {offset}, which is not finite")]
     OffsetNotFinite {

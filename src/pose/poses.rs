@@ -24,7 +24,9 @@ use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
     /// Blends layers: the normalised weighted sum of their rotations. Each layer's rotation has the sign that is
-    /// nearer to the first layer's. The sum of the weights need not be 1.
+    /// nearer to the first layer's. The sum of the weights need not be 1. Results have no names, so tracks are combined
+    /// by index; [`Joints::order_of`](crate::Joints::order_of) and [`TrackSet::select`](crate::TrackSet::select) bring
+    /// the tracks of sets into one order before they are evaluated.
     ///
     /// # Errors
     /// When there is no layer, the layers' shapes differ, a weight is not finite or exceeds 1e9 in magnitude, or the
@@ -57,7 +59,7 @@ impl Engine {
     }
 
     /// Mixes two results: slerp along the shorter arc from each rotation of `from` to that of `to`. `weight` is from
-    /// 0 to 1.
+    /// 0 to 1. Tracks are combined by index, as in [`Engine::blend`].
     ///
     /// # Errors
     /// When the shapes differ, the weight is outside 0 to 1, or the device fails.
@@ -77,7 +79,9 @@ impl Engine {
     }
 
     /// Adds the difference of a layer from a reference to a base: `base · (reference⁻¹ layer)^weight`. The reference
-    /// has one rotation for each track; the weight is from 0 to 1.
+    /// has one rotation for each track; the weight is from 0 to 1. Tracks are combined by index, as in
+    /// [`Engine::blend`].
+    ///
     /// # Errors
     /// When the shapes differ, there is not one reference rotation for each track, the weight is outside 0 to 1, or
     /// the device fails.

@@ -8,10 +8,15 @@ use crate::output::pose_error::{MAX_TRACKS, SkeletonError};
 use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
+///
+/// Results ([`Rotations`](crate::Rotations)) have no names, so they are combined with a skeleton by index. A
+/// [`CrowdLibrary`](crate::crowd::CrowdLibrary) matches the tracks of its clips to the joints by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     /// The tracks in the order of evaluation, parents before their children.
     links: Vec<Link>,
+    /// The name of each track; empty if the tracks have none.
+    names: Vec<String>,
 }
 
 impl Skeleton {
@@ -70,7 +75,33 @@ impl Skeleton {
         };
         let mut links = reserved(tracks, "a skeleton")?;
         links.extend(order.into_iter().map(link));
-        Ok(Self { links })
+        let names = Vec::new();
+        Ok(Self { links, names })
+    }
+
+    /// The same skeleton with a name for each track, by which a [`CrowdLibrary`](crate::crowd::CrowdLibrary) matches
+    /// the tracks of its clips.
+    ///
+    /// # Errors
+    /// When there is not one name for each track.
+    pub fn with_names<T: Into<String>>(
+        self,
+        names: impl IntoIterator<Item = T>,
+    ) -> Result<Self, SkeletonError> {
+        let names: Vec<String> = names.into_iter().map(Into::into).collect();
+        match names.len() == self.len() {
+            true => Ok(Self { names, ..self }),
+            false => Err(SkeletonError::Names {
+                names: names.len(),
+                tracks: self.len(),
+            }),
+        }
+    }
+
+    /// The name of each track; empty if they were not set.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// Makes a chain of joints: the first joint is at the origin, and each other joint is at `(0, -length, 0)`

@@ -2,6 +2,7 @@
 //! the shortest path are computed once.
 
 pub(crate) mod error;
+pub(crate) mod joints;
 pub(crate) mod rotation;
 pub(crate) mod set;
 pub(crate) mod signs;

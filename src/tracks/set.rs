@@ -276,7 +276,19 @@ impl TrackSet {
     /// The track's name. If it has none, or the index is out of range, `box1`, `box2` … from the index.
     pub fn track_name(&self, index: usize) -> String {
         let name = self.get(index).and_then(|track| track.name);
-        name.map_or_else(|| format!("box{}", index.saturating_add(1)), str::to_owned)
+        name.map_or_else(|| default_name(index), str::to_owned)
+    }
+
+    /// Names a track; with an empty name it has none.
+    ///
+    /// # Errors
+    /// When the track's index is out of range.
+    pub fn set_name(&mut self, track: usize, name: impl Into<String>) -> Result<(), TrackError> {
+        self.check_track(track)?;
+        let count = self.names.len().max(track + 1);
+        self.names.resize(count, String::new());
+        self.names[track] = name.into();
+        Ok(())
     }
 
     /// The first and the last key time of all tracks, seconds; `None` if there are none.
@@ -350,6 +362,11 @@ impl TrackSet {
         };
         self.span = Some((first, last));
     }
+}
+
+/// The name of a track without one.
+pub(crate) fn default_name(index: usize) -> String {
+    format!("box{}", index.saturating_add(1))
 }
 
 pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {

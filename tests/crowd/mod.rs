@@ -12,8 +12,8 @@ use proptest::prelude::*;
 use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
 use tumble::vulkan::tuning::{Mapping, Transfer};
 use tumble::{
-    Device, Engine, EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet,
-    VectorMethod, VectorWidth, WrapMode, method,
+    Device, Engine, EngineOptions, JointMatchError, Layout, METHODS, Method, SampleTimes, Skeleton,
+    TrackSet, VectorMethod, VectorWidth, WrapMode, method,
 };
 
 use crate::support::{Random, vulkan_devices};
@@ -503,6 +503,76 @@ fn layers_are_mixed_and_added_as_poses_are() {
         let found = evaluated(&mut crowd, CrowdValues::Rotations);
         assert_eq!(bits(&found), bits(expected.as_arrays()));
     }
+}
+
+/// Clips whose tracks are in another order have the same bits, and clips of other joints are refused, without a change
+/// of the library.
+#[test]
+fn joints_are_matched_by_name() {
+    let mut random = Random(23);
+    let joints = 9;
+    let skeleton = skeleton(&mut random, joints);
+    let first = clip(&mut random, joints, 6);
+    let order = [4, 0, 8, 2, 6, 1, 3, 7, 5];
+    let shuffled = first.select(order).unwrap();
+    let names: Vec<String> = (0..joints).map(|joint| first.track_name(joint)).collect();
+    let linear = VectorMethod::Linear;
+    for named in [false, true] {
+        let skeleton = match named {
+            false => skeleton.clone(),
+            true => skeleton.clone().with_names(names.clone()).unwrap(),
+        };
+        let mut library = CrowdLibrary::new(&skeleton).unwrap();
+        assert_eq!(library.joint_names().is_empty(), !named);
+        // Without names, the first clip is in the order of the skeleton.
+        let sets = match named {
+            false => [&first, &shuffled],
+            true => [&shuffled, &first],
+        };
+        for set in sets {
+            library.push(set, method::SLERP, linear).unwrap();
+        }
+        assert_eq!(library.joint_names(), names);
+        let mut other = first.clone();
+        other.set_name(3, "Third").unwrap();
+        let refused = library.push(&other, method::SLERP, linear).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            format!(
+                "the library has a joint `{}`, the clip has none of that name",
+                names[3]
+            )
+        );
+        let unnamed: Vec<&[Quat]> = first.tracks().map(|track| track.keys).collect();
+        let mut set = TrackSet::new();
+        for (track, keys) in unnamed.into_iter().enumerate() {
+            set.push("", first.track(track).times, keys).unwrap();
+        }
+        let refused = library.push(&set, method::SLERP, linear).unwrap_err();
+        assert!(
+            matches!(
+                refused,
+                CrowdError::OtherJoints(JointMatchError::Unnamed { .. })
+            ),
+            "{refused}"
+        );
+        assert_eq!(library.clip_count(), 2);
+        let mut crowd = cpu().crowd(&library, 2, 1).unwrap();
+        for instance in 0..2 {
+            let plays = CrowdLayer::new(instance).at(300_000);
+            crowd.set(instance, 0, plays).unwrap();
+        }
+        for values in [CrowdValues::Model, CrowdValues::Rotations] {
+            let found = bits(&evaluated(&mut crowd, values));
+            let (one, other) = found.split_at(found.len() / 2);
+            assert_eq!(one, other, "{values:?}");
+        }
+    }
+    let refused = skeleton.with_names(["one"]).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "1 names for 9 tracks; give one for each"
+    );
 }
 
 proptest! {

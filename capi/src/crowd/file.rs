@@ -1,16 +1,16 @@
 //! Libraries of clips from motion files, whose joints are matched by name.
 
-use std::collections::HashMap;
+use std::borrow::Cow;
 use std::ffi::c_char;
 
-use glam::Vec3;
-use tumble::{Channel, Method, TrackSet, VectorMethod, method};
+use tumble::{Method, TrackSet, VectorMethod, method};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
+use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
 
 use crate::arguments::Out;
-use crate::crowd::library::{LibraryJoint, TumbleCrowdLibrary, vector_method};
-use crate::file::{TumbleFile, c_text};
+use crate::crowd::library::{TumbleCrowdLibrary, vector_method};
+use crate::file::TumbleFile;
 use crate::handle;
 use crate::interpolation::TumbleInterpolation;
 use crate::result::{Failure, TumbleResult, code};
@@ -19,63 +19,13 @@ fn refused(message: String) -> Failure {
     Failure::new(TumbleResult::InvalidInput, message)
 }
 
-/// The name of a track, without zero bytes, as joints of libraries have it.
-fn name_of(motion: &Motion, track: usize) -> String {
-    motion.set.track_name(track).replace('\0', "")
-}
-
-/// The indices of a clip's tracks by name; an error if two tracks have the same name.
-fn tracks_by_name(motion: &Motion, clip: usize) -> Result<HashMap<String, usize>, Failure> {
-    let mut tracks = HashMap::new();
-    for track in 0..motion.set.track_count() {
-        let name = name_of(motion, track);
-        if tracks.insert(name.clone(), track).is_some() {
-            return Err(refused(format!(
-                "clip {clip} has two joints `{name}`; give them names of their own"
-            )));
-        }
-    }
-    Ok(tracks)
-}
-
 /// The joints of all clips of a file, those of the first clip first.
-fn joints(file: &TumbleFile) -> Result<Vec<LibraryJoint>, Failure> {
-    let mut joints: Vec<LibraryJoint> = Vec::new();
-    let mut known: HashMap<String, usize> = HashMap::new();
+fn joints(file: &TumbleFile) -> Result<ClipSkeleton, Failure> {
+    let mut joints = ClipSkeleton::default();
     for (clip, entry) in file.clips.iter().enumerate() {
-        let motion = &entry.motion;
-        tracks_by_name(motion, clip)?;
-        let names = (0..motion.set.track_count()).map(|track| name_of(motion, track));
-        let names: Vec<String> = names.collect();
-        let before = joints.len();
-        for (track, name) in names.iter().enumerate() {
-            known.entry(name.clone()).or_insert_with(|| {
-                joints.push(LibraryJoint {
-                    name: c_text(name),
-                    parent: None,
-                    rest: motion
-                        .skeleton
-                        .get(track)
-                        .map(|joint| joint.rest)
-                        .unwrap_or_default(),
-                });
-                joints.len() - 1
-            });
-        }
-        for (track, name) in names.iter().enumerate() {
-            let parent = motion.skeleton.get(track).and_then(|joint| joint.parent);
-            let parent = parent
-                .and_then(|parent| names.get(parent))
-                .map(|name| known[name]);
-            let joint = known[name];
-            if joint >= before {
-                joints[joint].parent = parent;
-            } else if joints[joint].parent != parent {
-                return Err(refused(format!(
-                    "`{name}` has another parent in clip {clip} than in the clips before; make a library for each skeleton"
-                )));
-            }
-        }
+        let names = ["the clips before", &format!("clip {clip}")];
+        let added = joints.extend(&entry.motion, names);
+        added.map_err(|error| refused(format!("{error}; make a library for each skeleton")))?;
     }
     Ok(joints)
 }
@@ -110,52 +60,26 @@ pub unsafe extern "C" fn tumble_crowd_library_of_file(
 
 /// The tracks of a clip in the order of a library's joints. Joints that the clip does not have are at rest in the
 /// library's pose; channels that it has no keys for are at rest in the pose of the clip's file.
-fn matched(
+fn matched<'a>(
     library: &TumbleCrowdLibrary,
-    motion: &Motion,
+    motion: &'a Motion,
     clip: usize,
-) -> Result<TrackSet, Failure> {
-    if motion.is_world {
-        return Err(refused(format!(
-            "the rotations of clip {clip} are relative to the world; joints of crowds turn relative to their parents"
-        )));
-    }
+) -> Result<Cow<'a, TrackSet>, Failure> {
+    let name = format!("clip {clip}");
     if let Some(reason) = &motion.no_world {
-        return Err(refused(format!("clip {clip}: {reason}")));
+        return Err(refused(format!("{name}: {reason}")));
     }
-    let mut by_name = tracks_by_name(motion, clip)?;
-    let mut set = motion.set.clone();
-    let start = set.time_span().map_or(0.0, |(first, _)| first);
-    let mut order = Vec::with_capacity(library.joints.len());
-    for joint in &library.joints {
-        let name = joint.name.to_string_lossy();
-        let (track, moved, scale) = match by_name.remove(&*name) {
-            Some(track) => {
-                let rest = |channel| motion.rest(channel, track);
-                (track, rest(Channel::Translation), rest(Channel::Scale))
-            }
-            None => {
-                set.push(name.as_ref(), &[start], &[joint.rest.rotation])?;
-                let rest = joint.rest;
-                (set.track_count() - 1, rest.translation, rest.scale)
-            }
-        };
-        let is_keyed = |channel| set.vector_keys(channel, track).is_some();
-        let (has_moved, has_scale) = (is_keyed(Channel::Translation), is_keyed(Channel::Scale));
-        if !has_moved && moved != joint.rest.translation {
-            set.set_translations(track, &[start], &[moved], &[])?;
+    // The first set names the joints of a library of arrays.
+    let joints = match library.read()?.joint_names() {
+        names if !names.is_empty() && !library.skeleton.is_named() => {
+            Cow::Owned(library.skeleton.clone().with_names(names))
         }
-        if !has_scale && scale != Vec3::ONE {
-            set.set_scales(track, &[start], &[scale], &[])?;
-        }
-        order.push(track);
-    }
-    if let Some(name) = by_name.into_keys().min() {
-        return Err(refused(format!(
-            "clip {clip} has a joint `{name}`, the library has none of that name"
-        )));
-    }
-    Ok(set.select(order)?)
+        _ => Cow::Borrowed(&library.skeleton),
+    };
+    let matched = joints.some_pairs(motion, ["the library", &name]);
+    let matched = matched.map_err(|error| refused(error.to_string()))?;
+    let tracks = joints.tracks(motion, &matched, OffsetSource::Clip, &name);
+    tracks.map_err(|error| refused(error.to_string()))
 }
 
 /// The method by which the file interpolates all rotations that change; an error if there are several.
@@ -190,7 +114,7 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
 }
 
 /// Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
-/// `tumble_crowd_library_of_file`.
+/// `tumble_crowd_library_of_file`. A joint has the same parent in the clip as in the library.
 ///
 /// Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
 /// `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in

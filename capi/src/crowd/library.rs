@@ -6,9 +6,11 @@ use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 use glam::{Affine3A, Mat3A, Vec3A};
 use tumble::crowd::CrowdLibrary;
 use tumble::{Skeleton, VectorMethod};
-use tumble_formats::motion::Transform;
+use tumble_formats::motion::{Joint, Transform};
+use tumble_formats::skeleton::ClipSkeleton;
 
 use crate::arguments::{Out, list, list_mut, product, text};
+use crate::file::c_text;
 use crate::handle::{self, Object};
 use crate::interpolation::TumbleInterpolation;
 use crate::result::{Failure, TumbleResult, code, guarded};
@@ -19,16 +21,9 @@ use crate::skeleton::joints;
 /// may use it at the same time.
 pub struct TumbleCrowdLibrary {
     inner: RwLock<CrowdLibrary>,
-    pub(crate) joints: Vec<LibraryJoint>,
-}
-
-/// A joint, with its transform in clips that do not move it.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct LibraryJoint {
-    /// Empty in libraries that were made from arrays.
-    pub(crate) name: CString,
-    pub(crate) parent: Option<usize>,
-    pub(crate) rest: Transform,
+    pub(crate) skeleton: ClipSkeleton,
+    /// The names of the joints; empty in libraries that were made from arrays.
+    names: Vec<CString>,
 }
 
 impl Object for TumbleCrowdLibrary {
@@ -37,16 +32,25 @@ impl Object for TumbleCrowdLibrary {
 
 impl TumbleCrowdLibrary {
     /// An empty library; 0 ticks mean the default.
-    pub(crate) fn new(joints: Vec<LibraryJoint>, ticks_per_second: u32) -> Result<Self, Failure> {
-        let parents = joints.iter().map(|joint| joint.parent).collect();
-        let offsets = joints.iter().map(|joint| joint.rest.translation).collect();
-        let skeleton = Skeleton::new(parents, offsets)?;
+    pub(crate) fn new(joints: ClipSkeleton, ticks_per_second: u32) -> Result<Self, Failure> {
+        let rest = joints.joints().iter();
+        let parents = rest.clone().map(|joint| joint.parent).collect();
+        let offsets = rest.map(|joint| joint.rest.translation).collect();
+        let mut skeleton = Skeleton::new(parents, offsets)?;
+        let mut names = vec![CString::default(); skeleton.len()];
+        if joints.is_named() {
+            names = joints.names().iter().map(|name| c_text(name)).collect();
+            skeleton = skeleton.with_names(joints.names())?;
+        }
         let library = match ticks_per_second {
             0 => CrowdLibrary::new(&skeleton)?,
             ticks => CrowdLibrary::with_ticks(&skeleton, ticks)?,
         };
-        let inner = RwLock::new(library);
-        Ok(Self { inner, joints })
+        Ok(Self {
+            inner: RwLock::new(library),
+            skeleton: joints,
+            names,
+        })
     }
 
     pub(crate) fn read(&self) -> Result<RwLockReadGuard<'_, CrowdLibrary>, Failure> {
@@ -86,15 +90,14 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
         let out = Out::new(library, "library")?;
         // SAFETY: as the caller promises.
         let joints = unsafe { joints(parents, offsets, joint_count)? };
-        let joint = |(parent, offset)| {
-            let mut library_joint = LibraryJoint {
-                parent,
-                ..LibraryJoint::default()
+        let joint = |(parent, translation)| {
+            let rest = Transform {
+                translation,
+                ..Transform::default()
             };
-            library_joint.rest.translation = offset;
-            library_joint
+            Joint { parent, rest }
         };
-        let joints = joints.into_iter().map(joint).collect();
+        let joints = ClipSkeleton::unnamed(joints.into_iter().map(joint).collect());
         let made = TumbleCrowdLibrary::new(joints, ticks_per_second)?;
         // SAFETY: as the caller promises.
         unsafe { out.set(handle::give(made)) };
@@ -122,7 +125,9 @@ pub(crate) unsafe fn vector_method(
 
 /// Adds a clip to a library.
 ///
-/// `set` has one track for each joint, in the same order. Rotations are interpolated by `interpolation`, or by the
+/// `set` has one track for each joint, of the same name, in any order. The joints have the names of the file of
+/// `tumble_crowd_library_of_file`, else those of the first set, whose tracks are then in the order of the joints. Sets
+/// without names are matched by index. Rotations are interpolated by `interpolation`, or by the
 /// defaults if it is null. Translations and scales are interpolated by the method `vectors`: "step", "linear",
 /// "catmull-rom", "bessel-overhauser", "gltf-cubic", "c2" or "b-spline"; null: "linear". Joints without translations
 /// stay at their offsets. `before` and `after` of `interpolation` are ignored, because each layer of an instance has
@@ -130,9 +135,9 @@ pub(crate) unsafe fn vector_method(
 /// (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track cannot be interpolated as
-/// requested, the quantity is not the rotation, a curve rotates so fast that no polynomial fits it, the clip is too
-/// long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown. After any error the library
+/// `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+/// track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+/// polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown. After any error the library
 /// is unchanged.
 ///
 /// # Safety
@@ -252,7 +257,7 @@ pub extern "C" fn tumble_crowd_library_set_reference(
 /// Returns the number of joints; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_count(library: *const TumbleCrowdLibrary) -> usize {
-    guarded(|| Ok(handle::get(library)?.joints.len())).unwrap_or(0)
+    guarded(|| Ok(handle::get(library)?.names.len())).unwrap_or(0)
 }
 
 /// Returns the number of clips; 0 if the handle is invalid.
@@ -295,8 +300,8 @@ pub extern "C" fn tumble_crowd_library_joint_name(
 ) -> *const c_char {
     let name = guarded(|| {
         let library = handle::get(library)?;
-        let count = library.joints.len();
-        let found = library.joints.get(joint).map(|joint| joint.name.as_ptr());
+        let count = library.names.len();
+        let found = library.names.get(joint).map(|name| name.as_ptr());
         found.ok_or_else(|| {
             let message = format!("there is no joint {joint}; the library has {count}");
             Failure::new(TumbleResult::OutOfRange, message)
@@ -321,7 +326,7 @@ pub unsafe extern "C" fn tumble_crowd_library_parents(
 ) -> TumbleResult {
     code(|| {
         let library = handle::get(library)?;
-        let joints = library.joints.len();
+        let joints = library.names.len();
         if joint_count != joints {
             let message =
                 format!("`joint_count` is {joint_count}; the library has {joints} joints");
@@ -329,7 +334,7 @@ pub unsafe extern "C" fn tumble_crowd_library_parents(
         }
         // SAFETY: as the caller promises.
         let parents = unsafe { list_mut(parents, joint_count, "parents")? };
-        for (parent, joint) in parents.iter_mut().zip(&library.joints) {
+        for (parent, joint) in parents.iter_mut().zip(library.skeleton.joints()) {
             // Indices of skeletons made of arrays have 31 bits, and files have no more joints.
             *parent = joint.parent.map_or(-1, |parent| parent as i32);
         }

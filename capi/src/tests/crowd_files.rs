@@ -21,6 +21,7 @@ use crate::engine::*;
 use crate::file::*;
 use crate::interpolation::*;
 use crate::result::*;
+use crate::set::*;
 
 fn load(path: &Path) -> *mut TumbleFile {
     let path = CString::new(path.to_str().unwrap()).unwrap();
@@ -270,6 +271,88 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     }
     done(tumble_file_free(file));
     done(tumble_file_free(other));
+}
+
+/// A file whose joints are in another order, and a set of the same names, are the same motion; other parents are refused.
+#[test]
+fn joints_of_other_files_are_matched_by_name_and_parent() {
+    let folder = tempfile::tempdir().unwrap();
+    let joint = |kind: &str, name: &str, offset: &str, inside: &str| {
+        format!(
+            "{kind} {name}\n{{\nOFFSET {offset}\nCHANNELS 3 Zrotation Xrotation Yrotation\n{inside}}}\n"
+        )
+    };
+    let end = "End Site\n{\nOFFSET 0 1 0\n}\n";
+    let file = |name: &str, inside: String, rows: [&str; 2]| {
+        let text = format!(
+            "HIERARCHY\n{}MOTION\nFrames: 2\nFrame Time: 0.5\n{}\n{}\n",
+            joint("ROOT", "hip", "0 3 0", &inside),
+            rows[0],
+            rows[1]
+        );
+        load(&write(&folder, name, text))
+    };
+    let left = |inside: &str| joint("JOINT", "left", "1 0 0", inside);
+    let right = |inside: &str| joint("JOINT", "right", "-1 0 0", inside);
+    let one = file(
+        "one.bvh",
+        left(end) + &right(end),
+        ["0 0 0 0 0 0 0 0 0", "10 0 0 20 0 0 0 30 0"],
+    );
+    let other = file(
+        "other.bvh",
+        right(end) + &left(end),
+        ["0 0 0 0 0 0 0 0 0", "10 0 0 0 30 0 20 0 0"],
+    );
+    let chain = file(
+        "chain.bvh",
+        left(&right(end)),
+        ["0 0 0 0 0 0 0 0 0", "10 0 0 20 0 0 0 30 0"],
+    );
+    let library = library_of(one);
+    done(push_clip(library, one, 0, null(), None));
+    done(push_clip(library, other, 0, null(), None));
+    let refused = push_clip(library, chain, 0, null(), None);
+    let text = "`right` has the parent `hip` in the library, but has the parent `left` in clip 0";
+    fails(refused, TumbleResult::InvalidInput, text);
+    // A set of the same names, in another order.
+    let path = folder.path().join("one.bvh");
+    let loaded = Format::open_detected(&path, &ReadOptions::default()).unwrap();
+    let mut set = loaded.clips[0].set.select([2, 0, 1]).unwrap();
+    let pushed = c_set(&set);
+    done(push(library, pushed, None));
+    done(tumble_set_free(pushed));
+    set.set_name(1, "pelvis").unwrap();
+    let pushed = c_set(&set);
+    let refused = push(library, pushed, None);
+    fails(
+        refused,
+        TumbleResult::InvalidInput,
+        "the library has a joint `hip`, the clip has none",
+    );
+    done(tumble_set_free(pushed));
+
+    let engine = cpu();
+    let crowd = c_crowd(engine, library, (3, 1));
+    for clip in 0..3 {
+        let layer = TumbleCrowdLayer {
+            instance: clip,
+            clip,
+            time: 705_600 / 2,
+            ..still()
+        };
+        done(set_layers(crowd, &[layer]));
+    }
+    let found = bits(crowd, CrowdOutput::from(CrowdValues::Model), false);
+    let each: Vec<_> = found.chunks_exact(found.len() / 3).collect();
+    assert_eq!(each[0], each[1]);
+    assert_eq!(each[0], each[2]);
+    done(tumble_crowd_free(crowd));
+    done(tumble_engine_free(engine));
+    done(tumble_crowd_library_free(library));
+    for file in [one, other, chain] {
+        done(tumble_file_free(file));
+    }
 }
 
 /// A file's clips, all of the same joints, as a library.

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use tumble::FrameRate;
-use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
+use tumble_formats::adjust::{JointOffsets, UpAxis, adjust_all, set_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
@@ -16,7 +16,6 @@ use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOpti
 
 use crate::arguments::options::{AppliesTo, OPTIONS};
 use crate::arguments::output::one_of;
-use crate::arguments::time::times;
 use crate::messages::exit::{self, Failure};
 use crate::messages::names;
 
@@ -60,7 +59,7 @@ pub(crate) struct ReadingArguments {
     #[arg(skip)]
     names_method: OnceLock<()>,
     /// The offset of each joint from its parent, for SMPL bodies, whose files do not store it: a text
-    /// file with x y z per line, in the order of the joints
+    /// file with `x y z` per line, in the order of the joints, or `name x y z` in any order
     #[arg(long, value_name = "FILE")]
     offsets: Option<PathBuf>,
     /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one per gender: the offsets of joints
@@ -259,9 +258,10 @@ impl ReadingArguments {
             choose(loaded, requested, path)?;
         }
         if let Some(file) = &self.offsets {
-            let offsets = times(file)?;
+            let offsets = JointOffsets::open(file);
+            let offsets = offsets.map_err(|fault| Failure::input(&fault, ""))?;
             for clip in &mut loaded.clips {
-                set_offsets(clip, &offsets).map_err(|error| {
+                offsets.set(clip).map_err(|error| {
                     let message = format!("{}: {error}", names::input(path));
                     let file = file.display().to_string();
                     Failure::input(&Diagnostic::new(file, Code::Offsets, message), "")

@@ -9,7 +9,7 @@ use tumble::{Channel, EulerSequence, FrameRate};
 
 use crate::bvh::{BvhChannel, angles};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError};
+use crate::format::{MotionOptions, WriteError, no_offsets};
 use crate::motion::SampledClip;
 use crate::names::line_name;
 use crate::origin::coordinate;
@@ -100,7 +100,8 @@ pub(super) fn write_motion(
         text.push('\n');
         out.write_all(text.as_bytes())?;
     }
-    Ok(warnings.into_list())
+    let unplaced = no_offsets(sampled.clip, options);
+    Ok(unplaced.into_iter().chain(warnings.into_list()).collect())
 }
 
 /// The frame time in seconds, with the fewest digits. Zeros are appended if these digits alone would be read as

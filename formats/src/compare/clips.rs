@@ -1,15 +1,16 @@
 //! Compares two clips at the same sample times.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::reference::angle_between;
-use tumble::{Channel, Engine, SampleTimes};
+use tumble::{Channel, Engine, JointMatchError, Joints, SampleTimes};
 
 use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
 use crate::motion::Motion;
+use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::world;
 
@@ -137,8 +138,8 @@ impl ClipPair<'_> {
     /// poses are relative to the world, otherwise to the parents.
     ///
     /// # Errors
-    /// When no track of one clip corresponds to a track of the other, when a clip cannot be sampled, or when poses in
-    /// the world cannot be computed.
+    /// When no track of one clip corresponds to a track of the other, when a track has another parent and the poses are
+    /// relative to the parents, when a clip cannot be sampled, or when poses in the world cannot be computed.
     pub fn differences(
         &self,
         engine: &Engine,
@@ -147,6 +148,10 @@ impl ClipPair<'_> {
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
         let (pairs, missing) = self.tracks()?;
+        if !in_world {
+            self.check_parents(motions)?;
+            self.check_spaces()?;
+        }
         let (first, of_first) = poses(engine, inputs[0], motions[0], frames, in_world)?;
         let shift = self.shift();
         let moved;
@@ -230,55 +235,104 @@ impl ClipPair<'_> {
         (first.time_offset - second.time_offset) as f64
     }
 
-    /// Pairs of corresponding tracks, and the names of the tracks that only one clip has. Tracks correspond by name
-    /// if the names within each clip are distinct and at least one occurs in both clips; otherwise by index.
+    /// Refuses rotations relative to the parents beside rotations relative to the world.
+    fn check_spaces(&self) -> Result<(), CompareError> {
+        let [first, second] = self.clips.map(|clip| clip.is_world);
+        let has_parents = |clip: &&Motion| clip.skeleton.iter().any(|joint| joint.parent.is_some());
+        if first == second || !self.clips.iter().any(has_parents) {
+            return Ok(());
+        }
+        let world = usize::from(second);
+        Err(CompareError::Spaces {
+            world: self.inputs[world].to_owned(),
+            local: self.inputs[1 - world].to_owned(),
+        })
+    }
+
+    /// What is assumed to compare the clips, for a warning: that two tracks are the same although their names differ,
+    /// because each clip has one track. `None` if nothing is assumed.
+    #[must_use]
+    pub fn assumption(&self) -> Option<String> {
+        let [first, second] = self.clips.map(|clip| {
+            let name = clip.set.get(0)?.name?;
+            // What a trajectory is called when it is read is no name that it had.
+            (name != TRAJECTORY_TRACK && clip.set.track_count() == 1).then_some(name)
+        });
+        let (first, second) = (first?, second?);
+        (first != second).then(|| {
+            format!(
+                "`{first}` of {} is compared with `{second}` of {}: each has one track",
+                self.inputs[0], self.inputs[1]
+            )
+        })
+    }
+
+    /// Refuses tracks of `parts` whose parents in these clips are not the same: rotations relative to other parents
+    /// cannot be compared. `parts` are selected tracks of these clips, or all of them.
+    ///
+    /// # Errors
+    /// The first track with another parent.
+    pub fn check_parents(&self, parts: [&Motion; 2]) -> Result<(), CompareError> {
+        let joints = self.clips.map(Motion::joints);
+        let selected = parts.map(|part| -> HashSet<String> {
+            let tracks = 0..part.set.track_count();
+            tracks.map(|track| part.set.track_name(track)).collect()
+        });
+        let (all, _) = self.pairs(&joints)?;
+        let is_selected = |pair: &&[usize; 2]| {
+            (0..2).all(|side| selected[side].contains(&joints[side].names()[pair[side]]))
+        };
+        let some: Vec<[usize; 2]> = all.iter().filter(is_selected).copied().collect();
+        joints[0].check_parents(&joints[1], &some, &all, self.inputs)?;
+        Ok(())
+    }
+
+    /// Pairs of corresponding tracks, and the tracks that only one clip has.
+    fn pairs(&self, joints: &[Joints; 2]) -> Result<TrackPairs, JointMatchError> {
+        let none = || [Vec::new(), Vec::new()];
+        // Two tracks need no name to tell them apart.
+        if joints.iter().all(|side| side.len() == 1) {
+            return Ok((vec![[0, 0]], none()));
+        }
+        // Formats without room for a name that occurs twice number it.
+        let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
+        if first == second {
+            return Ok(((0..first.len()).map(|track| [track; 2]).collect(), none()));
+        }
+        let found = joints[0].pairs(&joints[1], self.inputs)?;
+        Ok((found.pairs, found.missing))
+    }
+
+    /// Pairs of tracks of the same name, and the names of the tracks that only one clip has.
     #[expect(
         clippy::type_complexity,
         reason = "pairs, and a list of names for each side"
     )]
     fn tracks(&self) -> Result<(Vec<[usize; 2]>, [Vec<String>; 2]), CompareError> {
-        let names = self.clips.map(|clip| {
-            let set = &clip.set;
-            let all: Vec<String> = (0..set.track_count())
-                .map(|track| set.track_name(track))
-                .collect();
-            all
-        });
-        let indices = |side: usize| -> HashMap<&str, usize> {
-            let all = names[side].iter().enumerate();
-            all.map(|(index, name)| (&**name, index)).collect()
-        };
-        let by_name = [indices(0), indices(1)];
-        let distinct = (0..2).all(|side| by_name[side].len() == names[side].len());
-        let common: Vec<[usize; 2]> = (names[0].iter().enumerate())
-            .filter_map(|(first, name)| Some([first, *by_name[1].get(&**name)?]))
-            .collect();
-        if distinct && !common.is_empty() {
-            let missing = |side: usize| {
-                let other = &by_name[1 - side];
-                let lone = names[side]
-                    .iter()
-                    .filter(|name| !other.contains_key(&***name));
-                lone.cloned().collect()
-            };
-            let missing = [missing(0), missing(1)];
-            return Ok((common, missing));
-        }
-        match names[0].len() == names[1].len() && !names[0].is_empty() {
-            true => {
-                let all = 0..names[0].len();
-                Ok((
-                    all.map(|index| [index; 2]).collect(),
-                    [Vec::new(), Vec::new()],
-                ))
-            }
-            false => Err(CompareError::NoTrackInBoth {
+        let joints = self.clips.map(Motion::joints);
+        let (pairs, missing) = self.pairs(&joints)?;
+        if pairs.is_empty() {
+            let error = joints[0].order_of(&joints[1], self.inputs).err();
+            return Err(CompareError::NoTrackInBoth {
                 inputs: self.inputs.map(str::to_owned),
-                tracks: [0, 1].map(|side| names[side].len()),
-            }),
+                tracks: joints.map(|side| side.len()),
+                near: error.and_then(|error| match error {
+                    JointMatchError::Missing { name, near, .. } => Some([name, near?]),
+                    _ => None,
+                }),
+            });
         }
+        let names = [0, 1].map(|side| {
+            let lone = missing[side].iter();
+            lone.map(|&track| joints[side].names()[track].clone())
+                .collect()
+        });
+        Ok((pairs, names))
     }
 }
+
+/// Pairs of tracks, and the tracks that only one of two clips has.
+type TrackPairs = (Vec<[usize; 2]>, [Vec<usize>; 2]);
 
 /// All poses of a clip, and the origin to add to the translations of each track.
 fn poses(

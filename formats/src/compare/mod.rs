@@ -5,7 +5,7 @@ mod clips;
 mod paths;
 mod tally;
 
-use tumble::Error;
+use tumble::{Error, JointMatchError};
 
 use crate::world::HierarchyError;
 
@@ -16,20 +16,53 @@ pub use crate::compare::paths::{
 };
 pub use crate::compare::tally::Spread;
 
+fn hint(near: Option<&[String; 2]>) -> String {
+    near.map_or_else(String::new, |[first, second]| {
+        format!(" (`{first}` and `{second}` are near, but only equal names match)")
+    })
+}
+
+fn in_world(error: &JointMatchError) -> &'static str {
+    match error {
+        JointMatchError::Parent { .. } => "; compare them in the world with --world",
+        _ => "",
+    }
+}
+
 /// Why two inputs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompareError {
     /// No track of one clip corresponds to a track of the other.
     #[error(
-        "{} and {}: have {} and {} tracks, none of the same name; --tracks chooses some",
-        inputs[0], inputs[1], tracks[0], tracks[1]
+        "{} and {}: have {} and {} tracks, none of the same name{}; --tracks chooses some",
+        inputs[0], inputs[1], tracks[0], tracks[1], hint(near.as_ref())
     )]
     NoTrackInBoth {
         /// Names of the clips in messages.
         inputs: [String; 2],
         /// Number of tracks of each clip.
         tracks: [usize; 2],
+        /// A name of each clip that differ only in case, separators or a prefix.
+        near: Option<[String; 2]>,
+    },
+    /// The names do not tell the tracks apart, or a track has another parent.
+    #[error("{error}{}", in_world(error))]
+    Joints {
+        /// The first difference.
+        #[from]
+        error: JointMatchError,
+    },
+    /// The rotations of one clip are relative to the world, those of the other to the parents.
+    #[error(
+        "the rotations of {world} are relative to the world, those of {local} to the parents; compare them in the world \
+         with --world"
+    )]
+    Spaces {
+        /// Name of the first of these clips in messages.
+        world: String,
+        /// Name of the second.
+        local: String,
     },
     /// The time spans of the clips do not overlap.
     #[error(

@@ -73,6 +73,13 @@ impl Format {
     }
 }
 
+/// The warning that the joints of a clip have no offsets, for formats that cannot store this.
+pub(crate) fn no_offsets(clip: &Motion, options: &MotionOptions) -> Option<Diagnostic> {
+    let reason = clip.no_world.as_ref().filter(|_| clip.lacks_offsets())?;
+    let message = format!("{reason}; without them all joints are written at their parents");
+    Some(Diagnostic::new(&options.name, Code::NoOffsets, message))
+}
+
 /// Refuses samples whose times do not increase: no reader of clips takes such a file.
 pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
     // Where a clip's keys are written, the samples are none.

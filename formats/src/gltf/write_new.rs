@@ -15,7 +15,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, Quantization, WriteError};
+use crate::format::{MotionOptions, Quantization, WriteError, no_offsets};
 use crate::gltf::write_new::binary::{AccessorData, Binary};
 use crate::gltf::write_new::json::{
     Animation, Asset, Buffer, Channel, MESHOPT, Root, Sampler, Scene, Skin, Target,
@@ -124,7 +124,11 @@ pub fn write_new(
         write_glb(json, &chunk, length, &mut out)?;
     }
     out.flush()?;
-    Ok(moved_starts(clips, options))
+    let unplaced = clips.iter().find_map(|clip| no_offsets(clip.clip, options));
+    Ok(unplaced
+        .into_iter()
+        .chain(moved_starts(clips, options))
+        .collect())
 }
 
 /// Warnings about clips whose times count from whole seconds that an f32 cannot store in addition.

@@ -62,11 +62,27 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     let model = Model::read(&archive)?;
     let joints = model.joints(&archive, &shape.betas)?;
     let tracks = clip.skeleton.len();
-    let is_same = |track: usize| model.parents.get(track) == Some(&clip.skeleton[track].parent);
-    if tracks > joints.len() || !(0..tracks).all(is_same) {
+    // Models number their joints and do not name them, and all models begin with the joints of a body.
+    let differs = |track: &usize| model.parents.get(*track) != Some(&clip.skeleton[*track].parent);
+    if let Some(track) = (0..tracks).find(differs) {
+        let called = |parent: Option<usize>| match parent {
+            None => "is a root".to_owned(),
+            Some(parent) => {
+                let name = clip.set.track_name(parent);
+                format!("has the parent {parent} (`{name}`)")
+            }
+        };
+        let in_model = model.parents.get(track).copied();
         let message = format!(
-            "the model has {} joints that have other parents than the {tracks} of the motion",
-            joints.len()
+            "the model has other joints than the motion: {} joints, not {tracks} or more with the same parents; joint \
+             {track} (`{}`) of the motion {}, {}",
+            joints.len(),
+            clip.set.track_name(track),
+            called(clip.skeleton[track].parent),
+            in_model.map_or_else(
+                || "which the model does not have".to_owned(),
+                |parent| format!("that of the model {}", called(parent))
+            )
         );
         return Err(Diagnostic::new(&name, Code::BodyModel, message));
     }

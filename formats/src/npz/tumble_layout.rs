@@ -11,12 +11,13 @@ use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, read_numbers};
 use crate::quaternion::ComponentOrder;
 
 /// Arrays of the layout that do not contain keys: data of the clip that do not depend on frames.
-pub(crate) const CONSTANTS: [&str; 8] = [
+pub(crate) const CONSTANTS: [&str; 9] = [
     "name",
     "names",
     "parents",
     "rest",
     "is_world",
+    NO_WORLD,
     SAMPLERS,
     BVH_CHANNELS,
     END_SITES,
@@ -25,6 +26,9 @@ pub(crate) const CONSTANTS: [&str; 8] = [
 /// The array with the interpolation of rotation, translation and scale of each track: `STEP`, `LINEAR`, or empty for
 /// a channel at rest.
 pub(crate) const SAMPLERS: &str = "samplers";
+
+/// The text that says why poses in the world cannot be computed.
+pub(crate) const NO_WORLD: &str = "no_world";
 
 /// The array with the BVH channels of each track: `Zrotation Xrotation Yrotation`.
 pub(crate) const BVH_CHANNELS: &str = "bvh_channels";
@@ -67,11 +71,13 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
     if let Some(member) = archive.find("is_world") {
         plan.is_world = read_numbers(archive, member)? == [1.0];
     }
-    if let Some(array) = archive.array_named("name")? {
-        plan.name = array
-            .texts()
-            .ok()
-            .and_then(|texts| texts.into_iter().next());
+    for (name, text) in [("name", &mut plan.name), (NO_WORLD, &mut plan.no_world)] {
+        if let Some(array) = archive.array_named(name)? {
+            *text = array
+                .texts()
+                .ok()
+                .and_then(|texts| texts.into_iter().next());
+        }
     }
     Ok(Some(plan))
 }

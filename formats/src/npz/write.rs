@@ -193,6 +193,7 @@ pub(super) fn notes(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> i
 ///   origins are added;
 /// - `names` and `name`, of the tracks and of the clip; `is_world`, if poses are relative to the world;
 /// - `parents`, and `rest` (tracks, 10) as `tx ty tz x y z w sx sy sz` if the skeleton has a rest pose;
+/// - `no_world`, a text, if poses in the world cannot be computed, such as those of a body whose offsets are unknown;
 /// - `samplers` (tracks, 3), if the clip specifies how its channels are interpolated;
 /// - `bvh_channels` (tracks) and `end_sites` (sites, track x y z) of clips from BVH;
 /// - one text for each note on how the samples were made.
@@ -253,6 +254,9 @@ pub fn write_npz(
     if clip.is_world {
         let truth = (&Element::Unsigned(1), &[][..]);
         members.numbers("is_world.npy", truth, false, |put| put(1.0))?;
+    }
+    if let Some(reason) = &clip.no_world {
+        members.texts(&format!("{}.npy", tumble_layout::NO_WORLD), &[reason], &[])?;
     }
     if let Some(name) = &clip.name {
         members.texts("name.npy", &[name], &[])?;

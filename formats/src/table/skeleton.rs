@@ -17,6 +17,9 @@ struct SkeletonNote {
     parents: Vec<Option<usize>>,
     /// For each track, its rest position relative to its parent.
     offsets: Vec<[f64; 3]>,
+    /// Why poses in the world cannot be computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    no_world: Option<String>,
 }
 
 /// The metadata of a clip's skeleton; `None` if no joint has a parent and all rest at 0.
@@ -33,6 +36,7 @@ pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String
         tracks: distinct_names(&clip.set),
         parents: joints().map(|(_, joint)| joint.parent).collect(),
         offsets: joints().map(offset).collect(),
+        no_world: clip.no_world.clone(),
     };
     // Text and finite numbers: there is nothing that JSON has not.
     let text = serde_json::to_string(&hierarchy).ok()?;
@@ -49,6 +53,7 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
         tracks,
         parents,
         offsets,
+        no_world,
     }) = hierarchy
     else {
         return;
@@ -87,6 +92,7 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
     let parents: Vec<Option<usize>> = skeleton.iter().map(|joint| joint.parent).collect();
     if circle(&parents).is_none() {
         motion.skeleton = skeleton;
+        motion.no_world = no_world;
     }
 }
 

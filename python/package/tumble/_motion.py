@@ -63,10 +63,15 @@ class MotionState:
 class MotionLibrary:
     """Clips of one skeleton, of many lengths and rates, each instance at a time of its own.
 
-    `clips`: a list of `Clip`s with the same tracks. `method`: by which they are interpolated, as that of
-    `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks; else that of
-    the first clip. `names`: of the clips; else their own, or their files'.
-    `engine`: whose threads work, else one that all calls share.
+    `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no
+    clip has names, and another name, number or parent is refused. `method`: by which they are interpolated, as that
+    of `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
+    clip; its offsets are then those of all clips. Without it the skeleton is that of the first clip, and each clip
+    keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`).
+    `names`: of the clips; else their own, or their files'. `engine`: whose threads work, else one that all calls share.
+
+    A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
+    velocities are refused.
 
     Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to
     two minutes); before 0 and behind the end of a clip its ends are held.
@@ -99,17 +104,12 @@ class MotionLibrary:
         clips = list(clips)
         if not clips:
             raise InputError("clips: give at least one")
-        parents, offsets = _skeleton_of(clips[0] if skeleton is None else skeleton)
-        for index, clip in enumerate(clips):
-            if len(clip) != len(parents):
-                message = f"{len(clip)} tracks; the skeleton has {len(parents)} joints"
-                raise InputError(f"{clip.path or f'clips[{index}]'}: {message}")
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
         self.names = list(names) if names is not None else [_name(clip) for clip in clips]
         self.lengths = np.array([clip.duration for clip in clips])
         self.rates = np.array([_rate(clip) for clip in clips])
-        self._motions = Motions.of_clips(clips, parents, offsets.tolist(), method)
+        self._motions = Motions.of_clips(clips, *_skeleton_of(skeleton), method)
         self._engine = engine if engine is not None else Engine()
         self._method = method
         self._file: str | None = None
@@ -211,6 +211,8 @@ class MotionLibrary:
         last = np.maximum(np.round(lengths * rates) - 1, 0)
         first = np.minimum(first, last)
         names: list[_Name] = ["positions", "world_rotations"]
+        if out.velocities is None:
+            names.remove("positions")
         before = self.sample(ids, first / rates, arrays=names)
         after = self.sample(ids, (first + 1) / rates, arrays=names)
         each = rates[:, None, None].astype(np.float32)
@@ -300,6 +302,8 @@ class MotionLibrary:
             "names": np.array(self.names, dtype=np.str_),
             "lengths": self.lengths,
             "rates": self.rates,
+            "joint_names": np.array(self.joint_names, dtype=np.str_),
+            "unplaced": np.array(self._motions.unplaced, dtype=np.str_),
         }
         return {**about, **self._motions.arrays()}
 
@@ -317,6 +321,11 @@ class MotionLibrary:
         return self._motions.joints
 
     @property
+    def joint_names(self) -> list[str]:
+        """The names of the joints, in the order of all arrays: those of the skeleton."""
+        return self._motions.joint_names
+
+    @property
     def method(self) -> str:
         """The method by which the clips are interpolated."""
         return self._method
@@ -330,19 +339,17 @@ def _opened(file: str, engine: Engine) -> MotionLibrary:
     return MotionLibrary.open(file, engine=engine)
 
 
-def _skeleton_of(skeleton: _Skeleton) -> tuple[list[int], NDArray[np.float32]]:
+def _skeleton_of(
+    skeleton: _Skeleton | None,
+) -> tuple[Clip | None, tuple[list[int], list[list[float]]] | None]:
+    """A clip, or the parents and offsets of joints."""
+    if skeleton is None or isinstance(skeleton, Clip):
+        return skeleton, None
     if isinstance(skeleton, tuple):
         joint_parents, offsets = skeleton
         parents = [-1 if parent is None else int(parent) for parent in joint_parents]
-        return parents, np.asarray(offsets, np.float32).reshape(len(parents), 3)
-    clip = skeleton if isinstance(skeleton, Clip) else load(skeleton)[0]
-    if clip.parents is None or clip.offsets is None:
-        raise InputError(
-            "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, "
-            "or (parents, offsets)"
-        )
-    parents = [-1 if parent is None else parent for parent in clip.parents]
-    return parents, np.asarray(clip.offsets, np.float32)
+        return None, (parents, np.asarray(offsets, np.float32).reshape(len(parents), 3).tolist())
+    return load(skeleton)[0], None
 
 
 def _name(clip: Clip) -> str:

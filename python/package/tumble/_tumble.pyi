@@ -1110,8 +1110,8 @@ class Motions:
     @staticmethod
     def of_clips(
         clips: Sequence[Clip],
-        parents: Sequence[int],
-        offsets: Sequence[Sequence[float]],
+        skeleton: Clip | None,
+        arrays: tuple[Sequence[int], Sequence[Sequence[float]]] | None,
         method: str,
     ) -> Motions: ...
     @staticmethod
@@ -1119,6 +1119,10 @@ class Motions:
     def arrays(self) -> dict[str, Any]: ...
     @property
     def joints(self) -> int: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def unplaced(self) -> list[str]: ...
     def sample(
         self,
         engine: Engine,

@@ -2,6 +2,7 @@
 
 mod text;
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use clap::Args;
@@ -28,8 +29,8 @@ use crate::messages::{listing, names, words};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway
-between neighbouring keys, or at the frames of --fps; tracks are matched by name, or by index
-if the names differ. Two NPY files are compared number by number, and by angles if they contain
+between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only
+if neither file has names; joints with other parents are compared with --world alone. Two NPY files are compared number by number, and by angles if they contain
 rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these
 options it is also 8 if a track is missing in one of the motions.
 With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. It is
@@ -105,6 +106,35 @@ fn refused(error: CompareError) -> Failure {
     }
 }
 
+/// For each animation of a file, the index of the one of the same name in another file that has as many; of the same
+/// index if each file has one, or their names are equal in the same order.
+fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Failure> {
+    let all = clips.map(|clips| -> Vec<Option<&str>> {
+        clips.iter().map(|clip| clip.name.as_deref()).collect()
+    });
+    if all[0].len() == 1 || all[0] == all[1] {
+        return Ok((0..all[0].len()).collect());
+    }
+    let partner = |(index, name): (usize, &Option<&str>)| {
+        let count = |side: usize| all[side].iter().filter(|other| *other == name).count();
+        let same = all[1].iter().position(|other| other == name);
+        let found = same.filter(|_| name.is_some() && count(0) == 1 && count(1) == 1);
+        found.ok_or_else(|| {
+            let message = format!(
+                "{} {} is not exactly one animation of {}; choose one of each (--animation)",
+                names::input(paths[0]),
+                names::clip(&clips[0][index]),
+                names::input(paths[1])
+            );
+            Failure::new(ALL_INPUTS, message)
+        })
+    };
+    let partners: Vec<usize> = (all[0].iter().enumerate())
+        .map(partner)
+        .collect::<Result<_, _>>()?;
+    Ok(partners)
+}
+
 /// The heading of the options for trajectories in help.
 const TRAJECTORIES: &str = "Trajectories";
 
@@ -177,18 +207,17 @@ impl Arguments {
         ];
         let names = paths.map(names::input);
         let track = |clip: &Motion, name: &str| {
-            let chosen = self.inputs.tracks.select(clip, name)?;
-            let [track] = &chosen.set.tracks().collect::<Vec<_>>()[..] else {
+            let all = || (0..clip.set.track_count()).collect();
+            let chosen = self.inputs.tracks.of(clip, name)?.unwrap_or_else(all);
+            // Its position depends on all its ancestors, so that they are kept.
+            let &[track] = &chosen[..] else {
                 let message = format!(
                     "{name}: has {}; a path is one, choose it with --tracks",
-                    words::count(chosen.set.track_count(), "track")
+                    words::count(chosen.len(), "track")
                 );
                 return Err(Failure::new(ALL_INPUTS, message));
             };
-            // Its position depends on all its ancestors.
-            let all = clip.set.tracks();
-            let index = all.enumerate().find(|(_, other)| other.name == track.name);
-            Ok(index.map_or(0, |(index, _)| index))
+            Ok(track)
         };
         let tracks = [
             track(&first.clip, &names[0])?,
@@ -260,38 +289,63 @@ impl Arguments {
                 ),
             ));
         }
+        let partner = partners(paths, [&loaded[0].clips, &loaded[1].clips])?;
         let engine = Engine::new(Device::Cpu)
             .map_err(|error| Failure::evaluating(&names::input(paths[0]), &error))?;
         let mut found = Vec::new();
         for (index, first) in loaded[0].clips.iter().enumerate() {
-            // Of the same name, else of the same index.
-            let same = |clip: &&Motion| first.name.is_some() && clip.name == first.name;
-            let second = loaded[1].clips.iter().find(same);
-            let second = second.unwrap_or(&loaded[1].clips[index]);
+            let second = &loaded[1].clips[partner[index]];
             let names =
                 [(paths[0], first), (paths[1], second)].map(|(path, clip)| match counts[0] {
                     1 => names::input(path),
                     _ => format!("{} {}", names::input(path), names::clip(clip)),
                 });
-            let tracks = &self.inputs.tracks;
-            let select = |clip, name: &str| match self.world {
-                true => tracks.select_with_ancestors(clip, name),
-                false => tracks.select(clip, name),
-            };
-            let selected = [select(first, &names[0])?, select(second, &names[1])?];
-            let pair = ClipPair {
-                inputs: [&names[0], &names[1]],
-                clips: [&selected[0], &selected[1]],
-            };
+            let inputs = [&*names[0], &names[1]];
+            let selected = [
+                self.select(first, inputs[0])?,
+                self.select(second, inputs[1])?,
+            ];
+            let clips = [&*selected[0], &selected[1]];
+            if !self.world {
+                let whole = ClipPair {
+                    inputs,
+                    clips: [first, second],
+                };
+                whole.check_parents(clips).map_err(refused)?;
+            }
+            let pair = ClipPair { inputs, clips };
             found.push(self.differences(&engine, pair)?);
         }
         Ok((found, rest))
     }
 
+    /// The selected tracks of a clip, with names, so that tracks without names keep those that they are selected by.
+    fn select<'a>(&self, clip: &'a Motion, name: &str) -> Result<Cow<'a, Motion>, Failure> {
+        let tracks = &self.inputs.tracks;
+        let mut selected = match self.world {
+            true => tracks.select_with_ancestors(clip, name)?,
+            false => tracks.select(clip, name)?,
+        };
+        if let Some(indices) = tracks.of(clip, name)? {
+            let indices = match self.world {
+                true => clip.with_ancestors(&indices),
+                false => indices,
+            };
+            for (track, index) in indices.into_iter().enumerate() {
+                let named = selected
+                    .to_mut()
+                    .set
+                    .set_name(track, clip.set.track_name(index));
+                named.map_err(|error| Failure::evaluating(name, &error.into()))?;
+            }
+        }
+        Ok(selected)
+    }
+
     /// The differences of two clips at the frames that are asked for.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
-        if let Some(warning) = &common.warning {
+        for warning in common.warning.iter().chain(&pair.assumption()) {
             words::warning(warning);
         }
         // The times are those of the first clip.

@@ -1,0 +1,215 @@
+"""Clips are combined by the names of their joints: the result is the same motion, or a refusal."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from conftest import unit
+
+import tumble
+
+NAMES = ["hip", "left", "right", "left toe", "right toe"]
+PARENTS = [None, 0, 0, 1, 2]
+OFFSETS = np.array([[0, 1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 2], [0, 0, 3]], np.float32)
+ORDERS = [[0, 2, 1, 4, 3], [4, 3, 2, 1, 0], [1, 3, 0, 2, 4]]
+TIMES = np.arange(4) / 30
+
+
+def made(keys, order=range(5), times=TIMES, names=NAMES, parents=PARENTS, offsets=OFFSETS, root=None):
+    """The clip with its joints in another order."""
+    order = list(order)
+    moved = {} if root is None else {"translations": [root if joint == 0 else None for joint in order]}
+    return tumble.Clip(
+        times,
+        keys[order],
+        names=None if names is None else [names[joint] for joint in order],
+        parents=[None if parents[joint] is None else order.index(parents[joint]) for joint in order],
+        offsets=None if offsets is None else offsets[order],
+        **moved,
+    )
+
+
+@pytest.fixture
+def keys(rng):
+    return unit(rng, 5, 4)
+
+
+def states(clips, times, **options):
+    ids = np.repeat(np.arange(len(clips)), len(times))
+    state = tumble.MotionLibrary(clips, **options).sample(ids, np.tile(times, len(clips)))
+    return state.positions.reshape(len(clips), len(times), 5, 3), state.rotations.reshape(len(clips), len(times), 5, 4)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_other_orders_are_the_same_motion(keys, rng, order):
+    root = rng.normal(size=(4, 3))
+    first, other = made(keys, root=root), made(keys, order, root=root)
+    times = np.linspace(0, 0.1, 7)
+    positions, rotations = states([first, other], times)
+    assert np.array_equal(positions[0], positions[1]) and np.array_equal(rotations[0], rotations[1])
+    expected = tumble.Engine("cpu").world(first, at=times, layout="frame", method="slerp")[0]
+    np.testing.assert_allclose(positions[0], expected, atol=2e-6)
+    # The order of the result is that of the first clip, or of the skeleton.
+    library = tumble.MotionLibrary([other, first])
+    assert library.joint_names == other.names
+    again = tumble.MotionLibrary([other], skeleton=first)
+    assert again.joint_names == NAMES
+    assert np.array_equal(again.sample([0] * 7, times).positions, positions[0])
+
+    crowd = tumble.Crowd([first, other], 2)
+    crowd.set([0, 1], [0, 1], time=0.05, wrap="hold")
+    for values in ["model", "local", "rotations"]:
+        a, b = crowd.evaluate(values)
+        assert np.array_equal(a, b), values
+    for world in [False, True]:
+        found = tumble.compare(first, other, world=world)
+        assert (found.tracks, found.missing) == (5, ([], [])) and found.rotation.largest == 0
+        assert found.identical == found.tracks * found.samples
+
+
+def test_other_clocks_and_rates_are_the_same_motion(keys):
+    # The same keys on another clock, and every second of them.
+    first, later = made(keys), made(keys, ORDERS[1], times=TIMES + 1e9)
+    coarse = made(keys[:, ::2], ORDERS[0], times=TIMES[::2])
+    positions, rotations = states([first, later, coarse], [0.0, 2 / 30])
+    np.testing.assert_allclose(positions[1], positions[0], atol=1e-5)
+    assert np.array_equal(rotations[2], rotations[0]) and np.array_equal(positions[2], positions[0])
+
+
+@pytest.mark.parametrize("ending", ["npz", "bvh", "glb", "gltf", "parquet"])
+def test_a_clip_and_its_files_are_one_motion(keys, tmp_path, ending):
+    shuffled = made(keys, ORDERS[1])
+    path = tmp_path / f"clip.{ending}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        tumble.save(path, shuffled, fps=30, method="slerp")
+        found = tumble.load(path)[0]
+        positions, rotations = states([shuffled, found], TIMES)
+    np.testing.assert_allclose(positions[1], positions[0], atol=1e-5)
+    assert np.abs((rotations[0] * rotations[1]).sum(-1)).min() > 1 - 1e-6
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert tumble.compare(shuffled, found, at=TIMES).rotation.largest < 1e-3
+
+
+def differing(keys):
+    """Clips with other joints, and what is said of them."""
+    return [
+        (made(keys, names=["Hip", "Left", "Right", "Left_Toe", "Right_Toe"]), "`hip`.*`Hip`"),
+        (made(keys, names=["rig:hip", *NAMES[1:]]), "joint `hip`.*`rig:hip` is near, but only equal names match"),
+        (made(keys, parents=[None, 0, 0, 1, 0]), "`right toe` has the parent `right` in .*, but has the parent `hip`"),
+        (made(keys, parents=[None, None, 0, 1, 2]), "`left` has the parent `hip` in .*, but is a root in "),
+        (made(keys, parents=[1, None, 0, 1, 2]), "`hip` is a root in .*, but has the parent `left`"),
+        (made(keys, names=["hip", "left", "left", "left toe", "right toe"]), "two joints `left`"),
+        (made(keys, names=None), "names; name both, or neither to match them by index|none of the same name"),
+        (tumble.Clip(TIMES, keys[:1], names=["hip"], parents=[None]), "joint `left`.* none of that name$"),
+    ]
+
+
+def test_other_joints_are_refused(keys):
+    first = made(keys)
+    for other, words in differing(keys):
+        for combine in [
+            lambda: tumble.MotionLibrary([first, other]),
+            lambda: tumble.MotionLibrary([other], skeleton=first),
+            lambda: tumble.Crowd([first, other], 1),
+        ]:
+            with pytest.raises(tumble.InputError, match=words):
+                combine()
+        # Tracks of one of the clips alone are listed.
+        if len(other) == 5 and "rig" not in words:
+            with pytest.raises(tumble.InputError, match=words):
+                tumble.compare(first, other)
+    with pytest.raises(tumble.InputError, match=re.escape("joint `extra`")):
+        more = tumble.Clip(
+            TIMES, keys[[0, 1, 2, 3, 4, 0]], names=[*NAMES, "extra"], parents=[*PARENTS, 0], offsets=np.ones((6, 3))
+        )
+        tumble.MotionLibrary([first, more])
+    # Both without names: by index, and as many.
+    unnamed = made(keys, names=None)
+    positions, _ = states([unnamed, made(keys, names=None)], TIMES)
+    assert np.array_equal(positions[0], positions[1])
+    with pytest.raises(tumble.InputError, match=re.escape("clips[1]: 4 tracks; the skeleton has 5 joints")):
+        tumble.MotionLibrary([unnamed, tumble.Clip(TIMES, keys[:4], parents=[None, 0, 0, 1], offsets=OFFSETS[:4])])
+    # Rotations relative to other parents are compared in the world.
+    other = made(keys, parents=[None, 0, 0, 1, 0])
+    with pytest.raises(tumble.InputError, match="compare them in the world with world=True"):
+        tumble.compare(first, other)
+    assert tumble.compare(first, other, world=True).tracks == 5
+
+
+def test_each_clip_keeps_its_offsets(keys):
+    small, large = made(keys), made(keys, ORDERS[0], offsets=2 * OFFSETS)
+    positions, _ = states([small, large], TIMES)
+    np.testing.assert_allclose(positions[1], 2 * positions[0], atol=1e-5)
+    crowd = tumble.Crowd([small, large], 2)
+    crowd.set([0, 1], [0, 1])
+    a, b = crowd.evaluate("model")[..., 3]
+    np.testing.assert_allclose(b, 2 * a, atol=1e-5)
+    # A skeleton that is chosen holds for all.
+    for skeleton in [small, (PARENTS, OFFSETS)]:
+        positions, _ = states([small, large], TIMES, skeleton=skeleton)
+        np.testing.assert_allclose(positions[1], positions[0], atol=1e-6)
+    with pytest.raises(tumble.InputError, match="`right toe` has the parent `hip` in the skeleton"):
+        tumble.MotionLibrary([small], skeleton=([None, 0, 0, 1, 0], OFFSETS))
+    scaled = tumble.Clip(TIMES, keys[:1], parents=[None], scales=[np.full((4, 3), 2.0)])
+    with pytest.raises(tumble.InputError, match="scale keys"):
+        tumble.MotionLibrary([scaled])
+
+
+@pytest.fixture
+def body(tmp_path):
+    path = tmp_path / "body.npz"
+    np.savez(path, poses=np.zeros((31, 156)), trans=np.tile([0.0, 1.0, 0.0], (31, 1)), mocap_framerate=30.0)
+    return path
+
+
+def test_joints_without_offsets_have_no_positions(body, keys, tmp_path):
+    clip = tumble.load(body).clip
+    unplaced = made(keys, offsets=None)
+    for clip, words in [(clip, "body_model"), (unplaced, "give `offsets`")]:
+        library = tumble.MotionLibrary([clip])
+        library.save(tmp_path / "library.npz")
+        for library in [library, tumble.MotionLibrary.open(tmp_path / "library.npz")]:
+            for arrays in [["positions"], ["rotations", "velocities"], tumble.MotionState.__slots__]:
+                with pytest.raises(tumble.InputError, match=words):
+                    library.sample([0], [0.05], arrays=arrays)
+            for finite in [False, True]:
+                arrays = ["rotations", "world_rotations", "angular_velocities"]
+                state = library.sample([0], [0.05], arrays=arrays, finite=finite)
+                assert np.isfinite(state.angular_velocities).all() and state.positions is None
+        crowd = tumble.Crowd([clip], 1)
+        assert crowd.evaluate("rotations").shape == (1, len(clip), 4)
+        for values in ["model", "local"]:
+            with pytest.raises(tumble.InputError, match=words):
+                crowd.evaluate(values)
+        with pytest.raises(tumble.InputError, match="offsets"):
+            tumble.Engine("cpu").world(clip, at=[0.0])
+        for ending in ["bvh", "glb"]:
+            with pytest.warns(tumble.InputWarning, match="W209.*all joints are written at their parents"):
+                tumble.save(tmp_path / f"clip.{ending}", clip, fps=30, method="slerp")
+        for ending in ["npz", "parquet"]:
+            tumble.save(tmp_path / f"clip.{ending}", clip, fps=30, method="slerp")
+            again = tumble.load(tmp_path / f"clip.{ending}").clip
+            with pytest.raises(tumble.InputError, match="offsets"):
+                tumble.Engine("cpu").world(again, at=[0.0])
+
+
+def test_a_skeleton_places_the_joints_of_a_body(body):
+    clip = tumble.load(body).clip
+    offsets = np.arange(3.0 * len(clip)).reshape(-1, 3)
+    placed = tumble.load(body, offsets=offsets).clip
+    expected = tumble.Engine("cpu").world(placed, at=[0.0], layout="frame")[0]
+    for skeleton in [placed, (clip.parents, offsets)]:
+        found = tumble.MotionLibrary([clip], skeleton=skeleton).sample([0], [0.0]).positions
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+    crowd = tumble.Crowd([clip], 1, parents=clip.parents, offsets=offsets)
+    np.testing.assert_allclose(crowd.evaluate("model")[..., 3], expected, rtol=1e-6)
+    # Beside a clip that has offsets, one without them has no positions still.
+    library = tumble.MotionLibrary([placed, clip])
+    np.testing.assert_allclose(library.sample([0], [0.0]).positions, expected, rtol=1e-6)
+    with pytest.raises(tumble.InputError, match="body_model"):
+        library.sample([0, 1], [0.0, 0.0])
