@@ -63,13 +63,19 @@ impl Inputs {
             )));
         }
         let gathered = GatheredInputs::new(&self.paths, self.files_from.as_deref())?;
-        let format = |path: PathBuf| match self.reading.from {
-            Some(format) => format,
-            None => Format::detected(&path),
-        };
-        let formats = || gathered.paths().into_iter().map(format);
-        self.reading.check(formats).map_err(Failure::usage)?;
+        let paths = gathered.paths();
+        self.check_formats(&paths.iter().collect::<Vec<_>>())?;
         Ok(gathered)
+    }
+
+    /// Refuses options that apply to none of these inputs.
+    pub(crate) fn check_formats(&self, paths: &[&PathBuf]) -> Result<(), Failure> {
+        let format = |path: &&PathBuf| match self.reading.from {
+            Some(format) => format,
+            None => Format::detected(path),
+        };
+        let formats = || paths.iter().map(format);
+        self.reading.check(formats).map_err(Failure::usage)
     }
 
     /// Whether an input is read with extra keys that follow its curves.
