@@ -49,6 +49,7 @@ pub static FORMAT: Format = Format {
     features: &[
         Feature::SeveralTracks,
         Feature::Quaternions,
+        Feature::Curves,
         Feature::BoxLength,
         Feature::UnevenTimes,
         Feature::Start,

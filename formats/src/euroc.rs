@@ -50,6 +50,7 @@ pub static FORMAT: Format = Format {
     features: &[
         Feature::Quaternions,
         Feature::Translations,
+        Feature::Curves,
         Feature::UnevenTimes,
         Feature::Start,
     ],

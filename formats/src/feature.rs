@@ -26,6 +26,9 @@ pub enum Feature {
     /// Channels that join their keys by straight lines and the shorter arcs. The keys of a file without this feature
     /// are interpolated by the method that the user chooses, by default a smooth one.
     Lines,
+    /// Keys without a stated interpolation, which are joined by the method that the user chooses, by default a smooth
+    /// one. The keys of a file without this feature are joined by straight lines and the shorter arcs.
+    Curves,
     /// The order of channels and the End Sites of BVH.
     Bvh,
     /// Poses relative to the world. For a format without this feature they are converted to poses relative to the
@@ -45,7 +48,7 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -56,6 +59,7 @@ impl Feature {
         Self::Scales,
         Self::Steps,
         Self::Lines,
+        Self::Curves,
         Self::Bvh,
         Self::World,
         Self::BoxLength,
@@ -67,7 +71,7 @@ impl Feature {
 
     /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 11] = [
+    pub(crate) const OF_TABLES: [Self; 12] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -75,6 +79,7 @@ impl Feature {
         Self::Skeleton,
         Self::Translations,
         Self::Scales,
+        Self::Curves,
         Self::World,
         Self::SeveralClips,
         Self::UnevenTimes,
@@ -95,6 +100,7 @@ impl Feature {
             Self::Scales => "scales",
             Self::Steps => "steps",
             Self::Lines => "linear interpolation",
+            Self::Curves => "smooth interpolation",
             Self::Bvh => "channel order and End Sites",
             Self::World => "poses in the world",
             Self::BoxLength => "length of boxes",

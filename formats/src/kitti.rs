@@ -34,7 +34,7 @@ pub static FORMAT: Format = Format {
     read_bytes: |name, bytes, options| read_kitti(name, &bytes[..], options),
     write: None,
     write_motion: Some(write_motion),
-    features: &[Feature::Translations],
+    features: &[Feature::Translations, Feature::Curves],
     options: &[
         FormatOption::SourceRate,
         FormatOption::TimesApart,

@@ -2,7 +2,9 @@
 //! an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The results are those of
 //! `evo`.
 
-use glam::{DQuat, DVec3};
+use std::fmt;
+
+use glam::{DMat3, DQuat, DVec3};
 
 /// The position and rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +40,67 @@ tumble::names! {
     Sim3 => "sim3",
 }
 
+/// How the poses of a reference and of an estimate are associated. Both are compared at the times of the path that has
+/// fewer poses.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Associate {
+    /// The denser path is interpolated by lines and arcs.
+    #[default]
+    Interpolated,
+    /// The nearest pose of the denser path in time, if it is at most this many seconds away. So does `evo`.
+    Nearest(f64),
+}
+
+/// A text is not a kind of association.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("neither `interpolated` nor `nearest:0.01`, the longest time between two poses in seconds")]
+pub struct AssociateError;
+
+/// Parses `interpolated` or `nearest:0.01`.
+impl std::str::FromStr for Associate {
+    type Err = AssociateError;
+
+    fn from_str(text: &str) -> Result<Self, AssociateError> {
+        if text == "interpolated" {
+            return Ok(Self::Interpolated);
+        }
+        let limit = text.strip_prefix("nearest:").ok_or(AssociateError)?;
+        match limit.parse::<f64>() {
+            Ok(limit) if limit.is_finite() && limit >= 0.0 => Ok(Self::Nearest(limit)),
+            _ => Err(AssociateError),
+        }
+    }
+}
+
+/// Why positions do not determine the rotation of an alignment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Undetermined {
+    /// The positions of a path are all the same.
+    Still,
+    /// The positions of a path lie on a straight line, and any rotation about it fits as well.
+    Line,
+}
+
+impl Undetermined {
+    /// A name: `still` or `line`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Still => "still",
+            Self::Line => "line",
+        }
+    }
+}
+
+impl fmt::Display for Undetermined {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Still => "the positions of a path are all the same",
+            Self::Line => "the positions of a path lie on a straight line",
+        })
+    }
+}
+
 /// The transform that aligns an estimate to its reference: first `scale`, then `rotation`, then `translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
@@ -47,6 +110,8 @@ pub struct Alignment {
     pub rotation: DQuat,
     /// Translation of the whole path.
     pub translation: DVec3,
+    /// Why the positions do not determine the rotation, if they do not.
+    pub undetermined: Option<Undetermined>,
 }
 
 /// The length of a step for relative errors.
@@ -107,14 +172,15 @@ pub struct Statistics {
 }
 
 impl Alignment {
-    /// The best alignment of two paths with the same poses. If the positions do not determine a rotation, as on a
-    /// straight line, it is one of the best.
+    /// The best alignment of two paths with the same poses. If the positions do not determine the rotation, as on a
+    /// straight line, it is the smallest of the best, and `undetermined` says why.
     #[must_use]
     pub fn of(reference: &[Pose], estimate: &[Pose], align: Align) -> Self {
         let nothing = Self {
             scale: 1.0,
             rotation: DQuat::IDENTITY,
             translation: DVec3::ZERO,
+            undetermined: None,
         };
         let count = reference.len().min(estimate.len());
         if align == Align::None || count == 0 {
@@ -129,16 +195,34 @@ impl Alignment {
             let both = reference.iter().zip(estimate);
             both.map(|(a, b)| (a.position - to, b.position - from))
         };
-        let rotation = match align {
-            Align::None | Align::Position => DQuat::IDENTITY,
+        let level = |v: DVec3| match align {
+            Align::Yaw => v.with_z(0.0),
+            _ => v,
+        };
+        // The mean of equal numbers is rounded.
+        let extent = |poses: &[Pose], mean: DVec3| {
+            let apart = poses[..count]
+                .iter()
+                .map(|it| level(it.position - mean).length());
+            apart.fold(0.0, f64::max) / (1.0 + mean.length())
+        };
+        let is_still = extent(reference, to) < STILL || extent(estimate, from) < STILL;
+        let (rotation, undetermined) = match align {
+            Align::None | Align::Position => (DQuat::IDENTITY, None),
+            Align::Yaw | Align::Se3 | Align::Sim3 if is_still => {
+                (DQuat::IDENTITY, Some(Undetermined::Still))
+            }
             Align::Yaw => {
                 let (sine, cosine) = pairs().fold((0.0, 0.0), |(sine, cosine), (a, b)| {
                     (sine + b.x * a.y - b.y * a.x, cosine + b.x * a.x + b.y * a.y)
                 });
                 let (sine, cosine) = libm::sincos(0.5 * libm::atan2(sine, cosine));
-                DQuat::from_xyzw(0.0, 0.0, sine, cosine)
+                (DQuat::from_xyzw(0.0, 0.0, sine, cosine), None)
             }
-            Align::Se3 | Align::Sim3 => best_rotation(pairs()),
+            Align::Se3 | Align::Sim3 => match rotation_of_lines(pairs()) {
+                Some(rotation) => (rotation, Some(Undetermined::Line)),
+                None => (best_rotation(pairs()), None),
+            },
         };
         let scale = match align {
             Align::Sim3 => {
@@ -157,6 +241,7 @@ impl Alignment {
             scale,
             rotation,
             translation: to - rotation * (from * scale),
+            undetermined,
         }
     }
 
@@ -179,6 +264,32 @@ impl Alignment {
 /// The angle of a rotation, in radians.
 fn angle(rotation: DQuat) -> f64 {
     2.0 * libm::atan2(rotation.xyz().length(), rotation.w.abs())
+}
+
+/// Positions whose distances from their mean are a smaller part of its size are all the same.
+const STILL: f64 = 1e-9;
+
+/// The second singular value of the covariance of positions on a line, as a part of the first: of positions that are
+/// a hundred thousandth of the length beside it. f32 rounds positions by a hundredth of this.
+const LINE: f64 = 1e-10;
+
+/// The smallest rotation of the best from the second vectors to the first, if many are the best because one of both
+/// paths is a line.
+fn rotation_of_lines(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<DQuat> {
+    let outer = |(a, b): (DVec3, DVec3)| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+    let covariance: DMat3 = pairs.map(outer).fold(DMat3::ZERO, |sum, one| sum + one);
+    let square = covariance.transpose() * covariance;
+    let mut matrix = [[0.0; 4]; 4];
+    for (row, from) in matrix.iter_mut().zip(square.transpose().to_cols_array_2d()) {
+        row[..3].copy_from_slice(&from);
+    }
+    let [x, y, z, _] = largest_eigenvector(matrix);
+    let from = DVec3::new(x, y, z).try_normalize()?;
+    let to = covariance * from;
+    let size = to.length();
+    let rest = covariance - DMat3::from_cols(to * from.x, to * from.y, to * from.z);
+    let rest: f64 = rest.to_cols_array().iter().map(|it| it * it).sum();
+    (rest.sqrt() <= LINE * size).then(|| DQuat::from_rotation_arc(from, to / size))
 }
 
 /// The rotation from the second vectors to the first by least squares: the eigenvector of the largest eigenvalue of
@@ -567,11 +678,53 @@ mod tests {
         assert!(tilted.rotation.xyz().truncate().length() < 1e-15);
     }
 
+    /// On a line, any turn about it fits as well: the smallest rotation is that between the directions.
+    #[test]
+    fn a_line_is_turned_by_the_smallest_rotation() {
+        let along = |direction: DVec3| -> Vec<Pose> {
+            let at = (0..20).map(|i| direction * f64::from(i * i) + DVec3::new(5.0, -2.0, 1.0));
+            at.map(|position| pose(position.x, position.y, position.z, DQuat::IDENTITY))
+                .collect()
+        };
+        let direction = DVec3::new(0.6, 0.0, 0.8);
+        let turned = DQuat::from_rotation_y(0.4) * direction;
+        for align in [Align::Se3, Align::Sim3] {
+            let found = Alignment::of(&along(turned), &along(direction), align);
+            assert_eq!(found.undetermined, Some(Undetermined::Line));
+            assert!((found.angle() - 0.4).abs() < 1e-9, "{}", found.angle());
+            let same = Alignment::of(&along(direction), &along(direction), align);
+            assert!(same.angle() < 1e-9, "{}", same.angle());
+        }
+        // A turn about z alone is determined, and so is the turn of a path with a bend.
+        let found = Alignment::of(&along(turned), &along(direction), Align::Yaw);
+        assert_eq!(found.undetermined, None);
+        let mut bent = along(direction);
+        bent[3].position.y += 0.1;
+        assert_eq!(Alignment::of(&bent, &bent, Align::Se3).undetermined, None);
+    }
+
+    #[test]
+    fn associations_are_by_interpolation_or_the_nearest() {
+        assert_eq!("interpolated".parse(), Ok(Associate::Interpolated));
+        assert_eq!("nearest:0.02".parse(), Ok(Associate::Nearest(0.02)));
+        for bad in [
+            "",
+            "nearest",
+            "nearest:",
+            "nearest:-1",
+            "nearest:nan",
+            "0.01",
+        ] {
+            assert_eq!(bad.parse::<Associate>(), Err(AssociateError), "{bad}");
+        }
+    }
+
     #[test]
     fn paths_without_a_direction_stay_as_they_are() {
         let still = vec![pose(1.0, 2.0, 3.0, DQuat::IDENTITY); 3];
         let found = Alignment::of(&still, &still, Align::Sim3);
         assert_eq!(found.apply(still[0]), still[0]);
+        assert_eq!(found.undetermined, Some(Undetermined::Still));
         assert_eq!(Alignment::of(&[], &[], Align::Se3).scale, 1.0);
         assert_eq!(Statistics::of(&[]), None);
     }

@@ -5,7 +5,9 @@ use proptest::prelude::*;
 use tumble::{EulerSequence, FrameRate, TrackSet};
 use tumble_formats::bvh::FORMAT;
 use tumble_formats::format::{MotionOptions, WriteError};
-use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
+use tumble_formats::motion::{
+    ChannelInterpolation, Channels, Joint, Motion, SampledClip, Transform,
+};
 use tumble_formats::{Code, Diagnostic, ReadOptions};
 
 use crate::bvh::{angle, moved, read};
@@ -254,7 +256,11 @@ proptest! {
         sequences.retain(|sequence| sequence.axes()[0] != sequence.axes()[2]);
         prop_assert_eq!(sequences.len(), 12);
         let sequence = sequences[sequence];
-        let clip = clip(&[None], &["a"], rotations.len(), &rotations);
+        let mut clip = clip(&[None], &["a"], rotations.len(), &rotations);
+        clip.channels.push(Channels {
+            rotation: Some(ChannelInterpolation::Linear),
+            ..Channels::default()
+        });
         let times: Vec<f64> = (0..rotations.len()).map(|k| k as f64 / 30.0).collect();
         let mut sampled = sampled(&clip, &times, &rotations);
         let translations = vec![Vec3::from_array(translations); rotations.len()];

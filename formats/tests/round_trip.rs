@@ -97,6 +97,7 @@ fn clip(numbers: &mut Numbers) -> Motion {
         ..Motion::default()
     };
     let from_bvh = has_skeleton && numbers.coin();
+    let is_smooth = !from_bvh && !is_stepped && frames % 2 == 0;
     for (track, name) in names.iter().enumerate().take(tracks) {
         let keys: Vec<Quat> = times.iter().map(|_| numbers.rotation()).collect();
         motion.set.push(*name, &times, &keys).unwrap();
@@ -116,12 +117,12 @@ fn clip(numbers: &mut Numbers) -> Motion {
                 .collect();
             motion.set.set_scales(track, &times, &keys, &[]).unwrap();
         }
-        let sampler = if is_stepped {
+        let sampler = if is_stepped && !from_bvh {
             ChannelInterpolation::Step
         } else {
             ChannelInterpolation::Linear
         };
-        if !from_bvh {
+        if !is_smooth {
             motion.channels.push(Channels {
                 rotation: Some(sampler),
                 translation: is_moved.then_some(sampler),
@@ -384,6 +385,16 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
         assert!(is_linear(&found) || !says_so, "{case}");
     } else {
         assert_eq!(is_reported("lines and arcs"), says_so, "{case}: {left_out}");
+    }
+    let is_smooth = clip.channels.is_empty() && bends;
+    if supports(Feature::Curves) {
+        assert!(!is_smooth || !is_linear(&found), "{case}");
+    } else {
+        assert_eq!(
+            is_reported("smooth curves"),
+            is_smooth,
+            "{case}: {left_out}"
+        );
     }
     if supports(Feature::Bvh) && !clip.is_world {
         if !clip.bvh.is_empty() {

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use tumble::SampleTimes;
 use tumble_formats::compare::{self as differences, ClipPair, CompareError, PathMeasure};
 use tumble_formats::motion::Motion;
 use tumble_formats::npz;
-use tumble_formats::trajectory::Align;
+use tumble_formats::trajectory::{Align, Associate};
 
 use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
@@ -85,8 +84,10 @@ pub(crate) struct ChannelDifference {
     largest: f64,
     /// The name of the track with the largest.
     track: String,
-    /// When it is, seconds.
+    /// When it is, seconds, on the clock of the first clip.
     time: f64,
+    /// The same in frames of the first clip, from 0 at its first key; None where it has no rate.
+    frame: Option<f64>,
 }
 
 impl From<differences::ChannelDifference> for ChannelDifference {
@@ -97,7 +98,61 @@ impl From<differences::ChannelDifference> for ChannelDifference {
             largest: of.spread.largest,
             track: of.track,
             time: of.time,
+            frame: of.frame,
         }
+    }
+}
+
+impl ChannelDifference {
+    /// The differences of one track.
+    fn of_track(track: &str, of: differences::TimedSpread) -> Self {
+        Self {
+            mean: of.spread.mean,
+            rms: of.spread.rms,
+            largest: of.spread.largest,
+            track: track.to_owned(),
+            time: of.time,
+            frame: of.frame,
+        }
+    }
+}
+
+/// The differences of one track of two clips.
+#[pyclass(frozen, get_all, module = "tumble")]
+#[derive(Debug, Clone)]
+pub(crate) struct JointDifference {
+    /// Its name.
+    track: String,
+    /// Degrees.
+    rotation: ChannelDifference,
+    /// Lengths; None where neither clip moves.
+    translation: Option<ChannelDifference>,
+    /// Lengths of the differences of scales; None where neither clip scales.
+    scale: Option<ChannelDifference>,
+}
+
+impl From<differences::JointDifference> for JointDifference {
+    fn from(of: differences::JointDifference) -> Self {
+        let named = |spread| ChannelDifference::of_track(&of.track, spread);
+        Self {
+            rotation: named(of.rotation),
+            translation: of.translation.map(named),
+            scale: of.scale.map(named),
+            track: of.track,
+        }
+    }
+}
+
+#[pymethods]
+impl JointDifference {
+    fn __repr__(&self) -> String {
+        let Self {
+            track, rotation, ..
+        } = self;
+        format!(
+            "JointDifference({track:?}, largest angle {:.3e}°)",
+            rotation.largest
+        )
     }
 }
 
@@ -110,6 +165,7 @@ impl ChannelDifference {
             largest,
             track,
             time,
+            ..
         } = self;
         format!(
             "ChannelDifference(mean {mean:.3e}, rms {rms:.3e}, largest {largest:.3e} at {track:?}, {time:.4} s)"
@@ -136,6 +192,8 @@ pub(crate) struct ClipDifference {
     translation: Option<ChannelDifference>,
     /// Lengths of the differences of scales; None where neither clip scales.
     scale: Option<ChannelDifference>,
+    /// The differences of each track, in the order of the first clip.
+    joints: Vec<JointDifference>,
 }
 
 #[pymethods]
@@ -192,11 +250,13 @@ impl PathStatistics {
 /// How far an estimated path is from its reference.
 #[pyclass(frozen, get_all, module = "tumble")]
 pub(crate) struct PathErrors {
-    /// Poses of the reference that have one of the estimate.
+    /// Which clip's poses are compared, 0 or 1: the one with fewer.
+    times_of: usize,
+    /// How many are compared.
     poses: usize,
-    /// Poses of the reference before or after the estimate.
+    /// Those of its poses that have none of the other clip.
     outside: usize,
-    /// Poses of the reference in gaps of the estimate.
+    /// Those of its poses in gaps of the other clip.
     in_gaps: usize,
     /// First and last time, seconds.
     span: (f64, f64),
@@ -335,15 +395,12 @@ fn of_clips(
     let frames = match samples {
         None => pair.keys(&common),
         Some(SampleRequest::Rate(rate, start, end)) => {
-            let whole = (common.start, common.end);
-            let (start, end) = clips[0].range_in_set(start, end, whole);
-            SampleTimes::rate(rate).between(start, end)
+            (pair.frames(&common, rate, start, end)).map_err(of_compare)?
         }
         Some(SampleRequest::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;
-            let in_set = |&time: &f64| clips[0].time_in_set(time);
-            SampleTimes::at(times.iter().map(in_set).collect())
+            pair.at(&common, &times).map_err(of_compare)?
         }
         Some(_) => {
             return Err(input(
@@ -365,6 +422,11 @@ fn of_clips(
         rotation: found.rotation.into(),
         translation: found.translation.map(ChannelDifference::from),
         scale: found.scale.map(ChannelDifference::from),
+        joints: found
+            .joints
+            .into_iter()
+            .map(JointDifference::from)
+            .collect(),
     };
     Ok((difference, warnings))
 }
@@ -372,13 +434,16 @@ fn of_clips(
 /// The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The
 /// numbers are the same as those of the program `evo`.
 ///
-/// `path_errors(reference, estimate, *, align="none", rpe=None, max_gap=None, track=None, engine=None)`
+/// `path_errors(reference, estimate, *, align="none", rpe=None, associate="interpolated", max_gap=None,
+/// track=None, engine=None)`
 ///
-/// Both clips have one track, or `track` selects one. The estimate is interpolated by lines and arcs at the times
-/// of the reference's poses, and aligned to the reference by `align`: "position" translates it, "yaw" also rotates
-/// it about z, "se3" about any axis, "sim3" also scales it. Absolute errors are computed for each pose. `rpe` adds
-/// relative errors over steps of a time or a length: "1s", "0.5m". `max_gap`: the estimate is not interpolated
-/// between keys that are more than this many seconds apart.
+/// Both clips have one track, or `track` selects one. They are compared at the times of the clip with fewer poses,
+/// where the other is interpolated by lines and arcs; `associate="nearest:0.01"` takes its nearest pose within 0.01 s,
+/// as evo does. The estimate is aligned to the reference by `align`: "position" translates it, "yaw" also rotates it
+/// about z, "se3" about any axis, "sim3" also scales it. Absolute errors are computed for each pose. `rpe` adds
+/// relative errors over steps of a time or a length: "1s", "0.5m". `max_gap`: poses between two that are more than
+/// this many seconds apart are not interpolated. Gaps, and positions that do not determine the rotation of the
+/// alignment, are warned of.
 ///
 /// >>> import numpy as np, tumble
 /// >>> path = np.random.default_rng(1).normal(size=(9, 3))
@@ -389,7 +454,7 @@ fn of_clips(
 /// >>> round(found.scale, 6), found.ape_translation.max < 1e-6
 /// (0.5, True)
 #[pyfunction]
-#[pyo3(signature = (reference, estimate, *, align="none", rpe=None, max_gap=None, track=None, engine=None))]
+#[pyo3(signature = (reference, estimate, *, align="none", rpe=None, associate="interpolated", max_gap=None, track=None, engine=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn path_errors(
     py: Python<'_>,
@@ -397,6 +462,7 @@ pub(crate) fn path_errors(
     estimate: &Bound<'_, Clip>,
     align: &str,
     rpe: Option<&str>,
+    associate: &str,
     max_gap: Option<f64>,
     track: Option<&Bound<'_, PyAny>>,
     engine: Option<&Bound<'_, Engine>>,
@@ -409,7 +475,15 @@ pub(crate) fn path_errors(
         let step = text.parse();
         step.map_err(|error| input(format!("rpe: `{text}` is {error}")))
     });
+    let associate = (associate.parse())
+        .map_err(|error| input(format!("associate: `{associate}` is {error}")))?;
+    if matches!(associate, Associate::Nearest(_)) && max_gap.is_some() {
+        return Err(input(
+            "max_gap: is for interpolated poses; leave out `associate` or `max_gap`",
+        ));
+    }
     let measure = PathMeasure {
+        associate,
         align,
         is_absolute: true,
         step: step.transpose()?,
@@ -439,6 +513,9 @@ pub(crate) fn path_errors(
         let found = differences::PathDifference::of(&engine, clips, &measure);
         found.map_err(of_compare)
     })?;
+    for warning in &found.warnings {
+        warn_of(py, &in_python(warning))?;
+    }
     let Some(absolute) = found.ape else {
         return Err(input("there is no pose to compare"));
     };
@@ -452,6 +529,7 @@ pub(crate) fn path_errors(
         None => (None, None),
     };
     Ok(PathErrors {
+        times_of: found.times_of,
         poses: found.poses,
         outside: found.outside,
         in_gaps: found.in_gaps,

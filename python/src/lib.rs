@@ -43,8 +43,8 @@ mod _tumble {
     use crate::clip::Clip;
     #[pymodule_export]
     use crate::compare::{
-        ArrayDifference, ChannelDifference, ClipDifference, PathErrors, PathStatistics, Spread,
-        compare, path_errors,
+        ArrayDifference, ChannelDifference, ClipDifference, JointDifference, PathErrors,
+        PathStatistics, Spread, compare, path_errors,
     };
     #[pymodule_export]
     use crate::crowd::Crowd;

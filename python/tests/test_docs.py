@@ -49,7 +49,7 @@ def test_everything_public_is_documented_with_an_example():
     for name in tumble.__all__:
         assert inspect.getdoc(getattr(tumble, name)), name
     results = ["ArrayDifference", "ChannelDifference", "ClipDifference", "PathErrors"]
-    results += ["PathStatistics", "Reduction", "Route", "Spread", "Walk"]
+    results += ["JointDifference", "PathStatistics", "Reduction", "Route", "Spread", "Walk"]
     results += ["Chunk", "Chunks", "Verification"]
     exempt = {f"tumble.{name}" for name in results}
     for name, value in ALL.items():

@@ -551,6 +551,16 @@ def test_clips_are_compared_as_the_program_does(rng, tmp_path):
     again = tumble.compare(tumble.load(tmp_path / "a.glb").clip, tumble.load(tmp_path / "b.glb").clip)
     assert said["rotation"]["largest"] == again.rotation.largest
     assert said["rotation"]["time"] == again.rotation.time and said["samples"] == again.samples
+    assert said["joints"][0]["track"] in names and len(said["joints"]) == len(again.joints) == 2
+    for joint in said["joints"]:
+        (found,) = [other for other in again.joints if other.track == joint["track"]]
+        assert found.rotation.largest == joint["rotation"]["largest"]
+        assert found.rotation.frame == joint["rotation"]["frame"] and found.translation is None
+    with pytest.raises(tumble.InputError, match="times from 3 to 4 s are asked for, and both have times from 0 to 2 s"):
+        tumble.compare(first, second, fps=60, start=3, end=4)
+    with pytest.raises(tumble.InputError, match="times from 9 to 9 s are asked for"):
+        tumble.compare(first, second, at=[9.0])
+    assert tumble.compare(first, second, at=[1.0, 9.0]).samples == 1
     same = tumble.compare(first, first, fps=60, start=0.5)
     assert same.identical == same.tracks * same.samples == 2 * 91
     longer = tumble.Clip(TIMES * 2, keys, names=names)
@@ -598,11 +608,20 @@ def test_path_errors_are_those_of_the_program(rng, tmp_path):
             for field in ["rmse", "mean", "median", "std", "min", "max"]:
                 assert getattr(numbers, field) == said[name][kind][field]
     assert tumble.path_errors(*clips).rpe_rotation is None
+    few = tumble.Clip(times[::10], keys[::10], translations=[path[::10]])
+    for associate in ["interpolated", "nearest:0.01"]:
+        found = tumble.path_errors(clips[0], few, associate=associate)
+        assert (found.times_of, found.poses) == (1, 6) and found.ape_translation.max < 1e-6
+    line = tumble.Clip(TIMES, unit(rng, 4), translations=[np.outer(TIMES, [1, 0, 0])])
+    with pytest.warns(tumble.InputWarning, match="lie on a straight line"):
+        assert tumble.path_errors(line, line, align="se3").rotation[3] > 1 - 1e-9
     for options, message in [
         (dict(align="se4"), "align: there is no `se4`; there are none, position"),
         (dict(rpe="fast"), "rpe: `fast` is not a step"),
         (dict(rpe="1000s"), "rpe is longer than the whole path"),
         (dict(max_gap=-1), "max_gap: -1"),
+        (dict(associate="near"), "associate: `near` is neither `interpolated` nor `nearest:0.01`"),
+        (dict(associate="nearest:1", max_gap=1), "max_gap: is for interpolated poses"),
     ]:
         with pytest.raises(tumble.InputError, match=message):
             tumble.path_errors(*clips, **options)

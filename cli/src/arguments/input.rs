@@ -4,9 +4,10 @@
 use std::collections::HashSet;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
-use tumble_formats::format::FormatOption;
+use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 use walkdir::WalkDir;
@@ -63,13 +64,19 @@ impl Inputs {
             )));
         }
         let gathered = GatheredInputs::new(&self.paths, self.files_from.as_deref())?;
-        let format = |path: PathBuf| match self.reading.from {
-            Some(format) => format,
-            None => Format::detected(&path),
-        };
-        let formats = || gathered.paths().into_iter().map(format);
-        self.reading.check(formats).map_err(Failure::usage)?;
+        let paths = gathered.paths();
+        self.check_formats(&paths.iter().collect::<Vec<_>>())?;
         Ok(gathered)
+    }
+
+    /// Refuses options that apply to none of these inputs.
+    pub(crate) fn check_formats(&self, paths: &[&PathBuf]) -> Result<(), Failure> {
+        let format = |path: &&PathBuf| match self.reading.from {
+            Some(format) => format,
+            None => Format::detected(path),
+        };
+        let formats = || paths.iter().map(format);
+        self.reading.check(formats).map_err(Failure::usage)
     }
 
     /// Whether an input is read with extra keys that follow its curves.
@@ -100,7 +107,11 @@ impl Inputs {
         let mut loaded = self.load(path)?;
         let rest = check_complete(&names::input(path), &loaded);
         match loaded.clips.pop() {
-            Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip { clip, rest }),
+            Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip {
+                clip,
+                document: loaded.document.filter(|_| !loaded.is_adjusted),
+                rest,
+            }),
             Some(clip) => {
                 loaded.clips.push(clip);
                 Err(several_clips_failure(path, &loaded))
@@ -176,6 +187,8 @@ impl InputReader for Inputs {
 /// The clip of a file, for commands that work on one.
 pub(crate) struct OnlyClip {
     pub(crate) clip: Motion,
+    /// The file, unless the clip was converted to another unit or up axis.
+    pub(crate) document: Option<Arc<dyn Document>>,
     /// Fails where other animations of the file were refused: the result is then incomplete.
     pub(crate) rest: Result<(), Failure>,
 }

@@ -5,13 +5,18 @@ use std::fmt;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use tumble::method::KOCHANEK_BARTELS;
+use tumble::method::{BESSEL_OVERHAUSER, KOCHANEK_BARTELS};
 use tumble::{
-    Ends, Interpolation, InterpolationWarning, KeySigns, METHODS, Method, Speed, TrackSet, WrapMode,
+    Ends, Engine, Error, Interpolation, InterpolationWarning, KeySigns, METHODS, Method,
+    SampleTimes, Speed, TrackSet, WrapMode,
 };
+use tumble_formats::motion::Motion;
+use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::output::one_of;
+use crate::messages::colours::{self, Colour};
+use crate::messages::exit::Failure;
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -84,6 +89,43 @@ impl InterpolationArguments {
             .into_iter()
             .filter_map(|(name, value)| Some((name, value?)));
         present.collect()
+    }
+
+    /// Refuses options that have no effect on the channels of a clip by any of these methods.
+    pub(crate) fn check_clip(
+        self,
+        name: &str,
+        clip: &Motion,
+        methods: &[MethodArgument],
+    ) -> Result<(), Failure> {
+        let with = |method| self.with(method);
+        let used = methods.iter().flat_map(|method| {
+            let channels = ChannelMethods {
+                method: method.0,
+                with: &with,
+            };
+            channels.groups_of(clip)
+        });
+        let used: Vec<Method> = used.map(|group| group.0).collect();
+        let checked = self.check(&each_once(used.iter()));
+        checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
+    }
+
+    /// An option that is set, for inputs whose curves have none of them.
+    pub(crate) fn set_option(self) -> Option<&'static str> {
+        let default = WrapMode::default();
+        [
+            ("--ends", self.ends.is_some()),
+            ("--path", self.path.is_some()),
+            ("--speed", self.speed != Speed::default()),
+            ("--before", self.before != default),
+            ("--after", self.after != default),
+            ("--tension", self.tension.is_some()),
+            ("--continuity", self.continuity.is_some()),
+            ("--bias", self.bias.is_some()),
+        ]
+        .into_iter()
+        .find_map(|(option, is_set)| is_set.then_some(option))
     }
 
     /// Refuses options that have no effect on any of these methods.
@@ -229,10 +271,63 @@ impl MethodArgument {
         self.0.map_or(authored, |method| method.summary)
     }
 
+    pub(crate) fn colour(self) -> Colour {
+        self.0.map_or(colours::AUTHORED, colours::of_method)
+    }
+
+    /// Of these methods those that draw a clip differently: the method of a file that states none is
+    /// bessel-overhauser, which is not drawn twice.
+    pub(crate) fn distinct(methods: &[Self], clip: &Motion) -> Vec<Self> {
+        if !clip.channels.is_empty() {
+            return methods.to_vec();
+        }
+        let meant = Self(Some(BESSEL_OVERHAUSER));
+        let mut kept = methods.to_vec();
+        if kept.contains(&meant) {
+            kept.retain(|method| method.0.is_some());
+        }
+        let named: Vec<Self> = kept.iter().map(|it| Self(it.0.or(meant.0))).collect();
+        each_once(named.iter())
+    }
+
     /// `authored`, then all methods.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let methods = METHODS.into_iter().map(Some);
         std::iter::once(None).chain(methods).map(Self)
+    }
+}
+
+/// A method of the command line, with the other options of curves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CurveChoice {
+    pub(crate) method: MethodArgument,
+    pub(crate) options: InterpolationArguments,
+}
+
+impl CurveChoice {
+    /// How the rotations of a track are interpolated.
+    pub(crate) fn of_track(self, clip: &Motion, track: usize) -> Interpolation {
+        let with = |method| self.options.with(method);
+        let methods = ChannelMethods {
+            method: self.method.0,
+            with: &with,
+        };
+        with(methods.method_of_track(clip, track))
+    }
+
+    /// All channels of a clip.
+    pub(crate) fn sample(
+        self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &SampleTimes,
+    ) -> Result<Samples, Error> {
+        let with = |method| self.options.with(method);
+        let methods = ChannelMethods {
+            method: self.method.0,
+            with: &with,
+        };
+        methods.sample(engine, clip, frames)
     }
 }
 

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use glam::{DQuat, DVec3, Quat, Vec3, Vec4};
 use tumble::paths::PathFrame;
-use tumble::{Channel, Engine, Error, Interpolation, Method, SampleTimes, TrackSet};
+use tumble::{Channel, Engine, Error, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::looks_like_paths;
-use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Code, Diagnostic};
 use tumble_routes::mesh::Mesh;
 
 use crate::arguments::device::OpenedDevice;
+use crate::arguments::interpolation::CurveChoice;
 use crate::arguments::path::PathArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::batch::room;
@@ -205,14 +205,14 @@ pub(crate) enum TravelSource {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Maker {
     Frame(PathFrame),
-    Method(Interpolation),
+    Method(CurveChoice),
 }
 
 impl Maker {
     pub(crate) fn colour(self) -> Colour {
         match self {
             Self::Frame(frame) => colours::of_frame(frame),
-            Self::Method(interpolation) => colours::of_method(interpolation.method),
+            Self::Method(choice) => choice.method.colour(),
         }
     }
 }
@@ -308,17 +308,9 @@ impl TravelSource {
                     positions: positions.map(|position| position.truncate()).collect(),
                 })
             }
-            (Self::Clip(clip), Maker::Method(interpolation)) => {
+            (Self::Clip(clip), Maker::Method(choice)) => {
                 let timeline = room::in_memory(name, set, frames, 7)?;
-                let with = |method: Method| Interpolation {
-                    method,
-                    ..interpolation
-                };
-                let methods = ChannelMethods {
-                    method: Some(interpolation.method),
-                    with: &with,
-                };
-                let work = |engine: &Engine| methods.sample(engine, clip, frames);
+                let work = |engine: &Engine| choice.sample(engine, clip, frames);
                 let samples = device
                     .choose(tracks * timeline.len())
                     .and_then(|()| device.work(work))
@@ -326,7 +318,7 @@ impl TravelSource {
                 let poses = world(clip, &samples)
                     .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
                 Ok(Travel {
-                    name: interpolation.method.name.to_owned(),
+                    name: choice.method.name().to_owned(),
                     times,
                     tracks,
                     rotations: poses.iter().map(|pose| pose.rotation).collect(),

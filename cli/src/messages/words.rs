@@ -108,6 +108,37 @@ pub(crate) fn bytes(bytes: f64) -> String {
     }
 }
 
+/// A number of four significant digits in plain decimals: `17.04`, `0.0001661`, `0`. Below 1e-9 it has an exponent.
+pub(crate) fn decimals(number: f64) -> String {
+    let size = number.abs();
+    if size > 0.0 && size < 1e-9 {
+        return format!("{number:.3e}");
+    }
+    let scientific = format!("{size:.3e}");
+    let exponent = scientific
+        .rsplit('e')
+        .next()
+        .and_then(|it| it.parse::<i64>().ok());
+    let digits = exponent.map_or(0, |exponent| (3 - exponent).clamp(0, 12) as usize);
+    trimmed(format!("{number:.digits$}"))
+}
+
+/// A time in seconds to a tenth of a millisecond: `22.925`, `0.0042`.
+pub(crate) fn seconds(time: f64) -> String {
+    trimmed(format!("{time:.4}"))
+}
+
+/// Without the zeros at the end of decimals.
+fn trimmed(number: String) -> String {
+    match number.contains('.') {
+        true => number
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
+        false => number,
+    }
+}
+
 /// `3.1 ms`.
 pub(crate) fn duration(duration: Duration) -> String {
     let seconds = duration.as_secs_f64();

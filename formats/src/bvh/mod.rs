@@ -46,6 +46,7 @@ pub static FORMAT: Format = Format {
         Feature::TrackNames,
         Feature::Skeleton,
         Feature::Translations,
+        Feature::Lines,
         Feature::Bvh,
     ],
     options: &[FormatOption::RawTimes, FormatOption::Sequence],

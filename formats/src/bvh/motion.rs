@@ -8,7 +8,7 @@ use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::motion::{Joint, Motion, Transform};
+use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use crate::origin::{SMALL, origin_at_rest, relative};
 use crate::quaternion::rounded;
 use crate::rate::{RateSource, itself, of};
@@ -176,12 +176,25 @@ impl FrameKeys {
                 true => Vec::new(),
                 false => origins,
             },
+            // The format says nothing, and whatever reads it joins the samples by lines.
+            channels: (hierarchy.joints.iter())
+                .map(|joint| Channels {
+                    rotation: linear(!joint.rotations.is_empty()),
+                    translation: linear(!joint.positions.is_empty()),
+                    scale: None,
+                })
+                .collect(),
             bvh: (hierarchy.joints.iter())
                 .map(|joint| joint.written.clone())
                 .collect(),
             ..Motion::default()
         })
     }
+}
+
+/// The interpolation of a channel, if it has keys.
+fn linear(has_keys: bool) -> Option<ChannelInterpolation> {
+    has_keys.then_some(ChannelInterpolation::Linear)
 }
 
 /// The product of rotations about the axes of `channels`. The first is the outermost factor: each axis is rotated by

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::reference::angle_between;
-use tumble::{Channel, Engine, JointMatchError, Joints, SampleTimes};
+use tumble::{Channel, Engine, FrameRate, JointMatchError, Joints, SampleTimes};
 
 use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
@@ -60,6 +60,36 @@ pub struct ClipDifference {
     pub translation: Option<ChannelDifference>,
     /// Lengths of the differences of the scales; `None` if neither clip has scales.
     pub scale: Option<ChannelDifference>,
+    /// The differences of each track that both clips have, in the order of the first clip.
+    pub joints: Vec<JointDifference>,
+}
+
+/// The differences of one track.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct JointDifference {
+    /// Name of the track.
+    pub track: String,
+    /// Angles between the rotations, in degrees.
+    pub rotation: TimedSpread,
+    /// Distances between the translations, in the files' unit of length; `None` if neither clip has translations.
+    pub translation: Option<TimedSpread>,
+    /// Lengths of the differences of the scales; `None` if neither clip has scales.
+    pub scale: Option<TimedSpread>,
+}
+
+/// Statistics of differences over time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct TimedSpread {
+    /// Mean, root mean square and maximum of the differences.
+    #[serde(flatten)]
+    pub spread: Spread,
+    /// Time of the largest difference, in seconds, on the clock of the first clip.
+    pub time: f64,
+    /// The time in frames of the first clip, from 0 at its first key; half frames lie between two frames. `None` if
+    /// its keys are not frames of a rate.
+    pub frame: Option<f64>,
 }
 
 /// The differences of one channel.
@@ -71,8 +101,32 @@ pub struct ChannelDifference {
     pub spread: Spread,
     /// Name of the track with the largest difference.
     pub track: String,
-    /// Time of the largest difference, in seconds.
+    /// Time of the largest difference, in seconds, on the clock of the first clip.
     pub time: f64,
+    /// The time in frames of the first clip, from 0 at its first key; half frames lie between two frames. `None` if
+    /// its keys are not frames of a rate.
+    pub frame: Option<f64>,
+}
+
+/// The differences of one channel, of all tracks together and of each.
+struct ChannelTallies {
+    all: Tally,
+    each: Vec<Tally>,
+}
+
+impl ChannelTallies {
+    fn new(tracks: usize) -> Self {
+        Self {
+            all: Tally::default(),
+            each: vec![Tally::default(); tracks],
+        }
+    }
+
+    /// Adds the difference of a track at the next sample.
+    fn add(&mut self, track: usize, difference: f64) {
+        self.all.add(difference);
+        self.each[track].add(difference);
+    }
 }
 
 impl ClipPair<'_> {
@@ -86,6 +140,8 @@ impl ClipPair<'_> {
             let (first, last) = self.clips[side].set.time_span().unwrap_or((0.0, 0.0));
             [first - shifts[side], last - shifts[side]]
         });
+        let clock = self.clips[0].time_offset as f64;
+        let on_clock = |span: [f64; 2]| span.map(|time| time + clock);
         let start = spans[0][0].max(spans[1][0]);
         let end = spans[0][1].min(spans[1][1]);
         let differs = |end: usize| (spans[0][end] - spans[1][end]).abs() > SAME_TIME;
@@ -93,14 +149,15 @@ impl ClipPair<'_> {
         if is_longer && start > end {
             return Err(CompareError::NoTimeInBoth {
                 inputs: self.inputs.map(str::to_owned),
-                spans,
+                spans: spans.map(on_clock),
             });
         }
         let warning = is_longer.then(|| {
             let [first, second] = [0, 1].map(|side| {
-                let [first, last] = spans[side];
+                let [first, last] = on_clock(spans[side]);
                 format!("{} from {first} to {last} s", self.inputs[side])
             });
+            let [start, end] = on_clock([start, end]);
             format!(
                 "the keys of both do not lie at the same times: {first}, {second}; compared from {start} to \
                  {end} s"
@@ -132,6 +189,53 @@ impl ClipPair<'_> {
         times.sort_by(f64::total_cmp);
         times.dedup();
         SampleTimes::at(times)
+    }
+
+    /// The sample times of a comparison at a rate, from `start` to `end` on the clock of the first clip, or over all
+    /// common times. A range that is longer than these is cut to them.
+    ///
+    /// # Errors
+    /// When the range has no common time.
+    pub fn frames(
+        &self,
+        common: &CommonTimes,
+        rate: FrameRate,
+        start: Option<f64>,
+        end: Option<f64>,
+    ) -> Result<SampleTimes, CompareError> {
+        let whole = (common.start, common.end);
+        let (start, end) = self.clips[0].range_in_set(start, end, whole);
+        if start > common.end || end < common.start {
+            return Err(self.no_common_time(common, start, end));
+        }
+        Ok(SampleTimes::rate(rate).between(start.max(common.start), end.min(common.end)))
+    }
+
+    /// The sample times of a comparison at these times, on the clock of the first clip; those that only one clip has
+    /// are left out.
+    ///
+    /// # Errors
+    /// When none of them is a common time.
+    pub fn at(&self, common: &CommonTimes, times: &[f64]) -> Result<SampleTimes, CompareError> {
+        let times = times.iter().map(|&time| self.clips[0].time_in_set(time));
+        let times: Vec<f64> = times.collect();
+        let low = times.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let within = common.start - SAME_TIME..=common.end + SAME_TIME;
+        let shared: Vec<f64> = times.into_iter().filter(|it| within.contains(it)).collect();
+        match shared.is_empty() {
+            true => Err(self.no_common_time(common, low, high)),
+            false => Ok(SampleTimes::at(shared)),
+        }
+    }
+
+    fn no_common_time(&self, common: &CommonTimes, start: f64, end: f64) -> CompareError {
+        let clock = self.clips[0].time_offset as f64;
+        CompareError::RangeOutside {
+            inputs: self.inputs.map(str::to_owned),
+            range: [start, end].map(|time| time + clock),
+            common: [common.start, common.end].map(|time| time + clock),
+        }
     }
 
     /// Compares the clips at the times `frames`, in seconds, on the clock of the first clip. With `in_world` the
@@ -171,30 +275,49 @@ impl ClipPair<'_> {
         let each = || {
             let samples = 0..times.len();
             samples.flat_map(|sample| {
-                pairs
-                    .iter()
-                    .map(move |&pair| [0, 1].map(|side| sample * counts[side] + pair[side]))
+                let pairs = pairs.iter().enumerate();
+                pairs.map(move |(track, pair)| {
+                    (track, [0, 1].map(|side| sample * counts[side] + pair[side]))
+                })
             })
         };
-        let mut angles = Tally::default();
+        let mut angles = ChannelTallies::new(pairs.len());
         let mut identical = 0;
-        for [a, b] in each() {
+        for (track, [a, b]) in each() {
             let (a, b) = (sampled[0].rotations[a], sampled[1].rotations[b]);
             let bits = |q: Quat| q.to_array().map(f32::to_bits);
             identical += u64::from(bits(a) == bits(b) || bits(a) == bits(-b));
-            angles.add(angle_between(a.as_dquat(), b.as_dquat()));
+            angles.add(track, angle_between(a.as_dquat(), b.as_dquat()));
         }
-        let found = |tally: Tally, factor| {
-            let index = tally.largest_at as usize;
-            let pair = pairs.get(index % pairs.len().max(1));
-            ChannelDifference {
+        let clock = motions[0].time_offset as f64;
+        let frames = FrameNumbers::of(motions[0]);
+        let timed = |tally: Tally, sample: usize, factor| {
+            let time = times.get(sample).copied().unwrap_or(0.0);
+            TimedSpread {
                 spread: tally.times(factor),
-                track: pair.map_or_else(String::new, |pair| motions[0].set.track_name(pair[0])),
-                time: times
-                    .get(index / pairs.len().max(1))
-                    .copied()
-                    .unwrap_or(0.0),
+                time: time + clock,
+                frame: frames.map(|frames| frames.of_time(time)),
             }
+        };
+        let name = |pair: &[usize; 2]| motions[0].set.track_name(pair[0]);
+        let of_all = |tallies: &ChannelTallies, factor| {
+            let (tally, count) = (tallies.all, pairs.len().max(1));
+            let index = tally.largest_at as usize;
+            let TimedSpread {
+                spread,
+                time,
+                frame,
+            } = timed(tally, index / count, factor);
+            ChannelDifference {
+                spread,
+                track: pairs.get(index % count).map_or_else(String::new, name),
+                time,
+                frame,
+            }
+        };
+        let of_track = |tallies: &ChannelTallies, track: usize, factor| {
+            let tally = tallies.each[track];
+            timed(tally, tally.largest_at as usize, factor)
         };
         let apart = |values: fn(&Samples) -> &[Vec3], channel| {
             if sampled.iter().all(|samples| values(samples).is_empty()) {
@@ -209,22 +332,37 @@ impl ClipPair<'_> {
                 };
                 origin.unwrap_or_default() + relative.unwrap_or_else(rest).as_dvec3()
             };
-            let mut tally = Tally::default();
-            for [a, b] in each() {
-                tally.add(value(0, a).distance(value(1, b)));
+            let mut tallies = ChannelTallies::new(pairs.len());
+            for (track, [a, b]) in each() {
+                tallies.add(track, value(0, a).distance(value(1, b)));
             }
-            Some(found(tally, 1.0))
+            Some(tallies)
         };
+        let translations = apart(|samples| &samples.translations, Channel::Translation);
+        let scales = apart(|samples| &samples.scales, Channel::Scale);
+        let degrees = 1f64.to_degrees();
+        let joints = pairs.iter().enumerate().map(|(track, pair)| {
+            let lengths = |tallies: &ChannelTallies| of_track(tallies, track, 1.0);
+            JointDifference {
+                track: name(pair),
+                rotation: of_track(&angles, track, degrees),
+                translation: translations.as_ref().map(lengths),
+                scale: scales.as_ref().map(lengths),
+            }
+        });
+        let joints = joints.collect();
+        let lengths = |tallies: &ChannelTallies| of_all(tallies, 1.0);
         Ok(ClipDifference {
             inputs: inputs.map(str::to_owned),
             tracks: pairs.len(),
             missing,
             samples: times.len(),
-            span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0)),
+            span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0) + clock),
             identical,
-            rotation: found(angles, 1f64.to_degrees()),
-            translation: apart(|samples| &samples.translations, Channel::Translation),
-            scale: apart(|samples| &samples.scales, Channel::Scale),
+            rotation: of_all(&angles, degrees),
+            translation: translations.as_ref().map(lengths),
+            scale: scales.as_ref().map(lengths),
+            joints,
         })
     }
 
@@ -333,6 +471,30 @@ impl ClipPair<'_> {
 
 /// Pairs of tracks, and the tracks that only one of two clips has.
 type TrackPairs = (Vec<[usize; 2]>, [Vec<usize>; 2]);
+
+/// Numbers the frames of a clip, from 0 at its first key.
+#[derive(Debug, Clone, Copy)]
+struct FrameNumbers {
+    first: f64,
+    per_second: f64,
+}
+
+impl FrameNumbers {
+    /// `None` if the keys are not frames of a rate.
+    fn of(clip: &Motion) -> Option<Self> {
+        let rate = clip.rate.or_else(|| clip.rate_of_keys())?;
+        Some(Self {
+            first: clip.set.time_span()?.0,
+            per_second: rate.per_second(),
+        })
+    }
+
+    /// The frame of a time in the set, rounded to a thousandth.
+    fn of_time(self, time: f64) -> f64 {
+        let frame = (time - self.first) * self.per_second;
+        (frame * 1e3).round() / 1e3
+    }
+}
 
 /// All poses of a clip, and the origin to add to the translations of each track.
 fn poses(

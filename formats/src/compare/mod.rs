@@ -10,7 +10,9 @@ use tumble::{Error, JointMatchError};
 use crate::world::HierarchyError;
 
 pub use crate::compare::arrays::ArrayDifference;
-pub use crate::compare::clips::{ChannelDifference, ClipDifference, ClipPair, CommonTimes};
+pub use crate::compare::clips::{
+    ChannelDifference, ClipDifference, ClipPair, CommonTimes, JointDifference, TimedSpread,
+};
 pub use crate::compare::paths::{
     AlignmentSummary, PathDifference, PathErrors, PathMeasure, PathStatistics,
 };
@@ -75,9 +77,22 @@ pub enum CompareError {
         /// First and last key time of each clip, in seconds, on the clock of the first clip.
         spans: [[f64; 2]; 2],
     },
-    /// The estimate has no pose at the time of any pose of the reference.
+    /// The requested times lie outside those that both clips have.
     #[error(
-        "{} and {}: no pose of the first lies at a time of the second", inputs[0], inputs[1]
+        "{} and {}: times from {} to {} s are asked for, and both have times from {} to {} s",
+        inputs[0], inputs[1], range[0], range[1], common[0], common[1]
+    )]
+    RangeOutside {
+        /// Names of the clips in messages.
+        inputs: [String; 2],
+        /// First and last requested time, in seconds, on the clock of the first clip.
+        range: [f64; 2],
+        /// First and last common time, in seconds, on the clock of the first clip.
+        common: [f64; 2],
+    },
+    /// No pose of one path has one of the other at its time.
+    #[error(
+        "{} and {}: no pose of one lies at a time of the other", inputs[0], inputs[1]
     )]
     NoPoseInBoth {
         /// Names of the clips in messages.

@@ -55,6 +55,7 @@ pub static FORMAT: Format = Format {
         Feature::TrackNames,
         Feature::Translations,
         Feature::Scales,
+        Feature::Curves,
         Feature::World,
         Feature::UnevenTimes,
         Feature::Start,

@@ -194,8 +194,12 @@ fn loss(
             "that channels hold each key until the next one",
         ),
         Feature::Lines => (
-            is_at_keys(sampled) && (0..clip.set.track_count()).any(|track| has_lines(clip, track)),
+            is_at_keys(sampled) && bends_by(clip, Some(ChannelInterpolation::Linear)),
             "that lines and arcs join the keys (evaluate them with the method slerp)",
+        ),
+        Feature::Curves => (
+            is_at_keys(sampled) && bends_by(clip, None),
+            "that smooth curves join the keys (lines and arcs join them there; more frames are nearer to the curves)",
         ),
         Feature::Bvh => (
             !clip.bvh.is_empty() && !clip.is_world,
@@ -220,21 +224,25 @@ fn is_at_keys(sampled: &SampledClip<'_>) -> bool {
     sampled.is_at_keys || sampled.times == sampled.clip.key_times()
 }
 
-/// Whether a channel of a track is linear and would be another curve by a smooth method: two keys are joined by the
-/// same line, and equal keys do not move.
-fn has_lines(clip: &Motion, track: usize) -> bool {
-    fn bends<T: PartialEq>(keys: &[T]) -> bool {
-        keys.len() > 2 && keys.windows(2).any(|pair| pair[0] != pair[1])
+/// Whether a channel has this interpolation, and lines and a smooth method would join its keys differently: two keys
+/// are joined by the same line, and equal keys do not move.
+fn bends_by(clip: &Motion, interpolation: Option<ChannelInterpolation>) -> bool {
+    fn bends<T: Copy>(keys: &[T], is_same: fn(T, T) -> bool) -> bool {
+        keys.len() > 2 && keys.windows(2).any(|pair| !is_same(pair[0], pair[1]))
     }
-    let linear = Some(ChannelInterpolation::Linear);
-    let channels = clip.channel(track);
-    let vectors = |channel| clip.set.vector_keys(channel, track);
-    channels.rotation == linear && bends(clip.set.track(track).keys)
-        || [Channel::Translation, Channel::Scale]
-            .into_iter()
-            .filter(|&channel| channels.of(channel) == linear)
-            .filter_map(vectors)
-            .any(|vectors| bends(vectors.keys))
+    let is_same_rotation = |a: Quat, b: Quat| a == b || a == -b;
+    let set = &clip.set;
+    let track_bends = |track: usize| {
+        let channels = clip.channel(track);
+        let vectors = |channel| set.vector_keys(channel, track);
+        channels.rotation == interpolation && bends(set.track(track).keys, is_same_rotation)
+            || [Channel::Translation, Channel::Scale]
+                .into_iter()
+                .filter(|&channel| channels.of(channel) == interpolation)
+                .filter_map(vectors)
+                .any(|vectors| bends(vectors.keys, |a: Vec3, b| a == b))
+    };
+    (0..set.track_count()).any(track_bends)
 }
 
 /// A message about the contents of a file that none of its clips contains, and that a new file made of these clips

@@ -46,6 +46,7 @@ pub static FORMAT: Format = Format {
         Feature::Quaternions,
         Feature::TrackNames,
         Feature::Translations,
+        Feature::Curves,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,

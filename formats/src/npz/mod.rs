@@ -58,6 +58,7 @@ pub static FORMAT: Format = Format {
         Feature::Scales,
         Feature::Steps,
         Feature::Lines,
+        Feature::Curves,
         Feature::Bvh,
         Feature::World,
         Feature::UnevenTimes,

@@ -20,6 +20,7 @@ __all__ = [
     "DeviceArray",
     "Engine",
     "File",
+    "JointDifference",
     "Motions",
     "PathErrors",
     "PathStatistics",
@@ -1254,6 +1255,19 @@ class ChannelDifference:
     def track(self) -> str: ...
     @property
     def time(self) -> float: ...
+    @property
+    def frame(self) -> float | None: ...
+
+@final
+class JointDifference:
+    @property
+    def track(self) -> str: ...
+    @property
+    def rotation(self) -> ChannelDifference: ...
+    @property
+    def translation(self) -> ChannelDifference | None: ...
+    @property
+    def scale(self) -> ChannelDifference | None: ...
 
 @final
 class ClipDifference:
@@ -1273,6 +1287,8 @@ class ClipDifference:
     def translation(self) -> ChannelDifference | None: ...
     @property
     def scale(self) -> ChannelDifference | None: ...
+    @property
+    def joints(self) -> list[JointDifference]: ...
 
 @final
 class PathStatistics:
@@ -1291,6 +1307,8 @@ class PathStatistics:
 
 @final
 class PathErrors:
+    @property
+    def times_of(self) -> int: ...
     @property
     def poses(self) -> int: ...
     @property
@@ -1346,6 +1364,7 @@ def path_errors(
     *,
     align: _Align = "none",
     rpe: str | None = None,
+    associate: str = "interpolated",
     max_gap: float | None = None,
     track: int | str | None = None,
     engine: Engine | None = None,

@@ -1,20 +1,21 @@
 //! `tumble compare`: how far two motions, or two results, are apart.
 
+mod table;
 mod text;
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::TypedValueParser;
 use serde::Serialize;
-use tumble::{Device, Engine, FrameRate, SampleTimes};
+use tumble::{Device, Engine, FrameRate};
 use tumble_formats::compare::{
     ArrayDifference, ClipDifference, ClipPair, CompareError, PathDifference, PathMeasure,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::open_numbers;
-use tumble_formats::trajectory::{Align, Step};
+use tumble_formats::trajectory::{Align, Associate, Step};
 use tumble_formats::{Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
@@ -22,6 +23,7 @@ use crate::arguments::output::one_of;
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::room;
+use crate::commands::compare::table::{TableArguments, csv_table};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::{listing, names, words};
 
@@ -30,19 +32,25 @@ use crate::messages::{listing, names, words};
 #[command(after_help = "\
 Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway
 between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only
-if neither file has names; joints with other parents are compared with --world alone. Two NPY files are compared number by number, and by angles if they contain
+if neither file has names; joints with other parents are compared with --world alone. A table lists
+the joints that are furthest apart. Frames are those of the first input, from 0 at its first key;
+frame 7.5 is halfway between two. Two NPY files are compared number by number, and by angles if they contain
 rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these
 options it is also 8 if a track is missing in one of the motions.
-With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. It is
-interpolated by lines and arcs at the times of the first input's poses, aligned by --align, and
-compared as by the program evo. --tolerance and --distance are then limits of the absolute errors.
+With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. Both are
+compared as by the program evo, after the alignment by --align, at the times of the input with fewer
+poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest
+pose within 0.01 s instead, as evo does. --tolerance and --distance are then limits of the absolute errors.
 
 Examples:
   tumble compare walk.bvh walk.glb
   tumble compare walk.bvh reduced.glb --world --tolerance 0.1deg --distance 0.5
+  tumble compare walk.bvh retargeted.bvh --world --worst-by distance --top 5
+  tumble compare walk.bvh walk.glb --csv > joints.csv
   tumble compare one.npy other.npy --tolerance 0
   tumble compare a.dat b.dat --fps 240 --json
-  tumble compare truth.tum estimate.tum --align sim3 --ape --rpe 1m")]
+  tumble compare truth.tum estimate.tum --align sim3 --ape --rpe 1m
+  tumble compare truth.tum estimate.tum --align se3 --ape --associate nearest:0.01")]
 pub(crate) struct Arguments {
     /// Two keyframe files, or two results of `tumble eval`
     #[command(flatten)]
@@ -75,12 +83,20 @@ pub(crate) struct Arguments {
     /// Relative errors: over steps of this many seconds, or units of length along the second path
     #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
-    /// The longest gap, seconds: poses between two of the second that are further apart are left out
+    /// How poses are associated: interpolated, or nearest:SECONDS, the nearest at most so far away
+    #[arg(long, value_name = "HOW", value_parser = association, help_heading = TRAJECTORIES)]
+    associate: Option<Associate>,
+    /// The longest gap, seconds: poses between two of the interpolated input that are further apart are left out
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, help_heading = TRAJECTORIES)]
     max_gap: Option<f64>,
+    #[command(flatten)]
+    table: TableArguments,
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Print a table of the joints as CSV
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
 }
 
 fn alignment() -> impl TypedValueParser<Value = Align> {
@@ -92,6 +108,10 @@ fn alignment() -> impl TypedValueParser<Value = Align> {
         Align::Sim3 => "move, turn and scale it",
     };
     one_of(Align::ALL.map(|align| (align.name(), help(align), align)))
+}
+
+fn association(text: &str) -> Result<Associate, String> {
+    text.parse::<Associate>().map_err(|error| error.to_string())
 }
 
 fn step(text: &str) -> Result<Step, String> {
@@ -148,10 +168,10 @@ enum ComparisonReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let inputs = arguments.inputs.distinct(false)?;
+    let inputs = arguments.paths()?;
     let [first, second] = &inputs[..] else {
         return Err(Failure::usage(format!(
-            "two different inputs are compared, not {}",
+            "two inputs are compared, not {}",
             inputs.len()
         )));
     };
@@ -160,6 +180,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage("--start and --end are for --fps; add it"));
     }
     let paths = [first.as_path(), second.as_path()];
+    arguments.check_table(paths)?;
     let (report, rest) = match arguments.are_arrays(paths)? {
         _ if arguments.is_of_trajectories() => {
             let (found, rest) = arguments.trajectory(paths)?;
@@ -174,22 +195,68 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             (ComparisonReport::Clips(found), rest)
         }
     };
-    match (&report, arguments.json) {
-        (report, true) => listing::json(report)?,
-        (ComparisonReport::Array(found), false) => listing::text(&text::of_arrays(found))?,
-        (ComparisonReport::Trajectory(found), false) => listing::text(&text::of_paths(found))?,
-        (ComparisonReport::Clips(found), false) => {
-            let lines: String = found.iter().map(text::of_clips).collect();
-            listing::text(&lines)?;
-        }
-    }
+    arguments.print(&report)?;
     arguments.judge(&report).and(rest)
 }
 
 impl Arguments {
+    /// The inputs; one that is named twice is compared with itself.
+    fn paths(&self) -> Result<Vec<PathBuf>, Failure> {
+        match self.inputs.named_paths() {
+            [first, second] if first == second && !names::is_standard(first) => {
+                self.inputs.check_formats(&[first, second])?;
+                Ok(vec![first.clone(), second.clone()])
+            }
+            _ => self.inputs.distinct(false),
+        }
+    }
+
+    /// Refuses options for the joints of motions where none are compared.
+    fn check_table(&self, paths: [&Path; 2]) -> Result<(), Failure> {
+        let compared = match self.is_of_trajectories() {
+            true => "trajectories",
+            false if self.are_arrays(paths)? => "arrays",
+            false => return Ok(()),
+        };
+        let option = self.csv.then_some("--csv").or(self.table.set_option());
+        match option {
+            Some(option) => Err(Failure::usage(format!(
+                "{option} is for the joints of motions, and two {compared} are compared; leave it out"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn print(&self, report: &ComparisonReport) -> Result<(), Failure> {
+        let table = self.table;
+        match report {
+            ComparisonReport::Clips(found) => {
+                let ordered = found.iter().map(|found| {
+                    let mut found = found.clone();
+                    found.joints = table.ordered(&found.joints);
+                    found
+                });
+                if self.csv {
+                    let csv = csv_table(&ordered.collect::<Vec<_>>());
+                    let csv = csv.map_err(|error| Failure::writing("standard output", &error))?;
+                    return listing::text(&csv);
+                }
+                if self.json {
+                    return listing::json(&ComparisonReport::Clips(ordered.collect()));
+                }
+                let lines: String = found.iter().map(|it| text::of_clips(it, table)).collect();
+                listing::text(&lines)
+            }
+            report if self.json => listing::json(report),
+            ComparisonReport::Array(found) => listing::text(&text::of_arrays(found)),
+            ComparisonReport::Trajectory(found) => listing::text(&text::of_paths(found)),
+        }
+    }
+
     /// Whether the second is an estimate of the path of the first.
     fn is_of_trajectories(&self) -> bool {
-        self.align.is_some() || self.ape || self.rpe.is_some() || self.max_gap.is_some()
+        let has_option = self.align.is_some() || self.associate.is_some() || self.max_gap.is_some();
+        has_option || self.ape || self.rpe.is_some()
     }
 
     /// The one track of both files, as paths.
@@ -198,8 +265,14 @@ impl Arguments {
         paths: [&Path; 2],
     ) -> Result<(PathDifference, Result<(), Failure>), Failure> {
         if self.fps.is_some() || self.world {
-            let message = "trajectories are compared in the world at the poses of the first; leave out --fps and --world";
+            let message = "trajectories are compared in the world at their poses; leave out --fps and --world";
             return Err(Failure::usage(message));
+        }
+        let associate = self.associate.unwrap_or_default();
+        if matches!(associate, Associate::Nearest(_)) && self.max_gap.is_some() {
+            return Err(Failure::usage(
+                "--max-gap is for interpolated poses, and --associate nearest takes poses as they are; leave out one",
+            ));
         }
         let [first, second] = [
             self.inputs.load_one(paths[0])?,
@@ -229,6 +302,7 @@ impl Arguments {
             align: self.align.unwrap_or_default(),
             is_absolute: self.ape || self.rpe.is_none(),
             step: self.rpe,
+            associate,
             max_gap: self.max_gap,
         };
         let clips = [
@@ -236,6 +310,7 @@ impl Arguments {
             (&*names[1], &second.clip, tracks[1]),
         ];
         let found = PathDifference::of(&engine, clips, &measure).map_err(refused)?;
+        found.warnings.iter().for_each(|it| words::warning(it));
         Ok((found, first.rest.and(second.rest)))
     }
 
@@ -348,11 +423,11 @@ impl Arguments {
         for warning in common.warning.iter().chain(&pair.assumption()) {
             words::warning(warning);
         }
-        // The times are those of the first clip.
-        let whole = (common.start, common.end);
-        let (start, end) = pair.clips[0].range_in_set(self.start, self.end, whole);
         let frames = match self.fps {
-            Some(rate) => SampleTimes::rate(rate).between(start, end),
+            Some(rate) => {
+                let frames = pair.frames(&common, rate, self.start, self.end);
+                frames.map_err(refused)?
+            }
             None => pair.keys(&common),
         };
         for (name, clip) in pair.inputs.into_iter().zip(pair.clips) {
@@ -366,9 +441,8 @@ impl Arguments {
     fn judge(&self, report: &ComparisonReport) -> Result<(), Failure> {
         let over = |quantity: &str, largest: f64, bound: Option<f64>, unit: &str| {
             let bound = bound.filter(|&bound| largest > bound)?;
-            Some(format!(
-                "{quantity} of {largest:.3e}{unit} over {bound}{unit}"
-            ))
+            let largest = words::decimals(largest);
+            Some(format!("{quantity} of {largest}{unit} over {bound}{unit}"))
         };
         let mut faults = Vec::new();
         match report {

@@ -6,29 +6,31 @@ use tumble_formats::compare::{
 };
 use tumble_formats::printable::printable;
 
+use crate::commands::compare::table::{TableArguments, joints_text};
 use crate::messages::words;
 
-/// Lines that say how far two clips are apart.
-pub(super) fn of_clips(difference: &ClipDifference) -> String {
+/// Lines that say how far two clips are apart, with a table of the joints that are furthest apart.
+pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> String {
     let mut text = format!(
         "{} and {}: {} × {} from {} to {} s\n",
         difference.inputs[0],
         difference.inputs[1],
         words::count(difference.tracks, "track"),
         words::count(difference.samples, "sample"),
-        difference.span[0],
-        difference.span[1]
+        words::seconds(difference.span[0]),
+        words::seconds(difference.span[1])
     );
     let mut line = |label: &str, unit: &str, found: &ChannelDifference| {
-        let Spread { mean, rms, largest } = found.spread;
-        let position = match largest > 0.0 {
-            true => format!(" at {}, {:.4} s", printable(&found.track), found.time),
+        let position = match found.spread.largest > 0.0 {
+            true => {
+                let frame = found.frame.map(|frame| format!(" (frame {frame})"));
+                let time = words::seconds(found.time);
+                let frame = frame.unwrap_or_default();
+                format!(" at {}, {time} s{frame}", printable(&found.track))
+            }
             false => String::new(),
         };
-        text += &format!(
-            "  {label:<12} mean {mean:.3e}{unit}, rms {rms:.3e}{unit}, largest \
-                 {largest:.3e}{unit}{position}\n"
-        );
+        text += &format!("  {label:<12} {}{position}\n", spread(&found.spread, unit));
     };
     line("rotation", "°", &difference.rotation);
     for (label, found) in [
@@ -53,27 +55,27 @@ pub(super) fn of_clips(difference: &ClipDifference) -> String {
             );
         }
     }
-    text
+    text + &joints_text(difference, table)
+}
+
+/// `mean 0.0166°, rms 0.08211°, largest 17.04°`.
+fn spread(Spread { mean, rms, largest }: &Spread, unit: &str) -> String {
+    let [mean, rms, largest] = [mean, rms, largest].map(|number| words::decimals(*number));
+    format!("mean {mean}{unit}, rms {rms}{unit}, largest {largest}{unit}")
 }
 
 /// Lines that say how far two arrays are apart.
 pub(super) fn of_arrays(found: &ArrayDifference) -> String {
     let mut text = format!(
-        "array of shape {:?}: {} of {} numbers differ\n  difference   mean {:.3e}, rms {:.3e}, \
-             largest {:.3e} at {:?}\n",
+        "array of shape {:?}: {} of {} numbers differ\n  difference   {} at {:?}\n",
         found.shape,
         found.differing,
         found.numbers,
-        found.difference.mean,
-        found.difference.rms,
-        found.difference.largest,
+        spread(&found.difference, ""),
         found.largest_at
     );
     if let (Some(angles), Some(at)) = (&found.rotation, &found.largest_rotation_at) {
-        text += &format!(
-            "  angle        mean {:.3e}°, rms {:.3e}°, largest {:.3e}° at {at:?}\n",
-            angles.mean, angles.rms, angles.largest
-        );
+        text += &format!("  angle        {} at {at:?}\n", spread(angles, "°"));
     }
     text
 }
@@ -82,13 +84,14 @@ pub(super) fn of_arrays(found: &ArrayDifference) -> String {
 pub(super) fn of_paths(found: &PathDifference) -> String {
     let [first, second] = found.inputs.each_ref().map(|name| printable(name));
     let mut text = format!(
-        "{first} and {second}: {} from {} to {} s",
+        "{first} and {second}: {} of the {} from {} to {} s",
         words::count(found.poses, "pose"),
-        found.span[0],
-        found.span[1]
+        ["first", "second"][found.times_of],
+        words::seconds(found.span[0]),
+        words::seconds(found.span[1])
     );
     for (count, why) in [
-        (found.outside, "outside the times of the second"),
+        (found.outside, "without one of the other"),
         (found.in_gaps, "in its gaps"),
     ] {
         if count > 0 {

@@ -156,18 +156,8 @@ impl EvaluationJob<'_> {
 
     /// Refuses options that have no effect on the methods of a clip's channels.
     fn check_interpolation(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
-        let used_methods: Vec<Method> = methods
-            .groups_of(clip)
-            .iter()
-            .map(|group| group.0)
-            .collect();
-        let checked = self.arguments.interpolation.check(&used_methods);
-        checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
+        let (options, method) = (self.arguments.interpolation, self.arguments.method);
+        options.check_clip(name, clip, &[method])
     }
 
     /// With `--explain-route`, prints the route by which a clip's rotations are evaluated.

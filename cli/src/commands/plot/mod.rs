@@ -14,19 +14,22 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::Vec3;
-use tumble::{Interpolation, Method, TrackSet, method};
+use tumble::{TrackSet, method};
+use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
+    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, curve_warning,
+    each_once, method_arguments,
 };
+use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
 use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
-use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::PlotSubject;
+use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PlotQuantity, Subjects, moving_boxes, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
@@ -51,6 +54,8 @@ Examples:
   tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
 pub(crate) struct Arguments {
     #[command(flatten)]
+    command_line: CommandLine,
+    #[command(flatten)]
     inputs: Inputs,
     /// Where to write: FILE.svg, FILE.png, or a directory for several pictures
     #[arg(short, long = "out", value_name = "OUT")]
@@ -58,10 +63,10 @@ pub(crate) struct Arguments {
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
-    /// How to interpolate: one method or several, or all [default: bessel-overhauser; for a
-    /// report slerp,catmull-rom,bessel-overhauser]
-    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = methods())]
-    methods: Vec<MethodSelection>,
+    /// How to interpolate: one method or several, or all [default: authored; for a report
+    /// slerp,catmull-rom,bessel-overhauser]
+    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
+    methods: Vec<MethodArgumentSelection>,
     /// What to draw [default: components; of files of paths, path]
     #[arg(long, value_enum, value_name = "WHAT")]
     show: Option<PlotQuantity>,
@@ -161,10 +166,11 @@ enum PlotOutput {
 }
 
 /// Says where curves are less smooth than their methods promise.
-fn note_curves(name: &str, set: &TrackSet, interpolations: &[Interpolation]) {
-    let warnings = interpolations
-        .iter()
-        .filter_map(|interpolation| curve_warning(name, set, interpolation));
+fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
+    // No file asks for such a method.
+    let named = choices.iter().filter_map(|choice| choice.method.0);
+    let interpolations = named.map(|method| choices[0].options.with(method));
+    let warnings = interpolations.filter_map(|one| curve_warning(name, &clip.set, &one));
     for warning in warnings {
         words::note(&warning.to_string());
     }
@@ -174,18 +180,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments
         .inputs
         .distinct(arguments.sampling.reads_standard_input())?;
-    let samples = arguments.sampling.samples()?;
+    let samples = PlotSamples {
+        request: arguments.sampling.samples()?,
+        is_rate_chosen: arguments.command_line.has("fps"),
+    };
     refuse_shared_names(&inputs)?;
     let out = arguments.output(&inputs)?;
-    let methods = arguments.methods();
-    arguments
-        .interpolation
-        .check(&methods)
-        .map_err(Failure::usage)?;
-    let interpolations: Vec<Interpolation> = methods
-        .iter()
-        .map(|&method| arguments.interpolation.with(method))
-        .collect();
     let mut writer = FigureWriter {
         device: arguments.device.open()?,
         format: arguments.format(),
@@ -194,12 +194,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         drawn: 0,
     };
     if let (true, PlotOutput::Folder(folder)) = (arguments.report, &out) {
-        return report::write(arguments, &mut writer, &interpolations, &samples, folder);
+        return report::write(arguments, &mut writer, &samples, folder);
     }
     let outcome = for_each(&inputs, |path| {
         let name = names::input(path);
         let stem = names::stem(path);
-        if let Some((source, makers, rest)) = arguments.bodies(path, &interpolations)? {
+        if let Some((source, makers, rest)) = arguments.bodies(path)? {
             let title = (&*name, names::file(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
             let file = match &out {
@@ -210,16 +210,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             return writer.draw(&figure, &file).and(rest);
         }
-        let input::OnlyClip { clip, rest } = arguments.inputs.load_one(path)?;
+        let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
-        note_curves(&name, &clip.set, &interpolations);
-        let source = PlotSource::new(names::file(path), &clip, &interpolations, &samples)?;
+        let choices = arguments.choices(&name, &clip)?;
+        note_curves(&name, &clip, &choices);
+        let source = PlotSource::new(names::file(path), &clip, &choices, &samples)?;
         let subjects = arguments.subjects(&clip.set, tracks, &name)?;
         let pictures = match &out {
-            PlotOutput::One(file) => vec![(
-                file.clone(),
-                together(&subjects, interpolations.len(), &name)?,
-            )],
+            PlotOutput::One(file) => {
+                vec![(file.clone(), together(&subjects, choices.len(), &name)?)]
+            }
             PlotOutput::Folder(folder) => {
                 let file = |(label, subject): (String, PlotSubject)| {
                     let name = format!("{stem}-{label}.{}", writer.format.extension());
@@ -250,17 +250,30 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    fn methods(&self) -> Vec<Method> {
-        let methods = chosen(&self.methods);
+    fn methods(&self) -> Vec<MethodArgument> {
+        let methods = each_once(self.methods.iter().flat_map(|selection| &selection.0));
         match (methods.is_empty(), self.report) {
             (false, _) => methods,
-            (true, false) => vec![method::BESSEL_OVERHAUSER],
-            (true, true) => vec![
+            (true, false) => vec![MethodArgument(None)],
+            (true, true) => [
                 method::SLERP,
                 method::CATMULL_ROM,
                 method::BESSEL_OVERHAUSER,
-            ],
+            ]
+            .map(|method| MethodArgument(Some(method)))
+            .to_vec(),
         }
+    }
+
+    /// The methods that draw a clip, each differently.
+    fn choices(&self, name: &str, clip: &Motion) -> Result<Vec<CurveChoice>, Failure> {
+        let methods = MethodArgument::distinct(&self.methods(), clip);
+        self.interpolation.check_clip(name, clip, &methods)?;
+        let choice = |method| CurveChoice {
+            method,
+            options: self.interpolation,
+        };
+        Ok(methods.into_iter().map(choice).collect())
     }
 
     fn show(&self) -> PlotQuantity {
@@ -269,11 +282,7 @@ impl Arguments {
 
     /// The bodies on the paths of a file, if these are to be drawn, their makers, and the failure of
     /// animations that were refused.
-    fn bodies(
-        &self,
-        path: &Path,
-        interpolations: &[Interpolation],
-    ) -> Result<Option<Bodies>, Failure> {
+    fn bodies(&self, path: &Path) -> Result<Option<Bodies>, Failure> {
         let name = names::input(path);
         match self.show {
             None | Some(PlotQuantity::Path) if is_path_file(path) => {
@@ -282,14 +291,14 @@ impl Arguments {
                 Ok(Some((source, frames.collect(), Ok(()))))
             }
             Some(PlotQuantity::Path) => {
-                let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
+                let input::OnlyClip { clip, rest, .. } = self.inputs.load_one(path)?;
                 if !is_travel(&clip) {
                     let message =
                         "is neither a file of paths nor one of moving joints without parents";
                     return Err(Failure::usage(format!("{name}: {message}")));
                 }
-                let methods = interpolations.iter().copied().map(Maker::Method);
                 let clip = self.inputs.tracks.select(&clip, &name)?.into_owned();
+                let methods = self.choices(&name, &clip)?.into_iter().map(Maker::Method);
                 let source = travel::TravelSource::Clip(Box::new(clip));
                 Ok(Some((source, methods.collect(), rest)))
             }

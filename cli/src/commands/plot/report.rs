@@ -6,14 +6,14 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use tumble::{Interpolation, TrackSet};
+use tumble::TrackSet;
 use tumble_formats::motion::Motion;
 
-use crate::arguments::time::SampleRequest;
+use crate::arguments::interpolation::CurveChoice;
 use crate::batch::target::Destination;
 use crate::commands::info::Steps;
-use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::{NAMES, PlotSubject};
+use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
 use crate::messages::exit::{Failure, for_each};
@@ -39,21 +39,21 @@ struct Chapter {
 pub(crate) fn write(
     arguments: &Arguments,
     writer: &mut FigureWriter,
-    interpolations: &[Interpolation],
-    samples: &SampleRequest,
+    samples: &PlotSamples,
     folder: &Path,
 ) -> Result<(), Failure> {
     let inputs = writer.inputs.clone();
     let page = Destination::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
     page.check_writable()?;
-    let each = figures_of_one(interpolations.len());
+    let each = figures_of_one(arguments.methods().len());
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
     let outcome = for_each(&inputs, |path| {
         let only = progress.suspend(|| arguments.inputs.load_one(path))?;
         let (clip, set) = (&only.clip, &only.clip.set);
         let name = names::input(path);
-        progress.suspend(|| note_curves(&name, set, interpolations));
+        let choices = arguments.choices(&name, clip)?;
+        progress.suspend(|| note_curves(&name, clip, &choices));
         let mut boxes = progress.suspend(|| moving_boxes(set, &name));
         boxes.truncate(PANELS);
         let chapter = Chapter {
@@ -62,7 +62,7 @@ pub(crate) fn write(
             figures: figures(
                 writer,
                 (path, clip, boxes),
-                interpolations,
+                &choices,
                 samples,
                 folder,
                 &mut progress,
@@ -93,8 +93,8 @@ fn figures_of_one(methods: usize) -> usize {
 fn figures(
     writer: &mut FigureWriter,
     (path, clip, boxes): (&PathBuf, &Motion, Vec<usize>),
-    interpolations: &[Interpolation],
-    samples: &SampleRequest,
+    choices: &[CurveChoice],
+    samples: &PlotSamples,
     folder: &Path,
     progress: &mut Progress,
 ) -> Result<Vec<ReportFigure>, Failure> {
@@ -123,15 +123,15 @@ fn figures(
         let subject = PlotSubject::Dimensions(vec![dimension - 1]);
         let (component, index) = (NAMES[(dimension - 1) % 4], (dimension - 1) / 4 + 1);
         let about = format!("dimension {dimension}, {component} of box {index}");
-        for one in interpolations.chunks(1) {
+        for one in choices.chunks(1) {
             let method = one[0].method;
             let label = format!("{method}-dimension-{dimension}");
             draw(writer, one, &label, format!("{method}: {about}"), &subject)?;
         }
-        if interpolations.len() > 1 {
+        if choices.len() > 1 {
             let label = format!("all-dimension-{dimension}");
             let caption = format!("all together: {about}");
-            draw(writer, interpolations, &label, caption, &subject)?;
+            draw(writer, choices, &label, caption, &subject)?;
         }
     }
     for (label, caption, subject) in [
@@ -151,7 +151,7 @@ fn figures(
             PlotSubject::Sphere(boxes, Vec3::NEG_Y),
         ),
     ] {
-        draw(writer, interpolations, label, caption.to_owned(), &subject)?;
+        draw(writer, choices, label, caption.to_owned(), &subject)?;
     }
     Ok(shown)
 }

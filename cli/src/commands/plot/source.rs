@@ -7,6 +7,7 @@ use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
 use tumble_formats::motion::Motion;
 
 use crate::arguments::device::OpenedDevice;
+use crate::arguments::interpolation::CurveChoice;
 use crate::arguments::time::SampleRequest;
 use crate::batch::room;
 use crate::commands::plot::figure::TimeAxis;
@@ -16,11 +17,43 @@ use crate::messages::words;
 /// More keys than this stand too close for upright lines.
 const UPRIGHTS: usize = 200;
 
+/// Even times of a curve, so that it is smooth in the picture.
+const EVEN_TIMES: usize = 1000;
+
+/// The samples of curves.
+pub(crate) struct PlotSamples {
+    pub(crate) request: SampleRequest,
+    /// Whether the command line says the rate of frames; else a curve has as many as the picture needs.
+    pub(crate) is_rate_chosen: bool,
+}
+
+/// The times of a curve that goes through its keys: frames of a rate that was chosen, else even times, and
+/// all keys between the first of them and `last`.
+fn with_keys(frames: Vec<f64>, last: Option<f64>, clip: &Motion, is_rate_chosen: bool) -> Vec<f64> {
+    let (Some(&first), Some(&last_frame)) = (frames.first(), frames.last()) else {
+        return frames;
+    };
+    let last = last.unwrap_or(last_frame).max(last_frame);
+    let mut times = match is_rate_chosen || frames.len() > EVEN_TIMES {
+        true => frames,
+        false => {
+            let at = |i: usize| first + (last - first) * i as f64 / EVEN_TIMES as f64;
+            (0..=EVEN_TIMES).map(at).collect()
+        }
+    };
+    let keys = clip.key_times();
+    times.extend(keys.into_iter().filter(|key| (first..=last).contains(key)));
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+}
+
 /// One input, and how to evaluate it.
 pub(crate) struct PlotSource<'a> {
     pub(crate) name: String,
+    pub(crate) clip: &'a Motion,
     pub(crate) set: &'a TrackSet,
-    pub(crate) interpolations: &'a [Interpolation],
+    pub(crate) choices: &'a [CurveChoice],
     pub(crate) frames: SampleTimes,
     pub(crate) timeline: Timeline,
     pub(crate) x: TimeAxis,
@@ -31,27 +64,29 @@ impl<'a> PlotSource<'a> {
     pub(crate) fn new(
         name: String,
         clip: &'a Motion,
-        interpolations: &'a [Interpolation],
-        samples: &SampleRequest,
+        choices: &'a [CurveChoice],
+        samples: &PlotSamples,
     ) -> Result<Self, Failure> {
         let set = &clip.set;
-        let mut frames = samples.of(clip, &name);
-        if let SampleRequest::Rate { .. } = samples
+        let mut frames = samples.request.of(clip, &name);
+        let resolve = |frames: &SampleTimes| {
+            let timeline = frames.resolve(set.track_count(), set.time_span());
+            timeline.map_err(|error| Failure::evaluating(&name, &error.into()))
+        };
+        if let SampleRequest::Rate { .. } = samples.request
             && let Some(span) = set.time_span()
         {
             // A box alone has the frames of the whole set.
             frames = frames.spanning(span);
         }
-        let timeline = frames
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(&name, &error.into()))?;
+        let mut timeline = resolve(&frames)?;
         room::to_draw(&name, timeline.len())?;
         if timeline.is_empty() {
             return Err(Failure::usage(format!(
                 "{name}: there are no samples to plot"
             )));
         }
-        let about = match samples {
+        let mut about = match samples.request {
             SampleRequest::Rate { rate, .. } => {
                 let count = words::count(timeline.len(), "frame");
                 format!("{count}, {rate} per second")
@@ -60,6 +95,19 @@ impl<'a> PlotSource<'a> {
                 words::count(timeline.len(), "time")
             }
         };
+        if let SampleRequest::Rate { end, .. } = samples.request {
+            let times: Vec<f64> = timeline.times(0).collect();
+            let last = end
+                .map(|end| clip.time_in_set(end))
+                .or(set.time_span().map(|span| span.1));
+            let times = with_keys(times, last, clip, samples.is_rate_chosen);
+            frames = SampleTimes::at(times);
+            timeline = resolve(&frames)?;
+            room::to_draw(&name, timeline.len())?;
+            if !samples.is_rate_chosen {
+                about = words::count(timeline.len(), "sample");
+            }
+        }
         let (first, last) = timeline
             .times(0)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), time| {
@@ -68,13 +116,19 @@ impl<'a> PlotSource<'a> {
         let x = TimeAxis::of(first, last);
         Ok(Self {
             name,
+            clip,
             set,
-            interpolations,
+            choices,
             frames,
             timeline,
             x,
             about,
         })
+    }
+
+    /// How the rotations of a box are interpolated.
+    pub(crate) fn interpolation(&self, choice: CurveChoice, index: usize) -> Interpolation {
+        choice.of_track(self.clip, index)
     }
 
     /// The samples of one box, each with the sign that continues the one before it: a

@@ -1,75 +1,176 @@
-//! What stands in a picture: chains of boxes, or bodies on paths.
+//! What stands in a picture: chains of boxes, skeletons and their meshes, or bodies on paths.
 
-use glam::Vec3;
-use tumble::{Interpolation, Layout, SampleTimes, Skeleton, TrackSet};
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use tumble::{Error, SampleTimes};
+use tumble_formats::carried_mesh::CarriedMesh;
+use tumble_formats::motion::{Joint, Motion, Transform};
+use tumble_formats::world::{HierarchyError, world, world_matrices};
 use tumble_routes::mesh::Mesh;
 
 use crate::arguments::device::OpenedDevice;
-use crate::commands::render::scene::{Actor, Surroundings};
+use crate::arguments::interpolation::CurveChoice;
+use crate::batch::room;
+use crate::commands::render::bones::{Bones, Skin};
+use crate::commands::render::scene::{Actor, Shape, Surroundings};
 use crate::commands::render::solids::{Body, meshes, trails};
-use crate::commands::travel::{Maker, Scenery, TravelSource};
+use crate::commands::travel::{Maker, Scenery, TravelSource, positions_of, scene_origin};
 use crate::messages::colours::Colour;
-use crate::messages::exit::Failure;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
 
 /// Of a box that is 1 long.
 const BREADTH: f32 = 0.28;
-/// How many samples determine the extent of a chain.
+/// How many samples determine the extent of a motion.
 const REACHES: usize = 200;
 
-/// The boxes of a set as a chain, by one method.
-pub(super) fn chain(
-    device: &mut OpenedDevice,
-    name: &str,
-    set: &TrackSet,
-    interpolation: Interpolation,
-    frames: &SampleTimes,
-) -> Result<Actor, Failure> {
-    // A picture has no scale: boxes are 1 long, however long they are.
-    let timeline = frames
-        .resolve(set.track_count(), set.time_span())
-        .map_err(|error| Failure::evaluating(name, &error.into()))?;
-    let poses = device
-        .choose(set.track_count() * timeline.len())
-        .and_then(|()| {
-            let engine = &device.engine;
-            let local = engine
-                .request(set, interpolation, frames)
-                .layout(Layout::FrameMajor)
-                .evaluate()?;
-            engine.world(&local, &Skeleton::chain(set.track_count(), 1.0)?)
-        })
-        .map_err(|error| Failure::evaluating(name, &error))?;
-    let (tracks, samples) = (poses.track_count(), poses.sample_count());
-    let all = || (0..samples).flat_map(move |sample| (0..tracks).map(move |track| (track, sample)));
-    let mut actor = Actor {
-        name: interpolation.method.name.to_owned(),
-        tracks,
-        rotations: all()
-            .filter_map(|(track, sample)| poses.rotation(track, sample))
-            .collect(),
-        positions: all()
-            .filter_map(|(track, sample)| poses.position(track, sample))
-            .collect(),
-        body: Body::hanging(BREADTH),
-        trails: Vec::new(),
-        reach: Vec::new(),
-    };
-    for sample in (0..samples).step_by(samples.div_ceil(REACHES).max(1)) {
-        for index in sample * tracks..(sample + 1) * tracks {
-            let (rotation, hung) = (actor.rotations[index], actor.positions[index]);
-            actor.reach.extend([hung, hung + rotation * Vec3::NEG_Y]);
-        }
-    }
-    Ok(actor)
+/// A clip, as its skeleton, its mesh, or a chain of boxes.
+pub(super) struct Subject {
+    /// With the joints of a chain where it has no positions.
+    clip: Motion,
+    is_chain: bool,
+    mesh: Option<Arc<CarriedMesh>>,
 }
 
-/// What is around chains.
-pub(super) fn around_chains() -> Surroundings {
-    Surroundings {
-        ground: Vec::new(),
-        length: 1.0,
-        margin: BREADTH * 0.7,
-        shadows: false,
+impl Subject {
+    /// How a clip is drawn: tracks without positions are the boxes of a chain.
+    ///
+    /// # Errors
+    /// When its joints have parents, and positions that the file does not say.
+    pub(super) fn new(
+        clip: Motion,
+        mesh: Option<CarriedMesh>,
+        name: &str,
+    ) -> Result<Self, Failure> {
+        if let Some(reason) = &clip.no_world {
+            return Err(Failure::new(ALL_INPUTS, format!("{name}: {reason}")));
+        }
+        let is_chain = clip.skeleton.is_empty() && !clip.has_vectors();
+        Ok(Self {
+            clip: if is_chain { chain(clip) } else { clip },
+            is_chain,
+            mesh: mesh.map(Arc::new),
+        })
+    }
+
+    /// `4 boxes`, `22 joints`.
+    pub(super) fn tracks(&self) -> String {
+        let tracks = self.clip.set.track_count();
+        match self.is_chain {
+            true => words::boxes(tracks),
+            false => words::count(tracks, "joint"),
+        }
+    }
+
+    /// The clip by one method.
+    pub(super) fn actor(
+        &self,
+        device: &mut OpenedDevice,
+        name: &str,
+        choice: CurveChoice,
+        frames: &SampleTimes,
+    ) -> Result<Actor, Failure> {
+        let clip = &self.clip;
+        let tracks = clip.set.track_count();
+        let timeline = room::in_memory(name, &clip.set, frames, 7)?;
+        let samples = device
+            .choose(tracks * timeline.len())
+            .and_then(|()| device.work(|engine| choice.sample(engine, clip, frames)))
+            .map_err(|error: Error| Failure::evaluating(name, &error))?;
+        let refused = |error: HierarchyError| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
+        let poses = world(clip, &samples).map_err(refused)?;
+        let rotations: Vec<Quat> = poses.iter().map(|pose| pose.rotation).collect();
+        let positions = positions_of(clip, &poses);
+        let is_finite = positions.iter().all(|position| position.is_finite());
+        if !is_finite {
+            let message = "a position is too large for f32; scale the translations down";
+            return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
+        }
+        let count = timeline.len();
+        // Times that decide where the camera stands.
+        let seen = || (0..count).step_by(count.div_ceil(REACHES).max(1));
+        let at = |frame: usize| frame * tracks..(frame + 1) * tracks;
+        let (shape, reach) = match &self.mesh {
+            _ if self.is_chain => {
+                let ends = seen().flat_map(at).flat_map(|index| {
+                    let hung = positions[index];
+                    [hung, hung + rotations[index] * Vec3::NEG_Y]
+                });
+                (Shape::Boxes(Body::hanging(BREADTH)), ends.collect())
+            }
+            Some(mesh) => {
+                let origin = scene_origin(clip);
+                let matrices = world_matrices(clip, &samples).map_err(refused)?;
+                let matrices = matrices.into_iter().map(|mut matrix| {
+                    matrix.translation -= origin;
+                    matrix
+                });
+                let skin = Skin::new(Arc::clone(mesh), matrices.collect(), tracks);
+                let reach = seen().flat_map(|frame| skin.vertices(frame)).collect();
+                (Shape::Skin(skin), reach)
+            }
+            None => {
+                let bones = Bones::new(clip, &rotations, &positions);
+                let ends = |frame| bones.ends(&rotations[at(frame)], &positions[at(frame)]);
+                let reach: Vec<Vec3> = seen().flat_map(ends).collect();
+                (Shape::Bones(bones), reach)
+            }
+        };
+        Ok(Actor {
+            name: choice.method.name().to_owned(),
+            tracks,
+            rotations,
+            positions,
+            shape,
+            trails: Vec::new(),
+            reach,
+        })
+    }
+
+    /// What is around the actors of this clip.
+    pub(super) fn surroundings(&self, actors: &[Actor]) -> Surroundings {
+        if self.is_chain {
+            return Surroundings {
+                ground: Vec::new(),
+                length: 1.0,
+                margin: BREADTH * 0.7,
+                shadows: false,
+            };
+        }
+        let length = actors.first().map_or(1.0, |actor| match &actor.shape {
+            Shape::Bones(bones) => bones.length,
+            // A part of what is seen, as the bones in it are.
+            Shape::Boxes(_) | Shape::Skin(_) => {
+                let low = actor.reach.iter().copied().fold(Vec3::MAX, Vec3::min);
+                let high = actor.reach.iter().copied().fold(Vec3::MIN, Vec3::max);
+                Some((high - low).max_element() / 10.0)
+                    .filter(|it| *it > 0.0)
+                    .unwrap_or(1.0)
+            }
+        });
+        Surroundings {
+            ground: Vec::new(),
+            length,
+            margin: 0.1 * length,
+            shadows: true,
+        }
+    }
+}
+
+/// The clip with the joints of a chain of boxes. A picture has no scale: boxes are 1 long, however long they
+/// are.
+fn chain(clip: Motion) -> Motion {
+    let joint = |track: usize| Joint {
+        parent: track.checked_sub(1),
+        rest: Transform {
+            translation: if track == 0 { Vec3::ZERO } else { Vec3::NEG_Y },
+            ..Transform::default()
+        },
+    };
+    Motion {
+        skeleton: (0..clip.set.track_count()).map(joint).collect(),
+        ..clip
     }
 }
 
@@ -99,7 +200,7 @@ pub(super) fn travellers(
             tracks: bodies.tracks,
             rotations: bodies.rotations,
             positions: bodies.positions,
-            body,
+            shape: Shape::Boxes(body),
             trails: trails(&trail, scenery.drawn_frames, length, ink),
             reach: corners.collect(),
         });

@@ -1,6 +1,7 @@
-//! `tumble render`: boxes and bodies on paths drawn to pictures and films, without a display.
+//! `tumble render`: boxes, skeletons and bodies on paths drawn to pictures and films, without a display.
 
 mod actors;
+mod bones;
 pub(crate) mod film;
 pub(crate) mod scene;
 pub(crate) mod solids;
@@ -9,17 +10,22 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use tumble::{Method, SampleTimes, Timeline};
+use tumble::{SampleTimes, Timeline};
+use tumble_formats::carried_mesh::CarriedMesh;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{InterpolationArguments, MethodSelection, chosen, methods};
+use crate::arguments::interpolation::{
+    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
+    method_arguments,
+};
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
 use crate::arguments::tracks::selected;
 use crate::batch::room;
 use crate::batch::target::{self, Destination};
 use crate::commands::picture;
+use crate::commands::render::actors::Subject;
 use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
@@ -35,18 +41,20 @@ const MAX_METHODS: usize = 4;
 /// What browsers show a frame of a GIF for at least, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 
-/// Draw the boxes of a chain, or bodies on paths, as images or an animation, without a display
+/// Draw boxes, skeletons or bodies on paths as images or an animation, without a display
 #[derive(Debug, Args)]
 #[command(after_help = "\
-If the input is a file of paths, or a motion file in which all joints are roots that move (as written
-by `tumble follow`), the path is drawn, with its frames as small axes (x red, y green, z blue) and a
-box on it.
+Skeletons are drawn as bones, at their offsets and translations, or as the mesh of a glTF file that they
+move. Tracks without positions are the boxes of a chain. If the input is a file of paths, or
+a motion file in which all joints are roots that move (as written by `tumble follow`), the path is drawn,
+with its frames as small axes (x red, y green, z blue) and a box on it.
 
 Examples:
   tumble render data/pendulum.dat -o pendulum.gif
   tumble render data/pendulum.dat -m slerp,bessel-overhauser --size 800x400 -o both.apng
   tumble render data/pendulum.dat --start 2.5 -o still.png
   tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …
+  tumble render walk.bvh --size 400x600 --view 60,10 -o walk.gif
   tumble render road.csv --frame frenet,minimal -o both.gif
   tumble render walk.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
 pub(crate) struct Arguments {
@@ -66,10 +74,10 @@ pub(crate) struct Arguments {
         long = "method",
         value_name = "METHODS",
         value_delimiter = ',',
-        default_value = "bessel-overhauser",
-        value_parser = methods()
+        default_value = "authored",
+        value_parser = method_arguments()
     )]
-    methods: Vec<MethodSelection>,
+    methods: Vec<MethodArgumentSelection>,
     /// Width and height of a picture, pixels
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     size: (u32, u32),
@@ -162,6 +170,14 @@ impl RenderOutput {
     }
 }
 
+/// What is drawn of a file, and the failure of animations that were refused.
+struct Input {
+    source: TravelSource,
+    /// The mesh that the clip's joints move.
+    mesh: Option<CarriedMesh>,
+    rest: Result<(), Failure>,
+}
+
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments
         .inputs
@@ -170,23 +186,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage("`render` takes a single input"));
     };
     let samples = arguments.sampling.samples()?;
-    let methods = chosen(&arguments.methods);
+    let methods = each_once(arguments.methods.iter().flat_map(|selection| &selection.0));
     if methods.len() > MAX_METHODS {
         return Err(Failure::usage(format!(
             "{} are too many for one picture, at most {MAX_METHODS}; choose some (-m)",
             words::count(methods.len(), "method")
         )));
     }
-    arguments
-        .interpolation
-        .check(&methods)
-        .map_err(Failure::usage)?;
     let kind = RenderOutput::of(&arguments.out)?;
     if kind != RenderOutput::Folder {
         Destination::new(&arguments.out, arguments.overwrite, &inputs)?.check_writable()?;
     }
     let name = names::input(path);
-    let (source, rest) = arguments.source(path, &name)?;
+    let Input { source, mesh, rest } = arguments.source(path, &name)?;
+    let choices = arguments.choices(&name, &source, methods)?;
     let set = source.set();
     let mut frames = samples.of(source.clip(), &name);
     let mut timeline = frames
@@ -204,24 +217,37 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
     }
     // The rotations, and twice what becomes of them, for each method.
-    room::in_memory(&name, set, &frames, 5 * methods.len())?;
+    room::in_memory(&name, set, &frames, 5 * choices.len().max(1))?;
     let mut device = arguments.device.open()?;
     let style = Style {
         size: arguments.size,
         view: arguments.view,
         theme: arguments.theme.into(),
     };
-    let (actors, surroundings) =
-        arguments.actors(&mut device, &name, &source, &methods, &frames, style)?;
+    let subject = match &source {
+        TravelSource::Clip(clip) if !is_travel(clip) => {
+            Some(Subject::new((**clip).clone(), mesh, &name)?)
+        }
+        _ => None,
+    };
+    let (actors, surroundings) = match &subject {
+        Some(subject) => {
+            let actor = |&choice| subject.actor(&mut device, &name, choice, &frames);
+            let actors: Vec<Actor> = choices.iter().map(actor).collect::<Result<_, _>>()?;
+            let surroundings = subject.surroundings(&actors);
+            (actors, surroundings)
+        }
+        None => arguments.travellers(&mut device, &name, &source, &choices, &frames, style)?,
+    };
     let scene = Scene::new(actors, &surroundings, style)
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
     arguments.render_frames(kind, &scene, &timeline, &inputs)?;
     words::note(&format!(
         "{name}: {}, {}, on {} → {}",
         words::count(timeline.len(), "frame"),
-        match surroundings.shadows {
-            true => words::count(set.track_count(), "path"),
-            false => words::boxes(set.track_count()),
+        match &subject {
+            Some(subject) => subject.tracks(),
+            None => words::count(set.track_count(), "path"),
         },
         device.label,
         arguments.out.display()
@@ -230,52 +256,77 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The paths or the clip of a file, for chains of boxes with the ancestors of the selected tracks;
-    /// and the failure of animations that were refused.
-    fn source(
-        &self,
-        path: &Path,
-        name: &str,
-    ) -> Result<(TravelSource, Result<(), Failure>), Failure> {
+    /// The paths or the clip of a file, with the ancestors of the selected tracks.
+    fn source(&self, path: &Path, name: &str) -> Result<Input, Failure> {
         let tracks = &self.inputs.tracks;
         if is_path_file(path) {
-            return Ok((TravelSource::of_paths(path, &self.path, tracks)?, Ok(())));
+            return Ok(Input {
+                source: TravelSource::of_paths(path, &self.path, tracks)?,
+                mesh: None,
+                rest: Ok(()),
+            });
         }
-        let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
-        let requested = match is_travel(&clip) {
-            true => tracks.of(&clip, name)?,
-            false => tracks.chain(&clip, name)?,
+        let input::OnlyClip {
+            clip,
+            document,
+            rest,
+        } = self.inputs.load_one(path)?;
+        let is_chain = clip.skeleton.is_empty() && !clip.has_vectors();
+        let clip = match is_chain {
+            _ if is_travel(&clip) => tracks.select(&clip, name)?.into_owned(),
+            true => match tracks.chain(&clip, name)? {
+                Some(chain) => selected(&clip, &chain, name)?,
+                None => clip,
+            },
+            false => tracks.select_with_ancestors(&clip, name)?.into_owned(),
         };
-        let clip = match requested {
-            Some(requested) => selected(&clip, &requested, name)?,
-            None => clip,
+        let mesh = match document.map(|document| document.carried_mesh(&clip)) {
+            Some(Ok(mesh)) => mesh,
+            Some(Err(fault)) => {
+                words::note(&format!("{fault}; bones are drawn without meshes"));
+                None
+            }
+            None => None,
         };
-        Ok((TravelSource::Clip(Box::new(clip)), rest))
+        Ok(Input {
+            source: TravelSource::Clip(Box::new(clip)),
+            mesh,
+            rest,
+        })
     }
 
-    /// What is drawn: bodies where there are paths, else a chain, by each frame or method.
-    fn actors(
+    /// The methods that draw a clip, each differently; none for paths.
+    fn choices(
+        &self,
+        name: &str,
+        source: &TravelSource,
+        methods: Vec<MethodArgument>,
+    ) -> Result<Vec<CurveChoice>, Failure> {
+        let TravelSource::Clip(clip) = source else {
+            return Ok(Vec::new());
+        };
+        let methods = MethodArgument::distinct(&methods, clip);
+        self.interpolation.check_clip(name, clip, &methods)?;
+        let choice = |method| CurveChoice {
+            method,
+            options: self.interpolation,
+        };
+        Ok(methods.into_iter().map(choice).collect())
+    }
+
+    /// Bodies on paths, by each frame or method.
+    fn travellers(
         &self,
         device: &mut OpenedDevice,
         name: &str,
         source: &TravelSource,
-        methods: &[Method],
+        choices: &[CurveChoice],
         frames: &SampleTimes,
         style: Style,
     ) -> Result<(Vec<Actor>, Surroundings), Failure> {
-        let by_method = || {
-            methods
-                .iter()
-                .map(|&method| self.interpolation.with(method))
-        };
         let makers: Vec<Maker> = match source {
             TravelSource::Paths(..) => self.path.frames().into_iter().map(Maker::Frame).collect(),
-            TravelSource::Clip(clip) if is_travel(clip) => by_method().map(Maker::Method).collect(),
-            TravelSource::Clip(clip) => {
-                let chain = |by| actors::chain(device, name, &clip.set, by, frames);
-                let chains = by_method().map(chain).collect::<Result<_, _>>()?;
-                return Ok((chains, actors::around_chains()));
-            }
+            TravelSource::Clip(_) => choices.iter().copied().map(Maker::Method).collect(),
         };
         let of = (source, &*makers);
         actors::travellers(device, name, of, &self.scenery, frames, style.theme.ink)

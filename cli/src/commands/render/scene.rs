@@ -11,6 +11,7 @@ use glam::{EulerRot, Mat4, Quat, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::commands::picture::halved;
+use crate::commands::render::bones::{Bones, Skin};
 use crate::commands::render::film::overlay;
 use crate::commands::render::solids::{Body, Face};
 use crate::messages::colours::Colour;
@@ -64,11 +65,38 @@ pub(crate) struct Actor {
     pub(crate) rotations: Vec<Quat>,
     /// `[frame][track]`.
     pub(crate) positions: Vec<Vec3>,
-    pub(crate) body: Body,
+    pub(crate) shape: Shape,
     /// What casts a shadow on the floor: the curves that bodies go along.
     pub(crate) trails: Vec<Face>,
     /// Where the camera looks, and nothing may be left out.
     pub(crate) reach: Vec<Vec3>,
+}
+
+/// What is drawn of the tracks of an actor.
+pub(crate) enum Shape {
+    /// A box for each.
+    Boxes(Body),
+    /// The bones of a skeleton.
+    Bones(Bones),
+    /// A mesh that follows the joints.
+    Skin(Skin),
+}
+
+impl Actor {
+    /// All that moves, at a frame.
+    fn faces(&self, frame: usize) -> Vec<Face> {
+        let tracks = frame * self.tracks..(frame + 1) * self.tracks;
+        let (rotations, positions) = (&self.rotations[tracks.clone()], &self.positions[tracks]);
+        match &self.shape {
+            Shape::Boxes(body) => {
+                let each = rotations.iter().zip(positions).enumerate();
+                each.flat_map(|(track, (&rotation, &at))| body.faces(rotation, at, track))
+                    .collect()
+            }
+            Shape::Bones(bones) => bones.faces(rotations, positions),
+            Shape::Skin(skin) => skin.faces(frame),
+        }
+    }
 }
 
 /// What there is beside actors.
@@ -286,15 +314,11 @@ impl Scene {
         let mut depth = self.depth.clone();
         let mut corners = Vec::new();
         for (actor, &shift) in self.actors.iter().zip(&self.shifts) {
-            for track in 0..actor.tracks {
-                let index = frame * actor.tracks + track;
-                let (rotation, at) = (actor.rotations[index], actor.positions[index]);
-                for face in actor.body.faces(rotation, at, track) {
-                    self.camera.add(&mut corners, &face, shift, 0.0);
-                    if let Some(floor) = self.shadowed {
-                        let shadow = face.shadow(floor, self.style.theme.shadow);
-                        self.camera.add(&mut corners, &shadow, shift, 0.0);
-                    }
+            for face in actor.faces(frame) {
+                self.camera.add(&mut corners, &face, shift, 0.0);
+                if let Some(floor) = self.shadowed {
+                    let shadow = face.shadow(floor, self.style.theme.shadow);
+                    self.camera.add(&mut corners, &shadow, shift, 0.0);
                 }
             }
         }

@@ -46,7 +46,7 @@ impl Face {
 
 /// Corners of the sides of a box, each counterclockwise seen from outside, and its normal: the corners'
 /// signs tell which end of each axis they are at.
-const SIDES: [([Vec3; 4], Vec3); 6] = {
+pub(crate) const SIDES: [([Vec3; 4], Vec3); 6] = {
     const fn corner(x: f32, y: f32, z: f32) -> Vec3 {
         Vec3::new(x, y, z)
     }

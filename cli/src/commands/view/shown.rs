@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use glam::{Quat, Vec3};
-use tumble::method::BESSEL_OVERHAUSER;
 use tumble::paths::PathFrame;
 use tumble::{
     Axes, Channel, Error, Interpolation, Layout, Quantity, SampleTimes, Timeline, TrackError,
@@ -15,7 +14,7 @@ use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, each_once};
+use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
 use crate::arguments::path::frame_summary;
 use crate::batch::room;
 use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of};
@@ -61,7 +60,7 @@ impl ResultChoice {
 
     pub(crate) fn colour(self) -> Colour {
         match self {
-            Self::By(method) => method.0.map_or(colours::AUTHORED, colours::of_method),
+            Self::By(method) => method.colour(),
             Self::In(frame) => colours::of_frame(frame),
         }
     }
@@ -210,22 +209,8 @@ impl ShownClip {
                 .map(ResultChoice::In)
                 .collect();
         }
-        if !self.clip.channels.is_empty() {
-            return methods.iter().copied().map(ResultChoice::By).collect();
-        }
-        let meant = MethodArgument(Some(BESSEL_OVERHAUSER));
-        let mut kept = methods.to_vec();
-        if kept.contains(&meant) {
-            kept.retain(|method| method.0.is_some());
-        }
-        let named: Vec<MethodArgument> = kept
-            .iter()
-            .map(|it| MethodArgument(it.0.or(meant.0)))
-            .collect();
-        each_once(named.iter())
-            .into_iter()
-            .map(ResultChoice::By)
-            .collect()
+        let distinct = MethodArgument::distinct(methods, &self.clip);
+        distinct.into_iter().map(ResultChoice::By).collect()
     }
 
     /// The times of all keys, in order.

@@ -7,6 +7,7 @@ use tumble::{Axes, Interpolation, Quantity, TrackSet};
 use tumble_formats::printable::printable;
 
 use crate::arguments::device::OpenedDevice;
+use crate::arguments::interpolation::CurveChoice;
 use crate::commands::plot::figure::{
     Dots, Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,
 };
@@ -43,7 +44,7 @@ impl PlotSource<'_> {
         subject: &PlotSubject,
     ) -> Result<Figure, Failure> {
         let (quantity, panels): (_, Result<Vec<Panel>, Failure>) = match subject {
-            PlotSubject::Components(boxes) if self.interpolations.len() == 1 => {
+            PlotSubject::Components(boxes) if self.choices.len() == 1 => {
                 let panel = |&index: &usize| self.components(device, index, &[0, 1, 2, 3]);
                 ("components", boxes.iter().map(panel).collect())
             }
@@ -79,7 +80,7 @@ impl PlotSource<'_> {
         };
         let panels = panels?;
         let columns = match (subject, panels.len()) {
-            (PlotSubject::Components(_), _) if self.interpolations.len() > 1 => 4,
+            (PlotSubject::Components(_), _) if self.choices.len() > 1 => 4,
             (PlotSubject::Sphere(..), 2) => 2,
             // As many rows: these panels are as broad as high.
             (PlotSubject::Sphere(..), panels @ 9..) => (panels - 1).isqrt() + 1,
@@ -88,7 +89,7 @@ impl PlotSource<'_> {
             (_, 9..19) => 3,
             _ => 4,
         };
-        let by_component = match (subject, self.interpolations) {
+        let by_component = match (subject, self.choices) {
             (PlotSubject::Components(_), [one]) => Some(one.method),
             _ => None,
         };
@@ -112,10 +113,8 @@ impl PlotSource<'_> {
             let of = |(name, colour): (&str, colours::Colour)| line(name.to_owned(), colour);
             NAMES.into_iter().zip(COMPONENTS).map(of).collect()
         } else {
-            let of = |one: &Interpolation| {
-                line(one.method.name.to_owned(), colours::of_method(one.method))
-            };
-            self.interpolations.iter().map(of).collect()
+            let of = |one: &CurveChoice| line(one.method.name().to_owned(), one.method.colour());
+            self.choices.iter().map(of).collect()
         };
         let (label, mark) = match subject {
             PlotSubject::Speed(_) => return legend,
@@ -151,13 +150,14 @@ impl PlotSource<'_> {
         let mut curves = Vec::new();
         let mut dots = Vec::new();
         let together = components.len() > 1;
-        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+        for (order, &choice) in self.choices.iter().enumerate() {
+            let interpolation = self.interpolation(choice, index);
             let rotations = self.rotations(device, index, interpolation)?;
             let keys = self.keys(index, &rotations);
             for &component in components {
                 let (colour, ink) = match together {
                     true => (COMPONENTS[component], COMPONENTS[component]),
-                    false => (colours::of_method(interpolation.method), INK),
+                    false => (choice.method.colour(), INK),
                 };
                 let values = rotations.iter().map(|q| value(q, component));
                 curves.push(PlotCurve {
@@ -201,7 +201,7 @@ impl PlotSource<'_> {
 
     /// Where curves may lie on each other, those drawn first are broader.
     fn width(&self, order: usize) -> f64 {
-        let above = self.interpolations.len() - 1 - order;
+        let above = self.choices.len() - 1 - order;
         1.6 + 1.8 * above.min(3) as f64
     }
 
@@ -233,7 +233,8 @@ impl PlotSource<'_> {
     /// Angular speed in rad/s; keys as upright lines.
     fn speed(&self, device: &mut OpenedDevice, index: usize) -> Result<Panel, Failure> {
         let mut curves = Vec::new();
-        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+        for (order, &choice) in self.choices.iter().enumerate() {
+            let interpolation = self.interpolation(choice, index);
             let velocity = Interpolation {
                 quantity: Quantity::Velocity(Axes::Body),
                 ..interpolation
@@ -242,7 +243,7 @@ impl PlotSource<'_> {
             let velocities = velocities.as_slice().iter();
             let speeds = velocities.map(|v| f64::from(v.truncate().length()));
             curves.push(PlotCurve {
-                colour: colours::of_method(interpolation.method),
+                colour: choice.method.colour(),
                 width: self.width(order).min(2.5),
                 opacity: 1.0,
                 pieces: vec![thinned(&self.points(speeds), 2000)],
@@ -262,7 +263,8 @@ impl PlotSource<'_> {
     fn error(&self, device: &mut OpenedDevice, index: usize) -> Result<Panel, Failure> {
         let mut curves = Vec::new();
         let mut level = f64::NEG_INFINITY;
-        for &interpolation in self.interpolations {
+        for &choice in self.choices {
+            let interpolation = self.interpolation(choice, index);
             let rotations = self.evaluate(device, index, interpolation)?;
             let reference = ReferenceCurve::of(&interpolation, self.set.track(index));
             let errors = rotations
@@ -280,7 +282,7 @@ impl PlotSource<'_> {
                     thinned(&powers.collect::<Vec<_>>(), 2000)
                 });
             curves.push(PlotCurve {
-                colour: colours::of_method(interpolation.method),
+                colour: choice.method.colour(),
                 width: 1.2,
                 opacity: 1.0,
                 pieces: pieces.collect(),
@@ -311,10 +313,11 @@ impl PlotSource<'_> {
     ) -> Result<Panel, Failure> {
         let mut curves = graticule();
         let mut dots = Vec::new();
-        for (order, &interpolation) in self.interpolations.iter().enumerate() {
+        for (order, &choice) in self.choices.iter().enumerate() {
+            let interpolation = self.interpolation(choice, index);
             let rotations = self.evaluate(device, index, interpolation)?;
             let path: Vec<DVec3> = rotations.iter().map(|&q| seen(q, axis)).collect();
-            let colour = colours::of_method(interpolation.method);
+            let colour = choice.method.colour();
             for (front, opacity) in [(false, 0.3), (true, 1.0)] {
                 curves.push(PlotCurve {
                     colour,

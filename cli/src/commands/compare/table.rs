@@ -1,0 +1,179 @@
+//! The joints of two motions, worst first: as text and as CSV.
+
+use std::io;
+
+use clap::{Args, ValueEnum};
+use tumble_formats::compare::{ClipDifference, JointDifference, TimedSpread};
+use tumble_formats::printable::printable;
+
+use crate::messages::words;
+
+/// How many joints the text lists if `--top` does not say.
+const LISTED: usize = 10;
+
+/// Which joints are listed, and in which order.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct TableArguments {
+    /// How many joints to list, the worst first [default: 10; in CSV and JSON all]
+    #[arg(long, value_name = "N")]
+    top: Option<usize>,
+    /// Which difference makes a joint the worst [default: angle]
+    #[arg(long, value_enum, value_name = "DIFFERENCE")]
+    worst_by: Option<Rank>,
+}
+
+/// The difference by which joints are ordered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Rank {
+    /// the largest angle; where it is the same, the largest distance
+    #[default]
+    Angle,
+    /// the largest distance; where it is the same, the largest angle
+    Distance,
+}
+
+impl TableArguments {
+    /// An option of these that is set.
+    pub(super) fn set_option(self) -> Option<&'static str> {
+        let top = self.top.map(|_| "--top");
+        top.or(self.worst_by.map(|_| "--worst-by"))
+    }
+
+    /// The joints of a comparison, worst first.
+    pub(super) fn ordered(self, joints: &[JointDifference]) -> Vec<JointDifference> {
+        let key = |joint: &JointDifference| {
+            let angle = joint.rotation.spread.largest;
+            let distance = joint.translation.map_or(0.0, |it| it.spread.largest);
+            match self.worst_by.unwrap_or_default() {
+                Rank::Angle => [angle, distance],
+                Rank::Distance => [distance, angle],
+            }
+        };
+        let mut joints = joints.to_vec();
+        joints.sort_by(|a, b| {
+            let [a, b] = [key(a), key(b)];
+            b[0].total_cmp(&a[0]).then(b[1].total_cmp(&a[1]))
+        });
+        joints.truncate(self.top.unwrap_or(joints.len()));
+        joints
+    }
+}
+
+/// A table of the joints that differ; nothing for a single track.
+pub(super) fn joints_text(difference: &ClipDifference, arguments: TableArguments) -> String {
+    let differs = |joint: &JointDifference| {
+        let channels = [Some(joint.rotation), joint.translation, joint.scale];
+        channels
+            .into_iter()
+            .flatten()
+            .any(|it| it.spread.largest > 0.0)
+    };
+    let mut joints = arguments.ordered(&difference.joints);
+    joints.retain(differs);
+    joints.truncate(arguments.top.unwrap_or(LISTED));
+    if joints.is_empty() || difference.tracks == 1 {
+        return String::new();
+    }
+    let has_distance = difference.translation.is_some();
+    let mut rows = vec![row_of("joint", "angle", has_distance.then_some("distance"))];
+    for joint in &joints {
+        let mut row = vec![printable(&joint.track).into_owned()];
+        row.extend(cells(&joint.rotation, "°"));
+        if let Some(distance) = joint.translation.filter(|_| has_distance) {
+            row.extend(cells(&distance, ""));
+        }
+        rows.push(row);
+    }
+    let columns = rows[0].len();
+    let widths: Vec<usize> = (0..columns)
+        .map(|column| {
+            rows.iter()
+                .map(|row| row[column].chars().count())
+                .max()
+                .unwrap_or(0)
+        })
+        .collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate();
+        let cells = cells.map(|(column, (cell, &width))| match column {
+            0 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        format!("  {}\n", cells.collect::<Vec<_>>().join("  "))
+    };
+    let table: String = rows.iter().map(line).collect();
+    let rest = difference.tracks - joints.len();
+    match rest {
+        0 => table,
+        _ => format!(
+            "{table}  and {} (--top {})\n",
+            words::count(rest, "more joint"),
+            difference.tracks
+        ),
+    }
+}
+
+fn row_of(joint: &str, angle: &str, distance: Option<&str>) -> Vec<String> {
+    let columns = |name: &str| {
+        [
+            format!("mean {name}"),
+            "largest".to_owned(),
+            "at".to_owned(),
+        ]
+    };
+    let mut row = vec![joint.to_owned()];
+    row.extend(columns(angle));
+    row.extend(distance.map(columns).into_iter().flatten());
+    row
+}
+
+/// The mean, the largest, and where it is: the frame, or the time where there are no frames.
+fn cells(found: &TimedSpread, unit: &str) -> [String; 3] {
+    let [mean, largest] = [found.spread.mean, found.spread.largest]
+        .map(|it| format!("{}{unit}", words::decimals(it)));
+    let at = match (found.spread.largest > 0.0, found.frame) {
+        (false, _) => String::new(),
+        (true, Some(frame)) => format!("frame {frame}"),
+        (true, None) => format!("{} s", words::seconds(found.time)),
+    };
+    [mean, largest, at]
+}
+
+/// The joints of all pairs of clips as CSV: angles in degrees, times in seconds, frames of the first clip.
+pub(super) fn csv_table(differences: &[ClipDifference]) -> io::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let columns = |name: &str| {
+        ["mean", "rms", "largest", "time", "frame"].map(|column| format!("{name}_{column}"))
+    };
+    let mut header = ["first", "second", "joint"].map(str::to_owned).to_vec();
+    header.extend(
+        ["rotation", "translation", "scale"]
+            .iter()
+            .flat_map(|it| columns(it)),
+    );
+    writer.write_record(&header)?;
+    for difference in differences {
+        for joint in &difference.joints {
+            let mut record: Vec<String> = difference.inputs.to_vec();
+            record.push(joint.track.clone());
+            for found in [Some(joint.rotation), joint.translation, joint.scale] {
+                let numbers = found.map(|found| {
+                    let [mean, rms, largest] =
+                        [found.spread.mean, found.spread.rms, found.spread.largest];
+                    [
+                        Some(mean),
+                        Some(rms),
+                        Some(largest),
+                        Some(found.time),
+                        found.frame,
+                    ]
+                });
+                let cells = numbers.unwrap_or_default();
+                record.extend(cells.map(|it| it.map_or_else(String::new, |it| it.to_string())));
+            }
+            writer.write_record(&record)?;
+        }
+    }
+    let bytes = writer.into_inner().map_err(|error| error.into_error())?;
+    String::from_utf8(bytes).map_err(io::Error::other)
+}
