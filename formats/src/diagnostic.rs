@@ -301,6 +301,7 @@ codes! {
     SameName = "W206", "two joints of one name", "A number is appended to the second name, so that names are unique. Braces and control characters in names are replaced by `_`.";
     NameChanged = "W207" elsewhere, "a name is changed", "The format does not allow line ends, braces or control characters in names, nor two equal names.";
     NoRoom = "W208" elsewhere, "data that the format cannot store", "It is left out. The table in docs/formats.md shows what each format can store.";
+    EndHeld = "W209" elsewhere, "a clip that ends between two frames", "The format stores frames of one rate and no times. One frame more has the value of the end, so that nothing is missing and loops continue; its time is that of the frame after the end. `--end-frame leave-out` ends with the last frame before the end instead. A format with times has a key at the end.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
