@@ -64,10 +64,7 @@ fn clips_end_with_a_key_or_a_held_frame_and_arrays_with_a_frame() {
         assert!((found.2 - last).abs() < 1e-12, "{output}: {}", found.2);
     }
     let csv = fs::read_to_string(at.join("out.csv")).unwrap();
-    assert!(
-        csv.lines().next_back().unwrap().starts_with("1.125"),
-        "{csv}"
-    );
+    assert!(csv.contains("\n34,1.125,"), "{csv}");
 }
 
 /// Rotations that are streamed have the bits of those without an end, and the end behind them.

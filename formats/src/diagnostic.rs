@@ -317,6 +317,8 @@ codes! {
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, so nothing moves.";
+    FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
+    FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
     McapCut = "W801", "a truncated log", "It ends within a record, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
