@@ -17,6 +17,7 @@ mod commands;
 mod compare;
 mod configurations;
 mod dat_fixtures;
+mod end_frame;
 mod faults;
 mod follow;
 mod json;

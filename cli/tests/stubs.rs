@@ -14,6 +14,7 @@ use tumble::{
     WrapMode,
 };
 use tumble_formats::adjust::UpAxis;
+use tumble_formats::end_frame::EndFrame;
 use tumble_formats::format::TimeUnit;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::trajectory::Align;
@@ -40,6 +41,7 @@ fn options() -> Vec<(&'static str, Vec<&'static str>)> {
         ("_Axes", [&names!(Axes)[..], &["world"]].concat()),
         ("_Curve", names!(ReducedCurve)),
         ("_Encoding", encodings),
+        ("_EndFrame", names!(EndFrame)),
         ("_Frame", names!(PathFrame)),
         ("_Layout", names!(Layout)),
         ("_Major", names!(MatrixOrder)),

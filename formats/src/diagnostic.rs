@@ -302,6 +302,7 @@ codes! {
     NameChanged = "W207" elsewhere, "a name is changed", "The format does not allow line ends, braces or control characters in names, nor two equal names.";
     NoRoom = "W208" elsewhere, "data that the format cannot store", "It is left out. The table in docs/formats.md shows what each format can store.";
     NoOffsets = "W209" elsewhere, "joints without offsets", "The input says the parents of joints, but not where the joints are relative to them. Motion of SMPL bodies is an example: the positions of joints depend on the shape of the body. In BVH and glTF such joints are at their parents. `--body-model` or `--offsets` places them.";
+    EndHeld = "W210" elsewhere, "a clip that ends between two frames", "The format stores frames of one rate and no times. One frame more has the value of the end, so that nothing is missing and loops continue; its time is that of the frame after the end. `--end-frame leave-out` ends with the last frame before the end instead. A format with times has a key at the end.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
@@ -317,6 +318,8 @@ codes! {
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, so nothing moves.";
+    FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
+    FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
     McapCut = "W801", "a truncated log", "It ends within a record, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";

@@ -179,10 +179,23 @@ fn is_unit(key: DQuat) -> bool {
     (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
 }
 
+/// The shortest step to a time beside another, in seconds: beside 0, the next f32 is so near that nothing could be
+/// evaluated between both.
+const SHORTEST: f64 = 1e-9;
+
+/// The f32 after `time`.
+#[cfg_attr(
+    not(feature = "fbx"),
+    expect(dead_code, reason = "curves of FBX jump after a key")
+)]
+pub(crate) fn just_after(time: f64) -> f64 {
+    f64::from((time as f32).next_up()).max(time + SHORTEST)
+}
+
 /// The f32 before `time`, or the middle between `earlier` and `time` if that is nearer; `None` if there is no such
 /// time.
 pub(crate) fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
-    let step = f64::from((time as f32).next_down());
+    let step = f64::from((time as f32).next_down()).min(time - SHORTEST);
     let Some(earlier) = earlier else {
         return Some(step);
     };

@@ -31,6 +31,7 @@ pub mod csv;
 pub mod dat;
 mod decimal;
 pub mod diagnostic;
+pub mod end_frame;
 pub mod euroc;
 #[cfg(feature = "fbx")]
 pub mod fbx;

@@ -10,6 +10,7 @@ mod cases;
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod codes;
 mod dat_fixtures;
+mod end_frame;
 #[cfg(feature = "fbx")]
 mod fbx;
 mod fixtures;

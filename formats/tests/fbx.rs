@@ -228,6 +228,106 @@ fn nodes_become_a_skeleton_in_the_units_of_the_file() {
     assert_eq!(names, ["hips", "knee", "knee#2", "node3"].map(Some));
 }
 
+/// The rotations and translations of a track at some times.
+fn sampled(clip: &Motion, track: usize, times: &[f64]) -> Vec<(DQuat, DVec3)> {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let frames = SampleTimes::at(times.to_vec());
+    let samples = ChannelMethods::AUTHORED
+        .sample(&engine, clip, &frames)
+        .unwrap();
+    let sampled = samples.of(clip, None, &[]);
+    let index = |sample: usize| sample * clip.set.track_count() + track;
+    (0..times.len())
+        .map(|sample| {
+            let rotation = samples.rotations[index(sample)].as_dquat().normalize();
+            (rotation, sampled.position(sample, track))
+        })
+        .collect()
+}
+
+fn degrees(from: DQuat, to: DQuat) -> f64 {
+    let sine = (from * to.conjugate()).xyz().length();
+    (2.0 * sine.min(1.0).asin()).to_degrees()
+}
+
+/// As Autodesk's SDK has them: a muted layer has no effect, and the weight of a layer that overrides others scales its
+/// translations.
+#[test]
+fn layers_have_the_effect_that_they_have_in_the_sdk() {
+    for (name, expected) in [
+        ("layer_muted", [[0.0; 3], [2.0, 2.5, 3.0], [4.0, 5.0, 6.0]]),
+        (
+            "layer_weight",
+            [[0.5; 3], [0.75, 1.0, -1.5], [1.0, 1.5, -3.5]],
+        ),
+        ("layer_solo", [[1.0; 3], [3.5, 4.5, 0.0], [6.0, 8.0, -1.0]]),
+    ] {
+        let loaded = read(&fixture(name), &ReadOptions::default());
+        let found = sampled(&loaded.clips[0], 0, &[0.0, 0.5, 1.0]);
+        for ((_, found), expected) in found.into_iter().zip(expected) {
+            let off = found.distance(DVec3::from_array(expected));
+            assert!(off < 1e-5, "{name}: {found}, {expected:?}");
+        }
+    }
+}
+
+/// Whatever rate the file states.
+#[test]
+fn the_rate_is_that_of_the_keys() {
+    for (name, frames, seconds) in [
+        ("rate_119_88", 120_000, 1001),
+        ("rate_29_97_in_30", 30_000, 1001),
+        ("rate_144_in_24", 144, 1),
+        ("walk", 30, 1),
+    ] {
+        let rate = FrameRate::new(frames, seconds).unwrap();
+        let clip = &read(&fixture(name), &ReadOptions::default()).clips[0];
+        assert_eq!(clip.rate, Some(rate), "{name}");
+        if name != "walk" {
+            let times: Vec<f64> = (0..=12).map(|frame| rate.time_of(frame)).collect();
+            assert_eq!(clip.set.track(1).times, times, "{name}");
+        }
+    }
+}
+
+#[test]
+fn an_end_that_was_rounded_to_f32_is_that_of_the_last_key() {
+    let clip = &read(&fixture("take_stop"), &ReadOptions::default()).clips[0];
+    assert_eq!(clip.set.track(1).times, [0.0, 8.0 / 24.0, 16.0 / 24.0]);
+    assert_eq!(clip.rate_of_keys(), FrameRate::new(3, 1).ok());
+}
+
+/// As the SDK, Blender and three.js read it.
+#[test]
+fn the_spheric_order_is_read_as_xyz() {
+    let loaded = read(&fixture("spheric"), &ReadOptions::default());
+    let codes: Vec<Code> = loaded.warnings.iter().map(|warning| warning.code).collect();
+    assert_eq!(codes, [Code::FbxSpheric]);
+    let found = sampled(&loaded.clips[0], 0, &[0.0, 0.5, 1.0]);
+    for ((found, _), [x, y, z]) in
+        (found.into_iter()).zip([[10.0, 20.0, 30.0], [30.0, -5.0, 55.0], [50.0, -30.0, 80.0]])
+    {
+        let [x, y, z] = [x, y, z].map(f64::to_radians);
+        let expected =
+            DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
+        let off = degrees(found, expected);
+        assert!(off < 1e-4, "{found}, {expected}: {off}°");
+    }
+}
+
+/// A key that is constant until the next one has its own value at its own time, and that of the next one from then on.
+#[test]
+fn the_value_of_the_next_key_holds_after_a_key() {
+    let loaded = read(&fixture("constant_next"), &ReadOptions::default());
+    let times = [0.0, 1e-6, 0.2, 8.0 / 24.0, 0.35, 16.0 / 24.0, 0.7, 1.0];
+    let found = sampled(&loaded.clips[0], 1, &times);
+    let expected: [f64; 8] = [0.0, 10.0, 10.0, 10.0, 20.0, 20.0, 60.0, 60.0];
+    for (((found, _), expected), time) in found.into_iter().zip(expected).zip(times) {
+        let off = degrees(found, DQuat::from_rotation_z(expected.to_radians()));
+        assert!(off < 1e-4, "{time} s: {off}° from {expected}°");
+    }
+}
+
 /// The keys of the file alone, but for turns that arcs between them would not take.
 #[test]
 fn keyframes_are_those_of_the_file() {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tumble::SampleTimes;
 use tumble::reduce::ReducedCurve;
 use tumble_formats::motion::ChannelInterpolation;
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce as reduced};
@@ -138,7 +137,7 @@ pub(crate) fn reduce(
     let found = interruptible(py, move || {
         let sampled = match rate {
             Some(rate) => {
-                let sampled = motion.sampled(&engine, &SampleTimes::rate(rate));
+                let sampled = motion.sampled_at_rate(&engine, rate);
                 Some(sampled.map_err(|error| of_engine(&error))?)
             }
             None => None,

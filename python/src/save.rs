@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop};
+use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop, Timeline};
 use tumble_formats::diagnostic::Code;
+use tumble_formats::end_frame::{EndFrame, EndRows, EndSample};
 use tumble_formats::format::{
     Document, Format, FormatOption, MotionOptions, Quantization, ResultShape, WriteError,
     WriteResults, left_behind,
@@ -27,7 +28,7 @@ use crate::engine::{default_engine, layout_named};
 use crate::errors::{input, of_engine, of_output, of_write, warn};
 use crate::evaluate::uniform;
 use crate::file::{File, format_named};
-use crate::options::{Request, SampleRequest};
+use crate::options::{Request, SampleRequest, option_named};
 use crate::run::interruptible;
 
 /// Rotations evaluated at once.
@@ -36,7 +37,7 @@ const CHUNK: usize = 1 << 20;
 /// Writes clips to a file, atomically; the format is that of the file's ending.
 ///
 /// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
-/// layout="track", times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None, …)`
+/// layout="track", end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None, …)`
 ///
 /// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled as by
 /// `Engine.evaluate`, with its options; without, the keys are written at their times. A clip of a glTF or NPZ file
@@ -46,7 +47,9 @@ const CHUNK: usize = 1 << 20;
 /// "wxyz") and `layout` of these options. The bytes are those that the program `tumble` writes.
 /// `sequence`: the axes of BVH's angles, such as "ZXY". `linear`: names of arrays in an NPZ file, with a number
 /// for each frame, to be interpolated linearly instead of left out. `times_out`: for KITTI, which stores no times, a file
-/// for the times of the poses, one time in seconds per line. `quantize`: store glTF rotations with 16 bits a
+/// for the times of the poses, one time in seconds per line. `end_frame`: what follows the last frame of `fps` if a clip
+/// ends between two frames: "key", a sample at the end; "hold", one frame more with the value of the end; "leave-out",
+/// nothing. By default formats with times get a key and others a held frame; NPY gets nothing. `quantize`: store glTF rotations with 16 bits a
 /// component, within 6e-5 rad. `meshopt`: compress a new glTF file by `EXT_meshopt_compression`. `engine`: the engine
 /// that evaluates; by default one that all calls share.
 /// `write` is the same function.
@@ -60,8 +63,8 @@ const CHUNK: usize = 1 << 20;
 #[pyfunction]
 #[pyo3(signature = (
     path, clips, /, *, format=None, sequence=None, linear=vec![], order=None, layout="track",
-    times_out=None, quantize=false, meshopt=false, overwrite=true, engine=None, **options
-), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
+    end_frame=None, times_out=None, quantize=false, meshopt=false, overwrite=true, engine=None, **options
+), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn save(
     py: Python<'_>,
@@ -72,6 +75,7 @@ pub(crate) fn save(
     linear: Vec<String>,
     order: Option<&str>,
     layout: &str,
+    end_frame: Option<&str>,
     times_out: Option<PathBuf>,
     quantize: bool,
     meshopt: bool,
@@ -128,6 +132,9 @@ pub(crate) fn save(
             meshopt,
         },
         layout: layout_named(layout)?,
+        end_frame: end_frame
+            .map(|name| option_named(name, "end_frame"))
+            .transpose()?,
         engine: match engine {
             Some(engine) => engine.clone().unbind(),
             None => default_engine(py)?.clone().unbind(),
@@ -193,10 +200,59 @@ struct Save {
     format: &'static Format,
     motion: MotionOptions,
     layout: Layout,
+    end_frame: Option<EndFrame>,
     engine: Py<crate::engine::Engine>,
     request: Request,
     clips: Vec<Clip>,
     path: PathBuf,
+}
+
+/// The frames of a clip, and the sample after them.
+struct FramesToEnd {
+    frames: SampleTimes,
+    timeline: Timeline,
+    end: Option<EndSample>,
+    /// The rate of which all samples are frames.
+    rate: Option<FrameRate>,
+}
+
+impl FramesToEnd {
+    /// `end`: where the clip ends, in seconds.
+    fn of(
+        clip: &Motion,
+        frames: SampleTimes,
+        (rate, end): (FrameRate, f64),
+        end_frame: EndFrame,
+    ) -> PyResult<Self> {
+        let timeline = resolved(clip, &frames)?;
+        let end = end_frame.sample(&timeline, rate, end);
+        Ok(Self {
+            frames,
+            timeline,
+            end,
+            rate: Some(rate).filter(|_| end.is_none_or(EndSample::is_held)),
+        })
+    }
+
+    fn requested(clip: &Motion, samples: &SampleRequest, end_frame: EndFrame) -> PyResult<Self> {
+        let frames = samples.frames(clip, None)?;
+        if let &SampleRequest::Rate(rate, _, end) = samples {
+            let last = clip.set.time_span().map_or(0.0, |span| span.1);
+            let end = end.map_or(last, |end| clip.time_in_set(end));
+            return Self::of(clip, frames, (rate, end), end_frame);
+        }
+        Ok(Self {
+            timeline: resolved(clip, &frames)?,
+            frames,
+            end: None,
+            rate: None,
+        })
+    }
+}
+
+fn resolved(clip: &Motion, frames: &SampleTimes) -> PyResult<Timeline> {
+    let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
+    timeline.map_err(|error| of_engine(&error.into()))
 }
 
 /// Ends writing when the work is stopped.
@@ -222,8 +278,24 @@ impl Save {
     /// `times` gets the times of the samples, for formats that need them in a separate file.
     fn write(&self, out: &mut dyn Write, times: &mut Vec<u8>) -> PyResult<Vec<Diagnostic>> {
         let Some(samples) = &self.request.samples else {
-            return self.keys(out, times);
+            return match self.end_frame {
+                Some(_) => Err(input(
+                    "`end_frame` needs `fps`; without it, keys stay as they are",
+                )),
+                None => self.keys(out, times),
+            };
         };
+        if self.end_frame.is_some() && !matches!(samples, SampleRequest::Rate(..)) {
+            return Err(input("`end_frame` needs `fps`; `at` lists all times"));
+        }
+        let has_times = self.format.supports(Feature::UnevenTimes)
+            || self.format.takes(FormatOption::TimesApart);
+        if self.end_frame == Some(EndFrame::Key) && !has_times {
+            return Err(input(format!(
+                "{} stores frames of a rate and no times; give end_frame=\"hold\" or \"leave-out\"",
+                self.format.name
+            )));
+        }
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
             let SampleRequest::Rate(rate, None, None) = *samples else {
@@ -389,14 +461,44 @@ impl Save {
         rate: FrameRate,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let times = |clip: &&Motion| document.times(clip.index, rate).map(SampleTimes::at);
-        let frames: Result<Vec<SampleTimes>, Diagnostic> = clips.iter().map(times).collect();
-        let frames = frames.map_err(|error| of_write(&error.into()))?;
-        self.written(clips, &frames, Some(rate), |sampled| {
+        let end_frame = match (document.end_frame(), self.end_frame) {
+            (None, Some(_)) => {
+                return Err(input(
+                    "the animations of a file that is kept keep their ends; leave out `end_frame`",
+                ));
+            }
+            (Some(EndFrame::Hold), Some(EndFrame::Key)) => {
+                return Err(input(
+                    "its arrays are frames of a rate, without times; give end_frame=\"hold\" or \"leave-out\"",
+                ));
+            }
+            (usual, asked) => asked.or(usual).unwrap_or(EndFrame::Key),
+        };
+        let times = |clip: &&Motion| {
+            let times = document.times(clip.index, rate);
+            let times = times.map_err(|error| of_write(&error.into()))?;
+            let last = times.last().copied().unwrap_or(0.0);
+            let end = clip.set.time_span().map_or(last, |span| span.1);
+            FramesToEnd::of(clip, SampleTimes::at(times), (rate, end), end_frame)
+        };
+        let frames: Vec<FramesToEnd> = clips.iter().map(times).collect::<PyResult<_>>()?;
+        let held = self.held(&frames);
+        let mut warnings = self.written(clips, &frames, |sampled| {
             let indices = clips.iter().map(|clip| clip.index);
             let clips: Vec<(usize, SampledClip<'_>)> =
                 indices.zip(sampled.iter().cloned()).collect();
             document.write(&clips, &self.motion, &self.path, out)
+        })?;
+        warnings.extend(held);
+        Ok(warnings)
+    }
+
+    /// The warning that a frame was added after the end of a clip, unless it was asked for.
+    fn held(&self, frames: &[FramesToEnd]) -> Option<Diagnostic> {
+        frames.iter().find_map(|frames| {
+            let (end, rate) = frames.end.zip(frames.rate)?;
+            let warning = end.warning(rate, &self.path.display().to_string());
+            warning.filter(|_| self.end_frame.is_none())
         })
     }
 
@@ -408,42 +510,42 @@ impl Save {
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
-        let frames = clips.iter().map(|clip| Ok(samples.resolved(clip)?.0));
-        let frames: Vec<SampleTimes> = frames.collect::<PyResult<_>>()?;
-        let rate = match samples {
-            SampleRequest::Rate(rate, ..) => Some(*rate),
-            _ => None,
-        };
-        self.written(clips, &frames, rate, |sampled| {
+        let has_times = self.format.supports(Feature::UnevenTimes) || self.motion.times_apart;
+        let end_frame = EndFrame::where_times_are(has_times);
+        let frames = clips
+            .iter()
+            .map(|clip| FramesToEnd::requested(clip, samples, self.end_frame.unwrap_or(end_frame)));
+        let frames: Vec<FramesToEnd> = frames.collect::<PyResult<_>>()?;
+        let held = self.held(&frames);
+        let mut warnings = self.written(clips, &frames, |sampled| {
             self.write_clips(sampled, out, times)
-        })
+        })?;
+        warnings.extend(held);
+        Ok(warnings)
     }
 
     fn written(
         &self,
         clips: &[&Motion],
-        frames: &[SampleTimes],
-        rate: Option<FrameRate>,
+        frames: &[FramesToEnd],
         write: impl FnOnce(&[SampledClip<'_>]) -> Result<Vec<Diagnostic>, WriteError>,
     ) -> PyResult<Vec<Diagnostic>> {
         let mut all = Vec::new();
         for (clip, frames) in clips.iter().zip(frames) {
-            let count = frames.resolve(clip.set.track_count(), clip.set.time_span());
-            let count = count.map_err(|error| of_engine(&error.into()))?.len();
             let engine = self
                 .engine
                 .get()
-                .engine_for(clip.set.track_count() * count)?;
+                .engine_for(clip.set.track_count() * frames.timeline.len())?;
             let methods = ChannelMethods {
                 method: self.request.method,
                 with: &self.request.with(Quantity::Rotation),
             };
-            let samples = methods.sample(&engine, clip, frames);
+            let samples = methods.sample_to_end(&engine, clip, &frames.frames, frames.end);
             all.push(samples.map_err(|error| of_engine(&error))?);
         }
         let notes = self.notes();
-        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
-            .map(|(clip, samples)| samples.of(clip, rate, &notes))
+        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all).zip(frames))
+            .map(|((clip, samples), frames)| samples.of(clip, frames.rate, &notes))
             .collect();
         write(&sampled).map_err(|error| of_write(&error))
     }
@@ -464,13 +566,24 @@ impl Save {
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let (frames, count) = samples.resolved(clip)?;
-        let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
-        let timeline = timeline.map_err(|error| of_engine(&error.into()))?;
+        let end_frame = self.end_frame.unwrap_or({
+            // Rotations with times are read again as a clip; arrays are frames.
+            match self.format.supports(Feature::UnevenTimes) {
+                true => EndFrame::Key,
+                false => EndFrame::LeaveOut,
+            }
+        });
+        let all = FramesToEnd::requested(clip, samples, end_frame)?;
+        let (frames, count) = (&all.frames, all.timeline.len());
+        let timeline = match all.end {
+            Some(end) => {
+                let times = all.timeline.times(0).chain([end.time]).collect();
+                resolved(clip, &SampleTimes::at(times))?
+            }
+            None => all.timeline.clone(),
+        };
         let mut notes = vec![("method", self.request.method_name().to_owned())];
-        if let SampleRequest::Rate(rate, ..) = samples {
-            notes.push(("rate", rate.to_string()));
-        }
+        notes.extend(all.rate.map(|rate| ("rate", rate.to_string())));
         let layout = format.layout.unwrap_or(self.layout);
         let shape = ResultShape {
             name: &self.motion.name,
@@ -489,18 +602,21 @@ impl Save {
             .get()
             .engine_for(clip.set.track_count() * count)?;
         let with = self.request.with(Quantity::Rotation);
+        let methods = ChannelMethods {
+            method: self.request.method,
+            with: &with,
+        };
+        let rows = |at: &SampleTimes| {
+            let found = methods.rotations(&engine, clip, at, layout);
+            found.map_err(|error| of_engine(&error))
+        };
+        let ends = all.end.map(|end| rows(&SampleTimes::at(vec![end.at])));
+        let mut ends = EndRows::new(ends.transpose()?.unwrap_or_default(), layout, count);
+        let mut write = |rows: &[glam::Quat]| writer.write(&ends.next(rows)).map_err(of_io);
         if let Some(method) = uniform(clip, &self.request) {
-            stream(&engine, clip, with(method), &frames, layout, |rotations| {
-                writer.write(rotations).map_err(of_io)
-            })?;
+            stream(&engine, clip, with(method), frames, layout, &mut write)?;
         } else {
-            let methods = ChannelMethods {
-                method: self.request.method,
-                with: &with,
-            };
-            let found = methods.rotations(&engine, clip, &frames, layout);
-            let found = found.map_err(|error| of_engine(&error))?;
-            writer.write(&found).map_err(of_io)?;
+            write(&rows(frames)?)?;
         }
         writer.finish().map_err(of_io)?;
         Ok(Vec::new())

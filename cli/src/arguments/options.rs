@@ -9,6 +9,8 @@ use std::path::Path;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 use tumble::{Encoding, Layout};
+use tumble_formats::Feature;
+use tumble_formats::end_frame::EndFrame;
 use tumble_formats::format::{Format, FormatOption};
 
 use crate::arguments::output::OutputArguments;
@@ -69,6 +71,7 @@ pub(crate) struct ResultRequest<'a> {
     pub(crate) output: &'a OutputArguments,
     pub(crate) layout: Layout,
     pub(crate) encoding: Encoding,
+    pub(crate) end_frame: Option<EndFrame>,
 }
 
 const fn silent(name: &'static str) -> OptionRule {
@@ -156,6 +159,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("end"),
     deciding("from_zero"),
     deciding("at"),
+    of_results("end_frame", end_frame),
     deciding("max_gap"),
     deciding("in_gaps"),
     // Curves.
@@ -305,6 +309,17 @@ fn encoding(result: &ResultRequest<'_>) -> Option<String> {
 fn linear(result: &ResultRequest<'_>) -> Option<String> {
     let takes = result.kind == ResultKind::Baked && result.format.takes(FormatOption::Linear);
     (!takes).then(|| "--linear is for NPZ that is written again as NPZ; leave it out".to_owned())
+}
+
+fn end_frame(result: &ResultRequest<'_>) -> Option<String> {
+    let format = result.format;
+    let has_times = format.supports(Feature::UnevenTimes) || format.takes(FormatOption::TimesApart);
+    (result.end_frame == Some(EndFrame::Key) && !has_times).then(|| {
+        format!(
+            "{} stores frames of a rate and no times; give --end-frame hold or leave-out",
+            format.name
+        )
+    })
 }
 
 fn lengths(result: &ResultRequest<'_>, option: &str) -> Option<String> {

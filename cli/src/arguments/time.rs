@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
-use tumble::{FrameRate, SampleTimes};
+use tumble::{FrameRate, SampleTimes, Timeline};
+use tumble_formats::end_frame::{EndFrame, EndSample};
 use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
 
+use crate::arguments::output::one_of;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -99,13 +102,38 @@ enum InGaps {
     Hold,
 }
 
+/// `--end-frame`: what a result has at the end of a clip that ends between two frames.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct EndFrameArguments {
+    /// Where a clip ends between two frames: add a sample at its end (`key`), one frame more with the value of
+    /// the end (`hold`), or nothing [default: key; hold in clips of formats without times; leave-out in NPY, and
+    /// in results other than rotations]
+    #[arg(long, value_name = "HOW", value_parser = end_frame())]
+    pub(crate) end_frame: Option<EndFrame>,
+}
+
+fn end_frame() -> impl TypedValueParser<Value = EndFrame> {
+    let help = |end_frame| match end_frame {
+        EndFrame::Key => "a sample at the end, less than a frame after the last frame",
+        EndFrame::Hold => "one frame more, after the end, with the value of the end",
+        EndFrame::LeaveOut => "nothing: the last frame before the end is the last sample",
+    };
+    one_of(EndFrame::ALL.map(|end_frame| (end_frame.name(), help(end_frame), end_frame)))
+}
+
 /// The samples of one clip.
 pub(crate) struct ClipFrames {
     /// The times at which it is evaluated.
     pub(crate) frames: SampleTimes,
     /// The times written with the results, where those differ: a key is held there.
-    pub(crate) held: Option<SampleTimes>,
-    /// How many of them were in gaps, and were left out or held.
+    held: Option<SampleTimes>,
+    /// The sample at the end of the clip, after its frames.
+    pub(crate) end: Option<EndSample>,
+    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    pub(crate) left_out: Option<f64>,
+    /// The rate of which all written times are neighbouring frames.
+    pub(crate) rate: Option<FrameRate>,
+    /// How many of the times were in gaps, and were left out or held.
     pub(crate) in_gaps: usize,
 }
 
@@ -114,21 +142,56 @@ impl From<SampleTimes> for ClipFrames {
         Self {
             frames,
             held: None,
+            end: None,
+            left_out: None,
+            rate: None,
             in_gaps: 0,
         }
     }
 }
 
 impl ClipFrames {
-    /// Whether frames of a rate are missing.
-    pub(crate) fn is_gappy(&self) -> bool {
-        self.in_gaps > 0 && self.held.is_none()
+    /// Frames of a rate, and the sample at the end of a clip that ends at `end`, in seconds.
+    pub(crate) fn at_rate(
+        frames: SampleTimes,
+        rate: FrameRate,
+        (clip, end): (&Motion, f64),
+        end_frame: EndFrame,
+        name: &str,
+    ) -> Result<Self, Failure> {
+        let timeline = resolved(&frames, clip, name)?;
+        let sample = end_frame.sample(&timeline, rate, end);
+        let left_out = EndFrame::Key
+            .sample(&timeline, rate, end)
+            .filter(|_| sample.is_none());
+        let last_frame = timeline.time(0, timeline.len().saturating_sub(1));
+        Ok(Self {
+            end: sample,
+            left_out: left_out.zip(last_frame).map(|(end, last)| end.at - last),
+            rate: Some(rate).filter(|_| sample.is_none_or(EndSample::is_held)),
+            ..frames.into()
+        })
+    }
+
+    /// Whether a key is held in gaps.
+    pub(crate) fn is_held(&self) -> bool {
+        self.held.is_some()
     }
 
     /// The times written with the results.
-    pub(crate) fn written_times(&self) -> &SampleTimes {
-        self.held.as_ref().unwrap_or(&self.frames)
+    pub(crate) fn written_times(&self, clip: &Motion, name: &str) -> Result<Timeline, Failure> {
+        let frames = resolved(self.held.as_ref().unwrap_or(&self.frames), clip, name)?;
+        let Some(end) = self.end else {
+            return Ok(frames);
+        };
+        let times = frames.times(0).chain([end.time]).collect();
+        resolved(&SampleTimes::at(times), clip, name)
     }
+}
+
+fn resolved(frames: &SampleTimes, clip: &Motion, name: &str) -> Result<Timeline, Failure> {
+    let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
+    timeline.map_err(|error| Failure::evaluating(name, &error.into()))
 }
 
 /// `--at`: the times of another file.
@@ -210,16 +273,23 @@ impl SampleRequest {
         &self,
         clip: &Motion,
         gaps: &GapArguments,
+        end_frame: EndFrame,
         name: &str,
     ) -> Result<ClipFrames, Failure> {
         let frames = self.of(clip, name);
-        let Some(max_gap) = gaps.max_gap else {
-            return Ok(frames.into());
+        let all = match *self {
+            Self::Rate { rate, end, .. } => {
+                let last = clip.set.time_span().map_or(0.0, |span| span.1);
+                let end = end.map_or(last, |end| clip.time_in_set(end));
+                ClipFrames::at_rate(frames, rate, (clip, end), end_frame, name)?
+            }
+            Self::Times(_) | Self::Keys(_) => frames.into(),
         };
-        let timeline = frames
-            .resolve(clip.set.track_count(), clip.set.time_span())
-            .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let times: Vec<f64> = timeline.times(0).collect();
+        let Some(max_gap) = gaps.max_gap else {
+            return Ok(all);
+        };
+        let mut times: Vec<f64> = resolved(&all.frames, clip, name)?.times(0).collect();
+        times.extend(all.end.map(|end| end.at));
         let known = clip.key_times();
         // The key before a gap.
         let held = |time: f64| {
@@ -230,17 +300,19 @@ impl SampleRequest {
         };
         let held: Vec<Option<f64>> = times.iter().map(|&time| held(time)).collect();
         let Some(first) = held.iter().position(Option::is_some) else {
-            return Ok(frames.into());
+            return Ok(all);
         };
         let in_gaps = held.iter().flatten().count();
-        let all = words::count(times.len(), "time");
         let found = format!(
-            "{name}: {in_gaps} of {all} lie between keys that are more than {max_gap} s apart"
+            "{name}: {in_gaps} of {} lie between keys that are more than {max_gap} s apart",
+            words::count(times.len(), "time")
         );
         let each = times.iter().zip(&held);
+        let written: Vec<f64> = all.written_times(clip, name)?.times(0).collect();
         let mut samples = ClipFrames {
             in_gaps,
-            ..frames.into()
+            left_out: all.left_out,
+            ..all.frames.into()
         };
         let done = match gaps.in_gaps {
             InGaps::Refuse => {
@@ -255,14 +327,20 @@ impl SampleRequest {
                 return Err(Failure::new(ALL_INPUTS, message));
             }
             InGaps::LeaveOut => {
-                let outside = each.filter(|(_, held)| held.is_none());
-                samples.frames = SampleTimes::at(outside.map(|(&time, _)| time).collect());
+                let outside = |times: &[f64]| {
+                    let each = times.iter().zip(&held);
+                    let outside = each.filter(|(_, held)| held.is_none());
+                    SampleTimes::at(outside.map(|(&time, _)| time).collect())
+                };
+                samples.frames = outside(&times);
+                samples.held = (written != times).then(|| outside(&written));
                 "left out"
             }
             InGaps::Hold => {
                 let evaluated = each.map(|(&time, held)| held.unwrap_or(time));
-                let evaluated = SampleTimes::at(evaluated.collect());
-                samples.held = Some(std::mem::replace(&mut samples.frames, evaluated));
+                samples.frames = SampleTimes::at(evaluated.collect());
+                samples.held = Some(SampleTimes::at(written));
+                samples.rate = all.rate;
                 "held at the key before"
             }
         };

@@ -9,6 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
 use tumble::{Chunk, Encoding, Error};
 use tumble_formats::Diagnostic;
+use tumble_formats::end_frame::EndRows;
 use tumble_formats::format::{
     Document, Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
@@ -97,6 +98,11 @@ impl ResultTarget {
         Ok(Self { times, ..self })
     }
 
+    /// Whether times go to a separate file.
+    pub(crate) fn has_times_apart(&self) -> bool {
+        self.times.is_some()
+    }
+
     /// Opens and drops the file: its directory may be read-only.
     pub(crate) fn check_writable(&self) -> Result<(), Failure> {
         self.destination.check_writable()
@@ -123,7 +129,7 @@ impl ResultTarget {
         MotionOptions {
             name: self.to_string(),
             format: ending.to_string_lossy().to_lowercase(),
-            times_apart: self.times.is_some(),
+            times_apart: self.has_times_apart(),
             ..MotionOptions::default()
         }
     }
@@ -250,6 +256,7 @@ impl ResultTarget {
     pub(crate) fn write_rotations(
         &self,
         result: &ResultShape<'_>,
+        mut ends: EndRows,
         evaluate: impl FnOnce(&mut ChunkSink<'_>) -> Result<(), ResultError>,
     ) -> Result<WrittenFile, Failure> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
@@ -269,7 +276,7 @@ impl ResultTarget {
             };
             let evaluated = evaluate(&mut |chunk| {
                 writer
-                    .write(bytemuck::cast_slice(chunk.rows))
+                    .write(&ends.next(bytemuck::cast_slice(chunk.rows)))
                     .map_err(ResultError::Writing)
             });
             match evaluated {

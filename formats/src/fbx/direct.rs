@@ -12,6 +12,7 @@ use ufbx::{
     Transform,
 };
 
+use crate::fbx::layers::is_spheric;
 use crate::fbx::times::Properties;
 use crate::fbx::{ROTATION, SCALE, TRANSLATION};
 
@@ -113,7 +114,7 @@ impl<'a> DirectEvaluator<'a> {
             translation: vector("Lcl Translation", 0.0, properties.translation)?,
             rotation: vector("Lcl Rotation", 0.0, properties.rotation)?,
             scale: vector("Lcl Scaling", 1.0, properties.scale)?,
-            order: if is_spaced {
+            order: if is_spaced && !is_spheric(node) {
                 node.rotation_order
             } else {
                 RotationOrder::Xyz
@@ -370,7 +371,8 @@ mod tests {
                 continue;
             };
             for stack in &scene.anim_stacks {
-                let Ok(takes) = Takes::of(&scene, stack, &budget) else {
+                let layers: Vec<usize> = (0..stack.layers.len()).collect();
+                let Ok(takes) = Takes::of(&scene, stack, &layers, &budget) else {
                     continue;
                 };
                 for (&node, properties) in &takes.properties {

@@ -7,7 +7,7 @@
 use glam::DVec4;
 use tumble::FrameRate;
 
-use crate::keys::just_before;
+use crate::keys::{just_after, just_before};
 use crate::rate::frame_time;
 
 /// The largest distance between a curve and the keys that follow it: in radians for rotations, otherwise relative to
@@ -71,6 +71,8 @@ pub(super) struct ChannelFollower<'a> {
     pub(super) rate: Option<FrameRate>,
     /// Whether keys are added only where rotations need them.
     pub(super) keyframes: bool,
+    /// The largest number of keys of the channel, for which there is memory.
+    pub(super) max_keys: usize,
 }
 
 /// An interval in which the channel does not jump.
@@ -112,7 +114,8 @@ impl Cubic {
 
 impl ChannelFollower<'_> {
     /// The keys for a channel with these stops, whose values at the thirds between them are known, and whether the
-    /// keys follow the channel everywhere. `None` if the channel cannot be evaluated so often.
+    /// keys follow the channel everywhere. `None` if the channel cannot be evaluated so often, or if it takes more keys
+    /// than [`max_keys`](Self::max_keys).
     pub(super) fn keys(
         &self,
         stops: &[KeyStop],
@@ -187,7 +190,7 @@ impl ChannelFollower<'_> {
                      next: f64,
                      pieces: &mut Vec<_>| {
             let after = self.near(stop.after, keys[keys.len() - 1].1);
-            let late = f64::from((stop.clip as f32).next_up());
+            let late = just_after(stop.clip);
             if stop.after != stop.at && late < next {
                 keys.push((late, after));
                 pieces.push(None);
@@ -300,6 +303,9 @@ impl ChannelFollower<'_> {
                 let seconds = piece.clip[1] - piece.clip[0];
                 let [leaves, arrives] = cubic.tangents.map(|tangent| tangent / seconds);
                 keys[last].2[1] = leaves;
+                if keys.len() >= self.max_keys {
+                    return None;
+                }
                 keys.push((piece.clip[1], piece.ends[1], [arrives, ChannelValue::ZERO]));
             }
         }
@@ -332,6 +338,9 @@ impl ChannelFollower<'_> {
                 {
                     open.extend(halves);
                     continue;
+                }
+                if keys.len() >= self.max_keys {
+                    return None;
                 }
                 keys.push((piece.clip[1], q));
             }
@@ -404,7 +413,7 @@ fn steps(stops: &[KeyStop], thirds: &[[ChannelValue; 2]]) -> Option<Vec<(f64, Ch
     let mut keys = Vec::with_capacity(stops.len());
     for (index, stop) in stops.iter().enumerate() {
         keys.push((stop.clip, stop.at));
-        let late = f64::from((stop.clip as f32).next_up());
+        let late = just_after(stop.clip);
         let next = stops.get(index + 1);
         if stop.after != stop.at && next.is_some_and(|next| late < next.clip) {
             keys.push((late, stop.after));
@@ -448,6 +457,7 @@ mod tests {
             value: &|time| Some(curve(time)),
             rate: FrameRate::new(24, 1).ok(),
             keyframes,
+            max_keys: usize::MAX,
         };
         follow.keys(&stops, &thirds).unwrap()
     }
@@ -528,6 +538,7 @@ mod tests {
             value: &held,
             rate: None,
             keyframes: false,
+            max_keys: usize::MAX,
         };
         let stops = [
             stop(0.0, 1.0, 1.0, 1.0),

@@ -7,6 +7,7 @@
 
 mod direct;
 mod follow;
+mod layers;
 mod times;
 
 use std::cell::Cell;
@@ -18,22 +19,23 @@ use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{FrameRate, TrackError};
 use ufbx::{
-    AllocatorOpts, AnimValue, CoordinateAxis, ErrorType, FileFormat, InheritModeHandling, LoadOpts,
-    Node, SceneRoot, Transform,
+    AllocatorOpts, AnimRoot, AnimValue, CoordinateAxis, ErrorType, FileFormat, InheritModeHandling,
+    LoadOpts, Node, SceneRoot, Transform,
 };
 
 use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::fbx::direct::DirectEvaluator;
 use crate::fbx::follow::{ChannelFollower, ChannelKind, ChannelValue, FollowedKeys, KeyStop};
-use crate::fbx::times::{ChannelTimes, NodeTimes, Takes};
+use crate::fbx::layers::{StackLayers, is_solo, is_spheric, without_spheric_orders};
+use crate::fbx::times::{ChannelTimes, NodeTimes, Takes, was_rounded};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
 use crate::motion::{self, ChannelInterpolation, Channels, Joint, Motion};
 use crate::names::unique_name;
 use crate::origin::relative;
 use crate::quaternion::unit;
-use crate::rate::{RateSource, frame_time, of};
+use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of, on_frames};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
@@ -77,8 +79,8 @@ const DEPTH: u32 = 1024;
 /// The distance in seconds on either side of a key at which a curve is evaluated, to find jumps.
 const BESIDE: f64 = 1e-10;
 
-/// How often curves are evaluated: the number for every input, and the number for each byte of it. A layer counts as
-/// an eighth.
+/// How often curves are evaluated: the number for every input, and the number for each byte of it. Each layer counts,
+/// because each is evaluated.
 const EVALUATIONS: (i64, i64) = (1 << 23, 256);
 
 /// Bytes of memory of a track without its keys, of a key time while it is evaluated, and of a key.
@@ -121,14 +123,21 @@ pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loade
         let message = "the file has no animation stack; is it the right one?";
         return Err(Diagnostic::new(name, Code::NoAnimations, message));
     }
+    if scene.nodes.iter().all(|node| node.is_root) {
+        let message = "the file has no node, and its animation moves nothing; is it the right one?";
+        return Err(Diagnostic::new(name, Code::NoAnimations, message));
+    }
     let mut warnings = Warnings::new(name);
     warn_of_scene(&scene, &mut warnings);
+    let has_spheric = scene.nodes.iter().any(|node| is_spheric(node));
+    let rests = has_spheric.then(|| without_spheric_orders(&scene, Vec::new()));
     let reader = FbxReader {
         name,
         budget: &budget,
         scene: &scene,
         nodes: FbxNodes::of(&scene),
-        rate: of(&RateSource::Number(scene.settings.frames_per_second)).map(|found| found.grid),
+        rate: of(&RateSource::Number(frames_per_second(&scene))).map(|found| found.grid),
+        rests: rests.transpose().map_err(|error| no_anim(name, &error))?,
         options,
         evaluations: AtomicI64::new(
             EVALUATIONS.0 + EVALUATIONS.1.saturating_mul(bytes.len() as i64),
@@ -148,6 +157,23 @@ pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loade
     }
     loaded.warnings = warnings.into_list();
     Ok(loaded)
+}
+
+/// The rate that the file states.
+fn frames_per_second(scene: &SceneRoot) -> f64 {
+    /// 119.88 frames a second, which `ufbx` does not know.
+    const FRAMES_119_88: i64 = 18;
+    let mode = ufbx::find_prop(&scene.settings.props, "TimeMode").map(|mode| mode.value_int);
+    match mode {
+        Some(FRAMES_119_88) => 119.88,
+        _ => scene.settings.frames_per_second,
+    }
+}
+
+/// The error where the library cannot make an animation of some layers.
+fn no_anim(name: &str, error: &ufbx::Error) -> Diagnostic {
+    let message = format!("its layers cannot be evaluated: {}", &*error.description);
+    Diagnostic::new(name, Code::FbxDamaged, message)
 }
 
 fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnostic> {
@@ -246,6 +272,15 @@ fn warn_of_scene(scene: &SceneRoot, warnings: &mut Warnings) {
             )
         });
     }
+    if let Some(node) = scene.nodes.iter().find(|node| is_spheric(node)) {
+        warnings.warn(Code::FbxSpheric, || {
+            let name = &node.element.name;
+            (
+                None,
+                format!("`{name}` has the rotation order 6 (spheric), which is read as XYZ"),
+            )
+        });
+    }
     for warning in &scene.metadata.warnings {
         warnings.warn(Code::FbxOdd, || (None, warning.description.to_string()));
     }
@@ -305,7 +340,10 @@ struct FbxReader<'a> {
     budget: &'a Budget,
     scene: &'a SceneRoot,
     nodes: FbxNodes,
+    /// The rate that the file states.
     rate: Option<FrameRate>,
+    /// The animation without layers, in which nodes rest; `None` if `ufbx` knows where they rest.
+    rests: Option<AnimRoot>,
     options: &'a ReadOptions,
     /// How many evaluations are left.
     evaluations: AtomicI64,
@@ -334,6 +372,7 @@ impl NodeKeys {
 enum FollowFault {
     NotFinite { time: f64 },
     Work,
+    Keys { count: usize },
 }
 
 /// The channels that an evaluation computes: bits of `ufbx`'s `TransformFlags`, which the crate does not publish.
@@ -368,11 +407,22 @@ impl FbxReader<'_> {
         let over = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let (scene, tracks) = (self.scene, &self.nodes.tracks);
         self.budget.take(tracks.len(), TRACK).map_err(over)?;
-        let takes = Takes::of(scene, &scene.anim_stacks[stack], self.budget).map_err(over)?;
+        let layers = StackLayers::of(scene, &scene.anim_stacks[stack]);
+        let layers = layers.map_err(|error| no_anim(self.name, &error))?;
+        let anim_stack = &scene.anim_stacks[stack];
+        let takes = Takes::of(scene, anim_stack, &layers.audible, self.budget).map_err(over)?;
+        if let Some((property, node, [time, next])) = &takes.disorder {
+            let message = format!(
+                "the key times of `{property}` of `{node}` do not increase: {time} s is followed by {next} s; export \
+                 the file again"
+            );
+            return Err(self.refuse(stack, Code::TimeNotIncreasing, message));
+        }
+        let takes = self.on_frames(takes);
         self.warn_of_takes(stack, &takes, warnings);
         let nodes: Vec<Result<NodeKeys, Diagnostic>> = tracks
             .par_iter()
-            .map(|&node| self.node(stack, node, &takes))
+            .map(|&node| self.node(stack, node, &takes, &layers))
             .collect();
         let mut clip = Motion {
             name: Some(scene.anim_stacks[stack].element.name.to_string())
@@ -381,7 +431,7 @@ impl FbxReader<'_> {
             ..Motion::default()
         };
         let mut nodes: Vec<NodeKeys> = nodes.into_iter().collect::<Result<_, _>>()?;
-        let [start, end] = takes.span.map(|time| self.clip_time(time));
+        let [start, end] = takes.span.map(|time| self.clip_time(time, takes.grid));
         // A take in which nothing moves is as long as it says: its first track has a key at either end.
         if start < end
             && nodes.iter().all(NodeKeys::rests)
@@ -415,13 +465,46 @@ impl FbxReader<'_> {
                 return Err(too_large(reason));
             }
         }
-        clip.rate = clip.rate_of_keys().filter(|&rate| Some(rate) == self.rate);
+        // Keys that follow a curve may lie on other frames.
+        let is_of_file = |rate: &FrameRate| [self.rate, takes.rate].contains(&Some(*rate));
+        clip.rate = clip.rate_of_keys().filter(is_of_file);
         Ok(clip)
     }
 
+    /// Finds the rate of the keys, and moves the ends of the clip to frames of it if they were rounded to f32.
+    fn on_frames(&self, mut takes: Takes) -> Takes {
+        // Ticks are 2.2e-11 s.
+        const TICKS: Precision = Precision::Decimals(10);
+        let found = of(&RateSource::Times(&takes.keys, TICKS));
+        takes.rate = found.and_then(FrameGrid::rate);
+        let keys = || takes.keys.iter().flatten().copied();
+        let fits = |rate: &FrameRate| on_frames(keys(), *rate, 0.0, TICKS);
+        let found = found.filter(|found| found.phase == 0.0);
+        takes.grid = (self.rate.filter(fits)).or(found.map(|found| found.grid));
+        if let Some(grid) = takes.grid.filter(|_| !self.options.raw_times) {
+            takes.span = takes.span.map(|time| {
+                let frame = frame_time(grid, 0.0, time);
+                match was_rounded(time, frame) && (time - frame).abs() > times::SAME {
+                    true => frame,
+                    false => time,
+                }
+            });
+        }
+        takes
+    }
+
     fn warn_of_takes(&self, stack: usize, takes: &Takes, warnings: &mut Warnings) {
-        let name = &self.scene.anim_stacks[stack].element.name;
-        let inside = || Some(Location::Inside(name.to_string()));
+        let stack = &self.scene.anim_stacks[stack];
+        let inside = || Some(Location::Inside(stack.element.name.to_string()));
+        if let Some(layer) = stack.layers.iter().find(|layer| is_solo(layer)) {
+            warnings.warn(Code::FbxSolo, || {
+                let layer = &layer.element.name;
+                (
+                    inside(),
+                    format!("the layer `{layer}` is set to play alone (Solo); all layers that are not muted are read"),
+                )
+            });
+        }
         if takes.outside > 0 {
             warnings.warn(Code::FbxOutside, || {
                 let [begin, end] = takes.span;
@@ -457,20 +540,26 @@ impl FbxReader<'_> {
 
     /// A time of the file, moved to the frame from which it was rounded: ticks do not represent frames of 29.97
     /// exactly.
-    fn clip_time(&self, time: f64) -> f64 {
+    fn clip_time(&self, time: f64, grid: Option<FrameRate>) -> f64 {
         let tick = 1.1 / self.scene.metadata.ktime_second.max(1) as f64;
-        let frame = self.rate.map(|rate| frame_time(rate, 0.0, time));
+        let frame = grid.map(|rate| frame_time(rate, 0.0, time));
         let is_near = |frame: &f64| (frame - time).abs() <= tick && !self.options.raw_times;
         frame.filter(is_near).unwrap_or(time)
     }
 
-    fn node(&self, stack: usize, node: usize, takes: &Takes) -> Result<NodeKeys, Diagnostic> {
+    fn node(
+        &self,
+        stack: usize,
+        node: usize,
+        takes: &Takes,
+        layers: &StackLayers,
+    ) -> Result<NodeKeys, Diagnostic> {
         let none = ChannelTimes::default();
         let moved = takes.nodes.get(&node);
         let times = moved.map_or([&none; 3], |moved| {
             [&moved.translation, &moved.rotation, &moved.scale]
         });
-        let evaluator = Evaluator::of(self, stack, node, takes);
+        let evaluator = Evaluator::of(self, stack, node, takes, layers);
         let mut lists = times.map(|times| times.within(takes.span));
         // Curves that never change need no look behind their first key.
         for (list, channel) in lists.iter_mut().zip(CHANNELS) {
@@ -498,8 +587,13 @@ impl FbxReader<'_> {
         let [Some(translation), Some(rotation), Some(scale)] = keys else {
             unreachable!("each channel is in a group");
         };
+        let of_node = &self.scene.nodes[node];
+        let rest = match &self.rests {
+            Some(rests) if is_spheric(of_node) => ufbx::evaluate_transform(rests, of_node, 0.0),
+            _ => of_node.local_transform,
+        };
         Ok(NodeKeys {
-            rest: self.scene.nodes[node].local_transform,
+            rest,
             translation,
             rotation,
             scale,
@@ -518,7 +612,7 @@ impl FbxReader<'_> {
         let memory = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let _borrowed = self.budget.borrow(times.len(), STOP).map_err(memory)?;
         let evaluate = |time: f64, flags: u32| evaluator.at(time, flags);
-        let refuse = || evaluator.refusal();
+        let refuse = || evaluator.refusal(usize::MAX);
         let all = group
             .iter()
             .fold(0, |all, &channel| all | CHANNELS[channel].0);
@@ -564,7 +658,12 @@ impl FbxReader<'_> {
             let one = |time: f64| Some(part(&evaluate(time, flag)?));
             let channel_stops: Vec<KeyStop> = (times.iter().zip(&at))
                 .map(|(&file, all)| {
-                    stop(file, self.clip_time(file), kind, all.each_ref().map(part))
+                    stop(
+                        file,
+                        self.clip_time(file, evaluator.grid),
+                        kind,
+                        all.each_ref().map(part),
+                    )
                 })
                 .collect();
             let channel_thirds: Vec<[ChannelValue; 2]> = thirds
@@ -574,12 +673,12 @@ impl FbxReader<'_> {
             let follow = ChannelFollower {
                 kind,
                 value: &one,
-                rate: self.rate,
+                rate: evaluator.grid,
                 keyframes: self.options.keyframes,
+                max_keys: usize::try_from(self.budget.left() / KEY as u64).unwrap_or(usize::MAX),
             };
-            let keys = follow
-                .keys(&channel_stops, &channel_thirds)
-                .ok_or_else(refuse)?;
+            let keys = follow.keys(&channel_stops, &channel_thirds);
+            let keys = keys.ok_or_else(|| evaluator.refusal(follow.max_keys))?;
             let count = match &keys.0 {
                 FollowedKeys::Rest(_) => 1,
                 FollowedKeys::Step(keys) | FollowedKeys::Linear(keys) => keys.len(),
@@ -670,6 +769,9 @@ struct Evaluator<'a> {
     reader: &'a FbxReader<'a>,
     stack: usize,
     node: &'a Node,
+    layers: &'a StackLayers,
+    /// The frames to which key times belong.
+    grid: Option<FrameRate>,
     direct: Option<DirectEvaluator<'a>>,
     /// The cost of an evaluation.
     cost: i64,
@@ -682,16 +784,25 @@ struct Evaluator<'a> {
 const GRANTED: i64 = 1024;
 
 impl<'a> Evaluator<'a> {
-    fn of(reader: &'a FbxReader<'a>, stack: usize, node: usize, takes: &Takes) -> Self {
+    fn of(
+        reader: &'a FbxReader<'a>,
+        stack: usize,
+        node: usize,
+        takes: &Takes,
+        layers: &'a StackLayers,
+    ) -> Self {
         let scene = reader.scene;
-        let layers = &scene.anim_stacks[stack].layers;
-        let value = |index: usize| -> &'a AnimValue { &layers[0].anim_props[index].anim_value };
+        let first = layers.audible.first().copied().unwrap_or(0);
+        let lowest = &scene.anim_stacks[stack].layers;
+        let value = |index: usize| -> &'a AnimValue { &lowest[first].anim_props[index].anim_value };
         let mut evaluator = Self {
             reader,
             stack,
             node: &scene.nodes[node],
+            layers,
+            grid: takes.grid,
             direct: None,
-            cost: 1 + takes.layers as i64 / 8,
+            cost: takes.layers.max(1) as i64,
             left: Cell::new(0),
             fault: Cell::new(None),
         };
@@ -707,8 +818,17 @@ impl<'a> Evaluator<'a> {
 
     /// The transform that `ufbx` computes.
     fn exact(&self, time: f64, flags: u32) -> Transform {
-        let anim = &self.reader.scene.anim_stacks[self.stack].anim;
-        ufbx::evaluate_transform_flags(anim, self.node, time, EXPLICIT | flags)
+        let stack = &self.reader.scene.anim_stacks[self.stack];
+        let anim = self.layers.anim(stack, self.node);
+        let mut found = ufbx::evaluate_transform_flags(anim, self.node, time, EXPLICIT | flags);
+        if flags & TRANSLATION != 0
+            && let Some(off) = (self.layers).weight_of_translation(stack, self.node, time)
+        {
+            found.translation.x += off.x;
+            found.translation.y += off.y;
+            found.translation.z += off.z;
+        }
+        found
     }
 
     /// `None` if the work is too much or a number is not finite; the [refusal](Self::refusal) contains the reason.
@@ -746,9 +866,11 @@ impl<'a> Evaluator<'a> {
         direct.is_some_and(|direct| direct.is_still(flags))
     }
 
-    fn refusal(&self) -> Diagnostic {
-        match self.fault.get() {
-            Some(FollowFault::NotFinite { time }) => self.reader.refuse(
+    /// Why the node cannot be followed: no evaluation failed if there are more keys than `max_keys`.
+    fn refusal(&self, max_keys: usize) -> Diagnostic {
+        let fault = self.fault.get();
+        match fault.unwrap_or(FollowFault::Keys { count: max_keys }) {
+            FollowFault::NotFinite { time } => self.reader.refuse(
                 self.stack,
                 Code::NotFinite,
                 format!(
@@ -756,7 +878,16 @@ impl<'a> Evaluator<'a> {
                     &*self.node.element.name
                 ),
             ),
-            _ => self.reader.refuse(
+            FollowFault::Keys { count } => self.reader.refuse(
+                self.stack,
+                Code::Memory,
+                format!(
+                    "the curves of `{}` need more than {count} keys, for which an input of this length gets no \
+                     memory; is an angle damaged?",
+                    &*self.node.element.name
+                ),
+            ),
+            FollowFault::Work => self.reader.refuse(
                 self.stack,
                 Code::FbxWork,
                 "following the curves takes more work than a file of this length gets; is it damaged?",

@@ -2,11 +2,13 @@
 
 use std::collections::{HashMap, HashSet};
 
+use tumble::FrameRate;
 use ufbx::{
     AnimCurve, AnimLayer, AnimStack, ElementType, ExtrapolationMode, Interpolation, Node, Scene,
 };
 
 use crate::budget::{Budget, OverBudget};
+use crate::rate::Precision;
 
 /// Times closer than this are one, seconds: FBX counts in ticks of 2.2e-11 s.
 pub(super) const SAME: f64 = 1e-9;
@@ -68,6 +70,14 @@ pub(super) struct Takes {
     pub(super) others: Vec<String>,
     /// Number of layers, each of which is evaluated for each value.
     pub(super) layers: usize,
+    /// The key times of all curves, a list for each, unless it is that of the curve before.
+    pub(super) keys: Vec<Vec<f64>>,
+    /// The rate of these, as in every format: whatever the file says.
+    pub(super) rate: Option<FrameRate>,
+    /// The frames to which key times belong: those of the file's rate if all keys lie on them.
+    pub(super) grid: Option<FrameRate>,
+    /// A curve whose key times do not increase: the name of its property and of its node, and the two times.
+    pub(super) disorder: Option<(String, String, [f64; 2])>,
 }
 
 /// The part of a node's transform that a property determines.
@@ -96,15 +106,17 @@ impl Takes {
     pub(super) fn of(
         scene: &Scene,
         stack: &AnimStack,
+        audible: &[usize],
         budget: &Budget,
     ) -> Result<Self, OverBudget> {
+        let layers = || audible.iter().map(|&index| &stack.layers[index]);
         let mut takes = Self {
-            span: span(stack),
-            layers: stack.layers.len(),
+            span: span(stack, layers()),
+            layers: audible.len(),
             ..Self::default()
         };
         let mut others = HashSet::new();
-        for (index, layer) in stack.layers.iter().enumerate() {
+        for (index, layer) in layers().enumerate() {
             let weight = takes.weight(layer, budget)?;
             for (position, property) in layer.anim_props.iter().enumerate() {
                 let curves = || property.anim_value.curves.iter().flatten();
@@ -120,6 +132,8 @@ impl Takes {
                 };
                 let mut times = ChannelTimes::default();
                 for curve in curves() {
+                    let names = (&*property.prop_name, &*property.element.name);
+                    takes.note_keys(curve, names, budget)?;
                     takes.outside +=
                         times.add(curve, takes.span, part == TransformPart::Rotation, budget)?;
                 }
@@ -151,6 +165,29 @@ impl Takes {
             takes.carry(node, budget)?;
         }
         Ok(takes)
+    }
+
+    /// Keeps the key times of a curve, and notes whether they decrease.
+    fn note_keys(
+        &mut self,
+        curve: &AnimCurve,
+        (property, node): (&str, &str),
+        budget: &Budget,
+    ) -> Result<(), OverBudget> {
+        let keys = curve.keyframes.as_ref();
+        let mut pairs = keys.windows(2);
+        if let Some(pair) = pairs.find(|pair| pair[1].time < pair[0].time) {
+            let times = [pair[0].time, pair[1].time];
+            let found = || (property.to_owned(), node.to_owned(), times);
+            self.disorder.get_or_insert_with(found);
+        }
+        let times = || keys.iter().map(|key| key.time);
+        let is_known = |last: &Vec<f64>| times().eq(last.iter().copied());
+        if keys.len() > 1 && !self.keys.last().is_some_and(is_known) {
+            budget.take(keys.len(), size_of::<f64>())?;
+            self.keys.push(times().collect());
+        }
+        Ok(())
     }
 
     /// The key times of a layer's weight.
@@ -219,23 +256,35 @@ impl Takes {
     }
 }
 
-/// The first and the last time of a stack, or of its keys if the stack does not contain them.
-fn span(stack: &AnimStack) -> [f64; 2] {
-    let (begin, end) = (stack.time_begin, stack.time_end);
-    if begin.is_finite() && end.is_finite() && begin < end {
-        return [begin, end];
-    }
-    let layers = stack.layers.iter();
+/// The first and the last time of a stack, or of its keys if the stack does not contain them. Programs write ends that
+/// were rounded to f32, 2e-8 s after the last key; such an end is that key.
+fn span<'a>(stack: &AnimStack, layers: impl Iterator<Item = &'a AnimLayer>) -> [f64; 2] {
     let curves = layers.flat_map(|layer| layer.anim_values.iter());
     let curves = curves.flat_map(|value| value.curves.iter().flatten());
     let times = curves.flat_map(|curve| curve.keyframes.iter().map(|key| key.time));
     let each = times.filter(|time| time.is_finite()).map(|time| [time; 2]);
-    let span = each.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-    span.unwrap_or(if begin.is_finite() {
+    let keys = each.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    let (begin, end) = (stack.time_begin, stack.time_end);
+    if begin.is_finite() && end.is_finite() && begin < end {
+        let Some([first, last]) = keys.filter(|[first, last]| first < last) else {
+            return [begin, end];
+        };
+        let near = |time: f64, key: f64| match was_rounded(time, key) {
+            true => key,
+            false => time,
+        };
+        return [near(begin, first), near(end, last)];
+    }
+    keys.unwrap_or(if begin.is_finite() {
         [begin; 2]
     } else {
         [0.0; 2]
     })
+}
+
+/// Whether a time is another one after rounding to f32.
+pub(super) fn was_rounded(time: f64, exact: f64) -> bool {
+    (time - exact).abs() <= Precision::F32.rounding(exact)
 }
 
 impl ChannelTimes {

@@ -8,6 +8,7 @@ use tumble::FrameRate;
 
 use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::end_frame::EndFrame;
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
@@ -78,6 +79,10 @@ impl Document for GltfDocument {
         times.extend(within);
         times.extend((last > first).then_some(last));
         Ok(times)
+    }
+
+    fn end_frame(&self) -> Option<EndFrame> {
+        None
     }
 
     fn writes(&self, format: &Format) -> bool {

@@ -1,8 +1,9 @@
 //! The key times of a clip, and clips whose keys are samples.
 
 use glam::{Quat, Vec3};
-use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet};
+use tumble::{Channel, Engine, Error, FrameRate, SampleTimes, TrackError, TrackSet};
 
+use crate::end_frame::EndFrame;
 use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::sample::{ChannelMethods, Samples};
 
@@ -32,6 +33,20 @@ impl Motion {
     pub fn sampled(&self, engine: &Engine, frames: &SampleTimes) -> Result<Self, Error> {
         let methods = ChannelMethods::AUTHORED;
         Ok(self.with_keys(&methods.sample(engine, self, frames)?)?)
+    }
+
+    /// The clip with its samples at the frames of a rate as keys, and one at its end
+    /// ([`EndFrame::Key`]).
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn sampled_at_rate(&self, engine: &Engine, rate: FrameRate) -> Result<Self, Error> {
+        let frames = SampleTimes::rate(rate);
+        let span = self.set.time_span();
+        let timeline = frames.resolve(self.set.track_count(), span)?;
+        let end = span.and_then(|span| EndFrame::Key.sample(&timeline, rate, span.1));
+        let samples = ChannelMethods::AUTHORED.sample_to_end(engine, self, &frames, end)?;
+        Ok(self.with_keys(&samples)?)
     }
 
     /// The clip with `samples` as keys, as [`sampled`](Self::sampled) makes it.

@@ -8,13 +8,14 @@ use glam::Vec3;
 use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::end_frame::EndFrame;
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
 use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
-use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, times};
+use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, rate_of_frames, times};
 use crate::npz::{FORMAT, linear, smpl, tumble_layout};
 use crate::warnings::Warnings;
 
@@ -102,6 +103,19 @@ impl NpzDocument {
         Ok(parts)
     }
 
+    /// Whether the layout stores the time of each frame.
+    fn has_times(&self) -> bool {
+        self.plan.times.is_some() || self.plan.is_tumble_layout
+    }
+
+    /// The rate that is written beside the keys.
+    fn rate(&self, sampled: &SampledClip<'_>) -> Option<FrameRate> {
+        match self.plan.times {
+            Some(_) => rate_of_frames(sampled),
+            None => sampled.rate,
+        }
+    }
+
     /// The use of each member.
     fn outcomes<'a>(
         &self,
@@ -118,7 +132,7 @@ impl NpzDocument {
                 return MemberOutcome::Times;
             }
             if self.plan.rate_member == Some(index) {
-                return if sampled.rate.is_some() {
+                return if self.rate(sampled).is_some() {
                     MemberOutcome::Rate
                 } else {
                     MemberOutcome::Replaced
@@ -211,12 +225,10 @@ impl NpzDocument {
                 MemberOutcome::Rate => {
                     let array = self.archive.array(index)?;
                     let shape = &*array.header.shape;
-                    let element = rate_element(&array.header.element, sampled.rate);
+                    let rate = self.rate(sampled);
+                    let element = rate_element(&array.header.element, rate);
                     members.numbers(path, (&element, shape), deflated, |put| {
-                        sampled
-                            .rate
-                            .into_iter()
-                            .try_for_each(|rate| put(rate.per_second()))
+                        rate.into_iter().try_for_each(|rate| put(rate.per_second()))
                     })?;
                 }
                 MemberOutcome::Times => times(&mut members, sampled)?,
@@ -258,14 +270,17 @@ impl NpzDocument {
 }
 
 impl Document for NpzDocument {
-    /// Whole frames of the rate from the first time on, because arrays of frames cannot store a shorter last
-    /// interval.
+    /// Whole frames of the rate from the first time on.
     fn times(&self, _clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
         let frames = SampleTimes::rate(rate).resolve(self.plan.tracks, self.span);
         let timeline = frames.map_err(|error| {
             Diagnostic::new(&self.archive.file, Code::Layout, error.to_string())
         })?;
         Ok(timeline.times(0).collect())
+    }
+
+    fn end_frame(&self) -> Option<EndFrame> {
+        Some(EndFrame::where_times_are(self.has_times()))
     }
 
     fn writes(&self, format: &Format) -> bool {
@@ -343,7 +358,7 @@ impl Document for NpzDocument {
             );
             return Err(self.refuse(Code::Layout, message));
         }
-        if sampled.rate.is_none() && self.plan.times.is_none() && !self.plan.is_tumble_layout {
+        if sampled.rate.is_none() && !self.has_times() {
             let message = "the layout tells times by a rate alone; give --fps, not times";
             return Err(self.refuse(Code::Layout, message.to_owned()));
         }
@@ -352,7 +367,7 @@ impl Document for NpzDocument {
         self.write_members(&outcomes, sampled, out)?;
         let mut warnings = Warnings::new(&self.archive.file);
         let start = sampled.clip.time_offset as f64 + sampled.times[0];
-        if start != 0.0 && self.plan.times.is_none() && !self.plan.is_tumble_layout {
+        if start != 0.0 && !self.has_times() {
             warnings.warn(Code::StartMoved, || {
                 let message = format!(
                     "the first frame is at {start} s; the layout has a rate alone and begins at 0"

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 use half::f16;
-use tumble::Layout;
+use tumble::{FrameRate, Layout};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -17,6 +17,7 @@ use crate::npz::header::{ArrayHeader, Element};
 use crate::npz::plan::KeyKind;
 use crate::npz::{rotation_vector, tumble_layout};
 use crate::quaternion::ComponentOrder;
+use crate::rate::{Precision, RateSource, of};
 
 /// An archive that is being written. It grows in memory, because the length and the checksum of a member precede its
 /// bytes.
@@ -188,7 +189,8 @@ pub(super) fn notes(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> i
 
 /// Writes one clip in Tumble's layout, with these arrays:
 ///
-/// - `rotations` (tracks, frames, x y z w) in f32, `times` in f64, and `fps` if there is a rate;
+/// - `rotations` (tracks, frames, x y z w) in f32, `times` in f64, and `fps` if there is a rate, of which the last time
+///   may be no frame;
 /// - `translations` and `scales` (tracks, frames, 3), if tracks have them; with origins, translations are f64 and the
 ///   origins are added;
 /// - `names` and `name`, of the tracks and of the clip; `is_world`, if poses are relative to the world;
@@ -236,7 +238,7 @@ pub fn write_npz(
         }
     }
     times(&mut members, sampled)?;
-    if let Some(rate) = sampled.rate {
+    if let Some(rate) = rate_of_frames(sampled) {
         let scalar = (&Element::F64, &[][..]);
         members.numbers("fps.npy", scalar, false, |put| put(rate.per_second()))?;
     }
@@ -264,6 +266,17 @@ pub fn write_npz(
     notes(&mut members, sampled)?;
     members.finish(out)?;
     Ok(Vec::new())
+}
+
+/// The rate of the samples, or of all but the last one, if the clip ends between two frames: programs that read no times
+/// then play the last interval a little slower, and nothing is missing.
+pub(super) fn rate_of_frames(sampled: &SampledClip<'_>) -> Option<FrameRate> {
+    const FEWEST: usize = 3;
+    sampled.rate.or_else(|| {
+        let (_, frames) = sampled.times.split_last()?;
+        let frames = (frames.len() >= FEWEST).then(|| [frames.to_vec()])?;
+        of(&RateSource::Times(&frames, Precision::F64))?.rate()
+    })
 }
 
 /// Writes the times of all samples.

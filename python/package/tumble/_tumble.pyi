@@ -87,6 +87,7 @@ _Encoding: TypeAlias = Literal[
     "matrix-3x4",
     "euler",
 ]
+_EndFrame: TypeAlias = Literal["key", "hold", "leave-out"]
 _Frame: TypeAlias = Literal["minimal", "fixed", "frenet"]
 _Layout: TypeAlias = Literal["track", "frame"]
 _Major: TypeAlias = Literal["row", "column"]
@@ -1081,6 +1082,7 @@ def save(
     linear: Sequence[str] = ...,
     order: _Order | None = None,
     layout: _Layout = "track",
+    end_frame: _EndFrame | None = None,
     times_out: _Path | None = None,
     quantize: bool = False,
     meshopt: bool = False,

@@ -15,7 +15,9 @@ use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, me
 use crate::arguments::options::{AppliesTo, CommandLine, OPTIONS, ResultKind, ResultRequest};
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
-use crate::arguments::time::{AtKeysArguments, GapArguments, SampleRequest, SamplingArguments};
+use crate::arguments::time::{
+    AtKeysArguments, EndFrameArguments, GapArguments, SampleRequest, SamplingArguments,
+};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -61,6 +63,8 @@ pub(crate) struct Arguments {
     pub(super) sampling: SamplingArguments,
     #[command(flatten)]
     pub(super) at_keys: AtKeysArguments,
+    #[command(flatten)]
+    pub(super) end_frame: EndFrameArguments,
     #[command(flatten)]
     pub(super) gaps: GapArguments,
     #[command(flatten)]
@@ -192,6 +196,7 @@ impl Arguments {
             output: &self.output,
             layout: self.layout,
             encoding: self.encoding,
+            end_frame: self.end_frame.end_frame,
         };
         let mut set = OPTIONS
             .iter()

@@ -6,9 +6,9 @@ use std::borrow::Cow;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::method::SLERP;
-use tumble::{
-    Engine, Error, FrameRate, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline,
-};
+use tumble::{Engine, Error, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline};
+use tumble_formats::Feature;
+use tumble_formats::end_frame::{EndFrame, EndRows};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::origin::origin_of;
@@ -79,6 +79,7 @@ pub(super) fn evaluate_all(
             samples,
             work: &work,
             in_gaps: 0,
+            left_out: None,
         };
         let made = job.evaluate();
         reports.extend(pipeline.keep(&work, made));
@@ -94,6 +95,8 @@ struct EvaluationJob<'a> {
     work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
+    /// The seconds after the last frame that are left out, of one of these clips, unless this was asked for.
+    left_out: Option<f64>,
 }
 
 impl EvaluationJob<'_> {
@@ -119,6 +122,7 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
+        let end_frame = self.end_frame(kind, target);
         let tracks = &self.arguments.inputs.tracks;
         if kind == ResultKind::Motion {
             let some = self.arguments.command_line.has("tracks");
@@ -129,7 +133,7 @@ impl EvaluationJob<'_> {
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
             let selected: Vec<Cow<'_, Motion>> = selected.collect::<Result<_, Failure>>()?;
             let clips: Vec<&Motion> = selected.iter().map(|clip| &**clip).collect();
-            return self.motion(name, &clips, target);
+            return self.motion(name, &clips, end_frame, target);
         }
         let [clip] = clips else {
             let message =
@@ -137,9 +141,23 @@ impl EvaluationJob<'_> {
             return Err(Failure::usage(message));
         };
         if let (ResultKind::Poses, Some(poses)) = (kind, output.poses()) {
-            return self.poses(name, clip, poses, target);
+            return self.poses(name, clip, poses, end_frame, target);
         }
-        self.rotations(name, &*tracks.select(clip, name)?, target)
+        self.rotations(name, &*tracks.select(clip, name)?, end_frame, target)
+    }
+
+    /// What a new result has at the end of a clip that ends between two frames.
+    fn end_frame(&self, kind: ResultKind, target: &ResultTarget) -> EndFrame {
+        let (asked, format) = (self.arguments.end_frame.end_frame, target.format());
+        let has_times = format.supports(Feature::UnevenTimes) || target.has_times_apart();
+        asked.unwrap_or(match kind {
+            ResultKind::Motion | ResultKind::Baked => EndFrame::where_times_are(has_times),
+            // Rotations with times are read again as a clip; other numbers are frames.
+            ResultKind::Rotations if has_times && self.arguments.output.is_rotations() => {
+                EndFrame::Key
+            }
+            ResultKind::Rotations | ResultKind::Poses => EndFrame::LeaveOut,
+        })
     }
 
     /// Warns where the evaluated curves are less smooth than their method promises.
@@ -208,19 +226,20 @@ impl EvaluationJob<'_> {
         &mut self,
         name: &str,
         clip: &Motion,
-        frames: &SampleTimes,
+        samples: &ClipFrames,
     ) -> Result<Samples, Failure> {
+        let frames = &samples.frames;
         let (method, with) = self.methods();
         let methods = ChannelMethods {
             method,
             with: &with,
         };
         let tracks = clip.set.track_count();
-        let samples = frames.resolve(tracks, clip.set.time_span());
-        let found = samples.map_err(Error::from).and_then(|timeline| {
+        let timeline = frames.resolve(tracks, clip.set.time_span());
+        let found = timeline.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
             self.device
-                .work(|engine| methods.sample(engine, clip, frames))
+                .work(|engine| methods.sample_to_end(engine, clip, frames, samples.end))
         });
         found.map_err(|error| Failure::evaluating(name, &error))
     }
@@ -262,8 +281,12 @@ impl EvaluationJob<'_> {
             0 => String::new(),
             count => format!(" ({count} in gaps {})", self.arguments.gaps.done_in_gaps()),
         };
+        let left_out = match self.left_out {
+            Some(seconds) => format!(" (the {seconds:.3} s after the last one are left out)"),
+            None => String::new(),
+        };
         let done = format!(
-            "{} × {}{in_gaps}, {method}",
+            "{} × {}{in_gaps}{left_out}, {method}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
         );
@@ -317,19 +340,30 @@ impl EvaluationJob<'_> {
         &mut self,
         name: &str,
         clips: &[&Motion],
+        end_frame: EndFrame,
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let times: Vec<ClipFrames> = clips
             .iter()
-            .map(|clip| self.samples.of_clip(clip, &self.arguments.gaps, name))
+            .map(|clip| (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name))
             .collect::<Result<_, _>>()?;
-        self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
-        let is_gappy = times.iter().any(ClipFrames::is_gappy);
-        let rate = match self.samples {
-            SampleRequest::Rate { rate, .. } if !is_gappy => Some(*rate),
-            _ => None,
-        };
-        self.written(name, clips, &times, rate, target, None)
+        self.written(name, clips, &times, target, None)
+    }
+
+    /// Counts the times in gaps, and tells of ends between two frames.
+    fn note_frames(&mut self, frames: &[ClipFrames], target: &ResultTarget) {
+        self.in_gaps = frames.iter().map(|of_clip| of_clip.in_gaps).sum();
+        if self.arguments.end_frame.end_frame.is_some() {
+            return;
+        }
+        self.left_out = frames.iter().find_map(|of_clip| of_clip.left_out);
+        let warning = frames.iter().find_map(|of_clip| {
+            let (end, rate) = of_clip.end.zip(of_clip.rate)?;
+            end.warning(rate, &target.to_string())
+        });
+        if let Some(warning) = warning {
+            words::note(&warning.to_string());
+        }
     }
 
     /// The input's file, everything kept but the keys of some of its animations.
@@ -361,13 +395,29 @@ impl EvaluationJob<'_> {
                  another format"
             )));
         }
+        let refused = |why: &str| Err(Failure::usage(format!("{name}: {why}")));
+        let end_frame = match (document.end_frame(), self.arguments.end_frame.end_frame) {
+            (None, Some(_)) => {
+                return refused(
+                    "the animations of a file that is kept keep their ends; leave out --end-frame",
+                );
+            }
+            (Some(EndFrame::Hold), Some(EndFrame::Key)) => {
+                return refused(
+                    "its arrays are frames of a rate, without times; give --end-frame hold or leave-out",
+                );
+            }
+            (usual, asked) => asked.or(usual).unwrap_or(EndFrame::Key),
+        };
         let at = |clip: &&Motion| {
             let times = document.times(clip.index, rate);
-            times.map(|times| SampleTimes::at(times).into())
+            let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+            let last = times.last().copied().unwrap_or(0.0);
+            let end = clip.set.time_span().map_or(last, |span| span.1);
+            ClipFrames::at_rate(SampleTimes::at(times), rate, (clip, end), end_frame, name)
         };
-        let times: Result<Vec<ClipFrames>, _> = clips.iter().map(at).collect();
-        let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
-        self.written(name, clips, &times, Some(rate), target, Some(&*document))
+        let times: Vec<ClipFrames> = clips.iter().map(at).collect::<Result<_, Failure>>()?;
+        self.written(name, clips, &times, target, Some(&*document))
     }
 
     fn options(&self, target: &ResultTarget) -> MotionOptions {
@@ -386,10 +436,10 @@ impl EvaluationJob<'_> {
         name: &str,
         clips: &[&Motion],
         frames: &[ClipFrames],
-        rate: Option<FrameRate>,
         target: &ResultTarget,
         document: Option<&dyn Document>,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        self.note_frames(frames, target);
         let mut all: Vec<Samples> = Vec::new();
         for (clip, samples) in clips.iter().zip(frames) {
             let frames = &samples.frames;
@@ -398,18 +448,16 @@ impl EvaluationJob<'_> {
             // Rotations, translations, scales, and the same as written.
             room::in_memory(name, &clip.set, frames, 6)?;
             self.explain(name, clip, frames, Layout::FrameMajor)?;
-            let mut found = self.sample(name, clip, frames)?;
-            if let Some(held) = &samples.held {
-                let said = held.resolve(clip.set.track_count(), clip.set.time_span());
-                let said = said.map_err(|error| Failure::evaluating(name, &error.into()))?;
-                found.times = said.times(0).collect();
+            let mut found = self.sample(name, clip, samples)?;
+            if samples.is_held() {
+                found.times = samples.written_times(clip, name)?.times(0).collect();
             }
             all.push(found);
         }
         let method = self.arguments.method.to_string();
         let notes = self.notes(name)?;
-        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
-            .map(|(clip, samples)| samples.of(clip, rate, &notes))
+        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all).zip(frames))
+            .map(|((clip, samples), frames)| samples.of(clip, frames.rate, &notes))
             .collect();
         let indices = clips.iter().map(|clip| clip.index);
         let written = target.write_clips(&sampled, indices, document, &self.options(target))?;
@@ -455,30 +503,24 @@ impl EvaluationJob<'_> {
         &mut self,
         name: &str,
         clip: &Motion,
+        end_frame: EndFrame,
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
-        self.in_gaps = samples.in_gaps;
-        if samples.held.is_some() && arguments.output.quantity() != Quantity::Rotation {
+        let samples = (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name)?;
+        self.note_frames(std::slice::from_ref(&samples), target);
+        if samples.is_held() && arguments.output.quantity() != Quantity::Rotation {
             return Err(Failure::usage(format!(
                 "{name}: a rotation that is held has no velocity; leave times in gaps out (--in-gaps leave-out)"
             )));
         }
         let frames = &samples.frames;
-        let timeline = samples
-            .written_times()
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let timeline = samples.written_times(clip, name)?;
         let encoding = arguments.output.encoding(arguments.encoding);
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
         let requested = arguments.layout;
         let mut notes = self.notes(name)?;
-        if let SampleRequest::Rate { rate, .. } = self.samples
-            && !samples.is_gappy()
-        {
-            notes.push(("rate", rate.to_string()));
-        }
+        notes.extend(samples.rate.map(|rate| ("rate", rate.to_string())));
         let format = target.results()?;
         let order = arguments.order().unwrap_or(format.order);
         let order = encoding.is_quaternion().then_some(order);
@@ -501,31 +543,35 @@ impl EvaluationJob<'_> {
         };
         let size = (set.track_count(), timeline.len());
         let extent = (size.0, size.1, span(&timeline));
+        let quantity = arguments.output.quantity();
+        let rows = |engine: &Engine, at: &SampleTimes| match quantity {
+            Quantity::Rotation => methods.rotations(engine, clip, at, result.layout),
+            // Velocities are rows of four numbers too.
+            _ => {
+                let rates = methods.rates(engine, clip, at, result.layout)?;
+                Ok(rates.into_iter().map(Quat::from_vec4).collect())
+            }
+        };
+        let ends = samples.end.map(|end| SampleTimes::at(vec![end.at]));
+        let frame_count = timeline.len() - usize::from(ends.is_some());
+        let ends = ends.map(|at| self.device.work(|engine| rows(engine, &at)));
+        let ends = ends.transpose();
+        let ends = ends.map_err(|error| Failure::evaluating(name, &error))?;
+        let mut ends = EndRows::new(ends.unwrap_or_default(), result.layout, frame_count);
         let Some(method) = methods.method_of(clip) else {
             // Tracks of different samplers are evaluated apart, and put together in memory.
             room::in_memory(name, set, frames, 2)?;
             let found = self
                 .device
                 .choose(size.0 * size.1)
-                .and_then(|()| {
-                    let layout = result.layout;
-                    let work = |engine: &Engine| match arguments.output.quantity() {
-                        Quantity::Rotation => methods.rotations(engine, clip, frames, layout),
-                        // Velocities are rows of four numbers too.
-                        _ => {
-                            let rates = methods.rates(engine, clip, frames, layout)?;
-                            Ok(rates.into_iter().map(Quat::from_vec4).collect())
-                        }
-                    };
-                    self.device.work(work)
-                })
+                .and_then(|()| self.device.work(|engine| rows(engine, frames)))
                 .map_err(|error| Failure::evaluating(name, &error))?;
-            let written = target.write_whole(&result, &found)?;
+            let written = target.write_whole(&result, &ends.next(&found))?;
             let method = "each channel's method";
             return Ok(self.evaluated(extent, method, written, order));
         };
         let interpolation = with(method);
-        let written = target.write_rotations(&result, |sink| {
+        let written = target.write_rotations(&result, ends, |sink| {
             self.device
                 .stream(set, interpolation, frames, result.layout, sink)
         })?;
@@ -540,28 +586,30 @@ impl EvaluationJob<'_> {
         name: &str,
         clip: &Motion,
         kind: PoseKind,
+        end_frame: EndFrame,
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let set = &clip.set;
-        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
-        self.in_gaps = samples.in_gaps;
+        let samples = (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name)?;
+        self.note_frames(std::slice::from_ref(&samples), target);
         let frames = &samples.frames;
-        let timeline = samples
-            .written_times()
-            .resolve(set.track_count(), set.time_span())
-            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let timeline = samples.written_times(clip, name)?;
         // The rotations, and twice what becomes of them.
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
         self.explain(name, clip, frames, Layout::FrameMajor)?;
         let (mut numbers, mut origins) = if clip.skeleton.is_empty() && !clip.has_vectors() {
-            (self.chain(name, clip, frames, kind)?, Vec::new())
+            let mut numbers = self.chain(name, clip, frames, kind)?;
+            if let Some(end) = samples.end {
+                numbers.extend(self.chain(name, clip, &SampleTimes::at(vec![end.at]), kind)?);
+            }
+            (numbers, Vec::new())
         } else {
             if self.arguments.output.has_parents() {
                 let message = "has a skeleton or positions already; leave out --parents";
                 return Err(Failure::usage(format!("{name}: {message}")));
             }
-            let samples = self.sample(name, clip, frames)?;
+            let samples = self.sample(name, clip, &samples)?;
             numbers_of(clip, &samples, kind)
                 .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?
         };

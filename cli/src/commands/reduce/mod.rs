@@ -261,7 +261,7 @@ impl Arguments {
             Some(rate) => {
                 let frames = SampleTimes::rate(rate);
                 room::in_memory(name, &clip.set, &frames, 7)?;
-                let sampled = clip.sampled(engine, &frames);
+                let sampled = clip.sampled_at_rate(engine, rate);
                 Cow::Owned(sampled.map_err(|error| Failure::evaluating(name, &error))?)
             }
             None if clip

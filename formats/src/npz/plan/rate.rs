@@ -140,9 +140,14 @@ impl ArchivePlan {
         } else {
             Precision::F64
         };
-        let said = self
-            .rate
-            .filter(|&rate| on_frames(times.iter().copied(), rate, 0.0, precision));
+        let are_frames =
+            |times: &[f64], rate| on_frames(times.iter().copied(), rate, 0.0, precision);
+        let said = self.rate.filter(|&rate| are_frames(&times, rate));
+        // A clip may end between two frames of its rate.
+        let ends_between = self.rate.is_some_and(|rate| {
+            let frames = times.split_last().map_or(&[][..], |(_, frames)| frames);
+            frames.len() > 1 && are_frames(frames, rate)
+        });
         // Times in f64, as we write them, were not rounded, and are read back as they are.
         let found = if is_f32 && !options.raw_times {
             grid::restore(std::slice::from_mut(&mut times), precision)
@@ -150,7 +155,7 @@ impl ArchivePlan {
             let times = RateSource::Times(std::slice::from_ref(&times), precision);
             of(&times).and_then(crate::rate::FrameGrid::rate)
         };
-        if let (Some(first), None, Some(found)) = (self.rate, said, found) {
+        if let (Some(first), None, Some(found), false) = (self.rate, said, found, ends_between) {
             self.two_rates = Some(format!(
                 "the file says {first} frames a second, and its times lie at {found}; the times are used"
             ));

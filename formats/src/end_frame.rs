@@ -1,0 +1,211 @@
+//! The end of a clip that is sampled at a rate, where it lies between two frames: [`EndFrame`].
+//!
+//! A clip of 1.1583 s at 30 fps ends 0.025 s after its frame 34. If nothing followed this frame, the clip would be
+//! shorter, and a loop would jump from one turn to the next. Therefore a file of clips gets one sample more, whose
+//! value is that of the end.
+
+use std::borrow::Cow;
+
+use glam::Quat;
+use tumble::{FrameRate, Layout, Timeline};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
+use crate::format::Format;
+
+/// What a result that is sampled at the frames of a rate has at the end of its clip, if the end lies between two
+/// frames. If it lies on one, that is the last sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EndFrame {
+    /// A sample at the end, after the last frame.
+    Key,
+    /// One frame more, after the end. It has the value of the end.
+    Hold,
+    /// Nothing: the last frame before the end is the last sample.
+    LeaveOut,
+}
+
+tumble::names! {
+    EndFrame, "end frame",
+    Key => "key",
+    Hold => "hold",
+    LeaveOut => "leave-out",
+}
+
+/// The sample after the last frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EndSample {
+    /// The time of its value, in seconds: that of the end.
+    pub at: f64,
+    /// The time that is written for it, in seconds.
+    pub time: f64,
+}
+
+impl EndSample {
+    /// Whether it is a frame of the rate, later than the end.
+    #[must_use]
+    pub fn is_held(self) -> bool {
+        self.time != self.at
+    }
+
+    /// The warning that a frame after the end was added, unless it was asked for. `name` is the output's name in
+    /// messages.
+    #[must_use]
+    pub fn warning(self, rate: FrameRate, name: &str) -> Option<Diagnostic> {
+        self.is_held().then(|| {
+            let Self { at, time } = self;
+            let message = format!(
+                "the clip ends at {at} s, between two frames of {rate} a second; one frame more, at {time} s, has \
+                 the value of the end (--end-frame leave-out ends before it)"
+            );
+            Diagnostic::new(name, Code::EndHeld, message)
+        })
+    }
+}
+
+/// An end that is at most this part of a frame after the last frame is that frame: times are rounded.
+const ON_FRAME: f64 = 1e-3;
+
+impl EndFrame {
+    /// Of clips in a format: a [`Key`](Self::Key) if the format has times, otherwise one frame more
+    /// ([`Hold`](Self::Hold)).
+    #[must_use]
+    pub fn of_clips(format: &Format) -> Self {
+        Self::where_times_are(format.supports(Feature::UnevenTimes))
+    }
+
+    /// [`Key`](Self::Key) where every sample has its time, [`Hold`](Self::Hold) where they are frames of a rate.
+    #[must_use]
+    pub fn where_times_are(has_times: bool) -> Self {
+        match has_times {
+            true => Self::Key,
+            false => Self::Hold,
+        }
+    }
+
+    /// The sample after the frames of `timeline`, which are those of `rate` up to `end`, in seconds; `None` if the
+    /// last frame is the end, or if the end is left out.
+    #[must_use]
+    pub fn sample(self, timeline: &Timeline, rate: FrameRate, end: f64) -> Option<EndSample> {
+        let last_frame = timeline.len().checked_sub(1)?;
+        let gap = end - timeline.time(0, last_frame)?;
+        // Formats of f32 times cannot store times that are nearer to each other.
+        let rounding = f64::from(f32::EPSILON) * end.abs();
+        if gap <= (ON_FRAME / rate.per_second()).max(rounding) {
+            return None;
+        }
+        let time = match self {
+            Self::Key => end,
+            Self::Hold => timeline.time(0, 0)? + rate.time_of(timeline.len() as u64),
+            Self::LeaveOut => return None,
+        };
+        Some(EndSample { at: end, time })
+    }
+}
+
+/// The values of all tracks at the end of a clip, which are put after those of its frames while they are streamed.
+#[derive(Debug)]
+pub struct EndRows {
+    /// The rotation of each track, or the four numbers of another value; empty if nothing follows the last frame.
+    rows: Vec<Quat>,
+    layout: Layout,
+    /// Number of frames of a track, without the end.
+    frames: usize,
+    /// Number of rows that have passed.
+    passed: usize,
+}
+
+impl EndRows {
+    /// `rows` has the end of each track, or nothing. `frames` is the number of rows of each track that pass.
+    #[must_use]
+    pub fn new(rows: Vec<Quat>, layout: Layout, frames: usize) -> Self {
+        Self {
+            rows,
+            layout,
+            frames,
+            passed: 0,
+        }
+    }
+
+    /// The next rows, in the order of the layout, with the ends that follow them.
+    pub fn next<'a>(&mut self, rows: &'a [Quat]) -> Cow<'a, [Quat]> {
+        if self.rows.is_empty() {
+            return Cow::Borrowed(rows);
+        }
+        let mut all = Vec::with_capacity(rows.len() + self.rows.len());
+        for row in rows {
+            all.push(*row);
+            self.passed += 1;
+            match self.layout {
+                Layout::TrackMajor if self.passed.is_multiple_of(self.frames) => {
+                    all.push(self.rows[self.passed / self.frames - 1]);
+                }
+                Layout::FrameMajor if self.passed == self.frames * self.rows.len() => {
+                    all.extend_from_slice(&self.rows);
+                }
+                Layout::TrackMajor | Layout::FrameMajor => {}
+            }
+        }
+        Cow::Owned(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tumble::SampleTimes;
+
+    use super::*;
+
+    fn sample(end_frame: EndFrame, start: f64, end: f64) -> Option<EndSample> {
+        let rate = FrameRate::new(30, 1).unwrap();
+        let frames = SampleTimes::rate(rate).between(start, end);
+        end_frame.sample(&frames.resolve(1, None).unwrap(), rate, end)
+    }
+
+    #[test]
+    fn an_end_between_frames_has_one_sample_more() {
+        let end = 139.0 / 120.0;
+        let key = EndSample { at: end, time: end };
+        assert_eq!(sample(EndFrame::Key, 0.0, end), Some(key));
+        let hold = EndSample {
+            at: end,
+            time: 35.0 / 30.0,
+        };
+        assert_eq!(sample(EndFrame::Hold, 0.0, end), Some(hold));
+        assert_eq!(sample(EndFrame::LeaveOut, 0.0, end), None);
+    }
+
+    #[test]
+    fn an_end_on_a_frame_is_its_last_sample() {
+        for end_frame in EndFrame::ALL {
+            for (start, end) in [
+                (0.0, 1.0),
+                (0.1, 0.1 + 34.0 / 30.0),
+                (0.0, f64::from(1.133_333_4_f32)),
+                (0.0, 1.133_34),
+                (2.0, 2.0),
+            ] {
+                assert_eq!(sample(end_frame, start, end), None, "{start} {end}");
+            }
+        }
+    }
+
+    #[test]
+    fn ends_follow_the_rows_of_their_tracks_in_any_parts() {
+        let row = |number: usize| Quat::from_array([number as f32; 4]);
+        let rows: Vec<Quat> = (0..6).map(row).collect();
+        for (layout, expected) in [
+            (Layout::TrackMajor, [0, 1, 2, 10, 3, 4, 5, 11]),
+            (Layout::FrameMajor, [0, 1, 2, 3, 4, 5, 10, 11]),
+        ] {
+            for part in 1..=6 {
+                let mut ends = EndRows::new(vec![row(10), row(11)], layout, 3);
+                let mut found = Vec::new();
+                for rows in rows.chunks(part) {
+                    found.extend_from_slice(&ends.next(rows));
+                }
+                assert_eq!(found, expected.map(row), "{layout} in parts of {part}");
+            }
+        }
+    }
+}
