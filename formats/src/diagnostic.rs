@@ -267,7 +267,8 @@ codes! {
     // E8xx and W8xx: MCAP.
     McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or not an MCAP file. The location is the position of the record in the file.";
     McapMessage = "E802", "a message that cannot be read", "The message does not agree with its type. Its topic is refused; the other topics are read.";
-    McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage and Path, encoded in CDR, are read.";
+    McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, QuaternionStamped, Imu, TransformStamped, TFMessage and Path, encoded in CDR, are read. The message lists the topics of the log.";
+    McapRoute = "E804" elsewhere, "a path without times", "All poses of a path have the same stamp, as a planner writes a route. A route has no times; `tumble follow` moves a body along one.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -316,8 +317,9 @@ codes! {
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, so nothing moves.";
-    McapCut = "W801", "a truncated log", "It ends within a record, for example because recording was interrupted. Everything before is read.";
+    McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
+    McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
 }
 
