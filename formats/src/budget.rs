@@ -58,6 +58,12 @@ impl Budget {
         }
     }
 
+    /// All bytes, used or not.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn limit(&self) -> u64 {
+        self.limit.load(Ordering::Relaxed)
+    }
+
     /// Bytes that are not used yet.
     #[cfg(feature = "fbx")]
     pub(crate) fn left(&self) -> u64 {

@@ -267,7 +267,8 @@ codes! {
     // E8xx and W8xx: MCAP.
     McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or not an MCAP file. The location is the position of the record in the file.";
     McapMessage = "E802", "a message that cannot be read", "The message does not agree with its type. Its topic is refused; the other topics are read.";
-    McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage and Path, encoded in CDR, are read.";
+    McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, QuaternionStamped, Imu, TransformStamped, TFMessage and Path, encoded in CDR, are read. The message lists the topics of the log.";
+    McapRoute = "E804" elsewhere, "a path without times", "All poses of a path have the same stamp, as a planner writes a route. A route has no times; `tumble follow` moves a body along one.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -320,8 +321,9 @@ codes! {
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, so nothing moves.";
     FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
     FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
-    McapCut = "W801", "a truncated log", "It ends within a record, for example because recording was interrupted. Everything before is read.";
+    McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
+    McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
 }
 

@@ -71,6 +71,7 @@ mod source;
 pub mod surface;
 mod table;
 mod text;
+mod time_order;
 pub mod times;
 pub mod trajectory;
 pub mod trim;

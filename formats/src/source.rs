@@ -148,6 +148,9 @@ impl Source {
     }
 }
 
+/// The first bytes of what zstd compresses.
+pub(super) const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
 /// How many first bytes are enough to recognise a format.
 pub(super) const START: usize = 512;
 

@@ -1,5 +1,8 @@
 //! MCAP: logs that the libraries of others wrote, as tracks.
 
+mod clocks;
+mod log;
+
 use std::fs;
 use std::path::Path;
 
@@ -27,7 +30,11 @@ fn topics_and_pairs_of_frames_are_tracks() {
         assert_eq!(loaded.refused, []);
         let codes: Vec<Code> = loaded.warnings.iter().map(|warning| warning.code).collect();
         assert_eq!(codes, [Code::McapOthers]);
-        assert!(loaded.warnings[0].message.ends_with("`/log`"));
+        assert!(
+            loaded.warnings[0]
+                .message
+                .ends_with("`/log` (std_msgs/msg/String)")
+        );
         let clip = &loaded.clips[0];
         // The first stamp of all is 0.5 s before the whole second that the others begin with.
         assert_eq!(clip.time_offset, 1_699_999_999);

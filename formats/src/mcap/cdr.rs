@@ -2,6 +2,8 @@
 
 use glam::{DQuat, DVec3};
 
+use crate::source::ZSTD;
+
 /// A message that is being parsed. Errors are texts that follow the message's name.
 pub(super) struct Cdr<'a> {
     bytes: &'a [u8],
@@ -38,6 +40,13 @@ impl<'a> Cdr<'a> {
             (0, 1) => (true, 8),
             (0, 6) => (false, 4),
             (0, 7) => (true, 4),
+            _ if [zero, kind] == ZSTD[..2] => {
+                return Err(
+                    "is compressed by zstd, as `ros2 bag record --compression-mode message` writes \
+                     messages; decompress the log by `ros2 bag convert`"
+                        .to_owned(),
+                );
+            }
             _ => {
                 return Err(format!(
                     "begins with {zero:#04x} {kind:#04x}; only plain CDR is supported"
@@ -74,7 +83,8 @@ impl<'a> Cdr<'a> {
         Ok(u32::from_le_bytes(self.number()?))
     }
 
-    fn real(&mut self) -> Result<f64, String> {
+    /// Reads an f64.
+    pub(super) fn real(&mut self) -> Result<f64, String> {
         Ok(f64::from_le_bytes(self.number()?))
     }
 
@@ -111,12 +121,14 @@ impl<'a> Cdr<'a> {
 
     /// Reads a position, then a quaternion x y z w.
     pub(super) fn pose(&mut self) -> Result<(DVec3, DQuat), String> {
-        let mut numbers = [0.0; 7];
-        for number in &mut numbers {
-            *number = self.real()?;
-        }
-        let [x, y, z, qx, qy, qz, qw] = numbers;
-        Ok((DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw)))
+        let position = DVec3::new(self.real()?, self.real()?, self.real()?);
+        Ok((position, self.rotation()?))
+    }
+
+    /// Reads a quaternion x y z w.
+    pub(super) fn rotation(&mut self) -> Result<DQuat, String> {
+        let [x, y, z, w] = [self.real()?, self.real()?, self.real()?, self.real()?];
+        Ok(DQuat::from_xyzw(x, y, z, w))
     }
 }
 

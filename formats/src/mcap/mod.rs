@@ -4,34 +4,30 @@
 //! a robot that lost power) returns everything that it contains. The crate `mcap` is not used, because it unpacks
 //! chunks without a memory budget and depends on other decompressors than Parquet does.
 
+mod bodies;
 mod cdr;
 mod records;
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
-use glam::{DQuat, DVec3, Quat};
-use tumble::{TrackError, TrackSet};
+use glam::{DQuat, DVec3};
 
-use crate::budget::{Budget, OverBudget};
-use crate::decimal::{Decimal, offset_of};
+use crate::budget::{Borrowed, Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
-use crate::keys::{Origin, select};
-use crate::mcap::cdr::{Cdr, Stamp};
+use crate::mcap::bodies::{Body, BodyKind, TimedPose, into_loaded};
+use crate::mcap::cdr::Cdr;
 use crate::mcap::records::{MAGIC, McapChannel, Record, Records};
-use crate::motion::grid::restore;
-use crate::motion::{Joint, Motion, Transform};
-use crate::names::unique_name;
-use crate::rate::Precision;
 use crate::source::Source;
-use crate::warnings::Warnings;
+use crate::warnings::{Warnings, listed};
 
 /// The MCAP format: poses in a log.
 pub static FORMAT: Format = Format {
     name: "mcap",
-    summary: "logs of ROS 2: poses, odometry, paths and transforms",
+    summary: "logs of ROS 2: poses, odometry, orientations, paths and transforms",
     extensions: &[],
     probe: |start| start.starts_with(MAGIC),
     numbers_in_line: None,
@@ -51,17 +47,18 @@ pub static FORMAT: Format = Format {
         Feature::UnevenTimes,
         Feature::Start,
     ],
-    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::BridgeGaps,
+    ],
 };
 
 /// Bytes of memory of a pose: as it is read, sorted, and as a key.
 const POSE: usize = 2 * size_of::<TimedPose>() + 64;
 
-/// Bytes of memory of a track without its keys.
-const TRACK: usize = 400;
-
-/// Number of decimals of a stamp in seconds.
-const NANOSECONDS: u32 = 9;
+/// Bytes of memory of a body without its poses.
+const BODY: usize = 400;
 
 /// Reads an MCAP file; `-` is standard input.
 ///
@@ -76,8 +73,10 @@ pub fn open_mcap(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnosti
 }
 
 /// Reads the bytes of an MCAP file; `name` is the input's name in messages. The file becomes one clip. Each topic of
-/// poses is a track with the topic's name, and each pair of frames is a track named `parent/child`. The time of a
-/// pose is the stamp of its header. Times count from the whole second at or before the first one.
+/// poses or orientations is a track with the topic's name, and each pair of frames is a track named `parent/child`,
+/// with the topic before it if several topics have this pair. The time of a pose is the stamp of its header, or the
+/// time at which it was logged if its topic has no stamps. Static transforms are constant; another value is a step.
+/// Times count from the whole second at or before the first one.
 ///
 /// # Errors
 /// As [`open_mcap`].
@@ -86,21 +85,15 @@ pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Load
     let mut log = Log {
         name,
         budget: &budget,
-        tracks: Vec::new(),
-        track_of: HashMap::new(),
-        others: Vec::new(),
+        topics: Vec::new(),
+        topic_of: HashMap::new(),
+        bodies: Vec::new(),
         refused: Vec::new(),
         warnings: Warnings::new(name),
     };
     let mut records = Records::new(name, bytes, &budget)?;
     while let Some(record) = records.next(&mut log.warnings)? {
-        let Record {
-            channel,
-            log_time,
-            data,
-            offset,
-        } = record;
-        log.message(channel, log_time, data, offset)?;
+        log.message(&record)?;
     }
     log.into_loaded(options)
 }
@@ -111,10 +104,16 @@ enum MessageKind {
     PoseStamped,
     PoseWithCovarianceStamped,
     Odometry,
+    QuaternionStamped,
+    Imu,
     TransformStamped,
     TransformList,
     Path,
 }
+
+/// The types that are read, for messages.
+const KNOWN_TYPES: &str = "PoseStamped, PoseWithCovarianceStamped, Odometry, QuaternionStamped, Imu, \
+                           TransformStamped, TFMessage and Path in CDR, the encoding of ROS 2, are read";
 
 impl MessageKind {
     /// The kind with this name of a type, which may contain `msg/`.
@@ -124,148 +123,179 @@ impl MessageKind {
         Some(match (package, name) {
             ("geometry_msgs", "PoseStamped") => Self::PoseStamped,
             ("geometry_msgs", "PoseWithCovarianceStamped") => Self::PoseWithCovarianceStamped,
+            ("geometry_msgs", "QuaternionStamped") => Self::QuaternionStamped,
             ("geometry_msgs", "TransformStamped") => Self::TransformStamped,
             ("nav_msgs", "Odometry") => Self::Odometry,
             ("nav_msgs", "Path") => Self::Path,
+            ("sensor_msgs", "Imu") => Self::Imu,
             ("tf2_msgs", "TFMessage") => Self::TransformList,
             _ => return None,
         })
     }
 }
 
-/// The pose of a body at a time.
-#[derive(Debug, Clone, Copy)]
-struct TimedPose {
-    /// Nanoseconds.
-    time: i64,
-    position: DVec3,
-    rotation: DQuat,
-    /// Offset of its message in the file, or in its chunk.
-    offset: u64,
-}
-
-/// A track's name, times, positions and rotations.
-type BodyKeys = (String, Vec<f64>, Vec<DVec3>, Vec<Quat>);
-
-/// The poses of one body.
-struct BodyTrack {
-    name: String,
-    poses: Vec<TimedPose>,
+/// A topic of a log.
+#[derive(Default)]
+struct Topic {
+    name: Arc<str>,
+    /// Its type, why it is left out, if it is.
+    left_out: Option<String>,
+    is_refused: bool,
+    /// The index of its body, if its messages are of one.
+    body: Option<usize>,
+    /// The indices of the bodies of transforms, by parent and child.
+    transforms: HashMap<String, HashMap<String, usize>>,
 }
 
 /// A log that is being read.
 struct Log<'a> {
     name: &'a str,
     budget: &'a Budget,
-    tracks: Vec<BodyTrack>,
-    /// The index of the track of a topic, or of a pair of frames.
-    track_of: HashMap<[String; 2], usize>,
-    /// Topics with messages of other types.
-    others: Vec<String>,
-    /// Topics that cannot be read.
-    refused: Vec<(String, Diagnostic)>,
+    topics: Vec<Topic>,
+    /// The index of a topic.
+    topic_of: HashMap<Arc<str>, usize>,
+    bodies: Vec<Body<'a>>,
+    /// The errors of topics that cannot be read.
+    refused: Vec<Diagnostic>,
     warnings: Warnings,
 }
 
-impl Log<'_> {
+impl<'a> Log<'a> {
     fn over(&self, error: &OverBudget) -> Diagnostic {
         Diagnostic::new(self.name, Code::Memory, error.to_string())
     }
 
     /// Adds the poses of a message. If a message cannot be read, its topic is refused.
-    fn message(
-        &mut self,
-        channel: &McapChannel,
-        log_time: u64,
-        data: &[u8],
-        offset: u64,
-    ) -> Result<(), Diagnostic> {
-        if self
-            .refused
-            .iter()
-            .any(|(topic, _)| *topic == channel.topic)
-        {
+    fn message(&mut self, record: &Record<'_>) -> Result<(), Diagnostic> {
+        let channel = record.channel;
+        let topic = self.topic(&channel.topic)?;
+        if self.topics[topic].is_refused {
             return Ok(());
         }
         let kind = MessageKind::of(&channel.schema).filter(|_| channel.encoding == "cdr");
         let Some(kind) = kind else {
-            if !self.others.contains(&channel.topic) {
-                self.budget
-                    .take(channel.topic.len() + 64, 1)
-                    .map_err(|error| self.over(&error))?;
-                self.others.push(channel.topic.clone());
-            }
-            return Ok(());
+            return self.leave_out(topic, || type_of(channel));
         };
-        let mut found = Vec::new();
-        let read = self.poses(kind, channel, (log_time, offset), data, &mut found);
-        match read {
-            Ok(()) => {}
-            Err(MessageFault::Memory(error)) => return Err(self.over(&error)),
+        match self.poses(kind, topic, record) {
+            Ok(()) => Ok(()),
+            Err(MessageFault::Memory(error)) => Err(self.over(&error)),
+            Err(MessageFault::NoOrientation) => self.leave_out(topic, || {
+                format!(
+                    "{}, whose covariance says: no orientation",
+                    type_of(channel)
+                )
+            }),
             Err(MessageFault::Message(reason)) => {
-                let message = format!(
-                    "a message of `{}` ({}) {reason}",
-                    channel.topic, channel.schema
-                );
+                let (name, schema) = (&channel.topic, &channel.schema);
+                let message = format!("a message of `{name}` ({schema}) {reason}");
                 let mut fault = Diagnostic::new(self.name, Code::McapMessage, message);
-                fault.location = Some(Location::Inside(format!(
-                    "{} at byte {offset}",
-                    channel.topic
-                )));
-                self.refused.push((channel.topic.clone(), fault));
-                return Ok(());
+                let location = format!("{name} at byte {}", record.offset);
+                fault.location = Some(Location::Inside(location));
+                self.refused.push(fault);
+                self.topics[topic].is_refused = true;
+                Ok(())
             }
         }
-        // A path is said anew as a whole.
-        if kind == MessageKind::Path {
-            let track = self.track([channel.topic.clone(), String::new()])?;
-            self.tracks[track].poses.clear();
+    }
+
+    /// The index of a topic, which is added if it is new.
+    fn topic(&mut self, name: &str) -> Result<usize, Diagnostic> {
+        if let Some(&topic) = self.topic_of.get(name) {
+            return Ok(topic);
         }
-        for (key, pose) in found {
-            let track = self.track(key)?;
-            self.tracks[track].poses.push(pose);
+        let taken = self.budget.take(name.len() + size_of::<Topic>() + 64, 1);
+        taken.map_err(|error| self.over(&error))?;
+        let name: Arc<str> = name.into();
+        self.topics.push(Topic {
+            name: Arc::clone(&name),
+            ..Topic::default()
+        });
+        self.topic_of.insert(name, self.topics.len() - 1);
+        Ok(self.topics.len() - 1)
+    }
+
+    fn leave_out(
+        &mut self,
+        topic: usize,
+        describe: impl FnOnce() -> String,
+    ) -> Result<(), Diagnostic> {
+        if self.topics[topic].left_out.is_none() {
+            let description = describe();
+            let taken = self.budget.take(description.len(), 1);
+            taken.map_err(|error| self.over(&error))?;
+            self.topics[topic].left_out = Some(description);
         }
         Ok(())
     }
 
-    /// The index of a track, which is added if it is new.
-    fn track(&mut self, key: [String; 2]) -> Result<usize, Diagnostic> {
-        if let Some(&track) = self.track_of.get(&key) {
-            return Ok(track);
-        }
-        let length = TRACK + 4 * (key[0].len() + key[1].len());
-        self.budget
-            .take(length, 1)
-            .map_err(|error| self.over(&error))?;
-        let name = match &key {
-            [topic, none] if none.is_empty() => topic.clone(),
-            [parent, child] => format!("{parent}/{child}"),
-        };
-        self.tracks.push(BodyTrack {
-            name,
+    /// Adds a body, and returns its index.
+    fn add_body(
+        &mut self,
+        topic: usize,
+        kind: BodyKind,
+        frames: Option<[String; 2]>,
+    ) -> Result<usize, OverBudget> {
+        let topic_name = Arc::clone(&self.topics[topic].name);
+        // The name of a track is made of these, and may have the topic before it.
+        let texts = frames.iter().flatten().map(String::len).sum::<usize>();
+        self.budget.take(BODY + 4 * (topic_name.len() + texts), 1)?;
+        self.bodies.push(Body {
+            topic,
+            topic_name,
+            frames,
+            kind,
             poses: Vec::new(),
+            borrowed: None,
         });
-        self.track_of.insert(key, self.tracks.len() - 1);
-        Ok(self.tracks.len() - 1)
+        Ok(self.bodies.len() - 1)
     }
 
-    /// The poses of a message, each with the key of its track.
-    fn poses(
-        &self,
-        kind: MessageKind,
-        channel: &McapChannel,
-        (log_time, offset): (u64, u64),
-        data: &[u8],
-        found: &mut Vec<([String; 2], TimedPose)>,
-    ) -> Result<(), MessageFault> {
-        let mut cdr = Cdr::new(data)?;
-        let topic = || [channel.topic.clone(), String::new()];
-        // Who fills in no stamp leaves 0, and the log then says when the message came.
-        let time = |stamp: Stamp| match stamp.nanoseconds() {
-            0 => i64::try_from(log_time).unwrap_or(i64::MAX),
-            time => time,
+    /// The index of the only body of a topic, which is added if it is new.
+    fn body_of_topic(&mut self, topic: usize, kind: BodyKind) -> Result<usize, OverBudget> {
+        if let Some(body) = self.topics[topic].body {
+            return Ok(body);
+        }
+        let body = self.add_body(topic, kind, None)?;
+        self.topics[topic].body = Some(body);
+        Ok(body)
+    }
+
+    /// The index of the body of a transform, which is added if it is new.
+    fn body_of_frames(&mut self, topic: usize, frames: [String; 2]) -> Result<usize, OverBudget> {
+        let [parent, child] = &frames;
+        let known = &self.topics[topic].transforms;
+        if let Some(&body) = known.get(parent).and_then(|of| of.get(child)) {
+            return Ok(body);
+        }
+        // Topics of this name hold static transforms by convention; tf2 reads them so.
+        let is_static = self.topics[topic].name.ends_with("tf_static");
+        let kind = match is_static {
+            true => BodyKind::Static,
+            false => BodyKind::Moving,
         };
-        let take = || self.budget.take(1, POSE).map_err(MessageFault::Memory);
+        let body = self.add_body(topic, kind, Some(frames.clone()))?;
+        let [parent, child] = frames;
+        let of_parent = self.topics[topic].transforms.entry(parent).or_default();
+        of_parent.insert(child, body);
+        Ok(body)
+    }
+
+    /// Adds the poses of a message to their bodies.
+    fn poses(
+        &mut self,
+        kind: MessageKind,
+        topic: usize,
+        record: &Record<'_>,
+    ) -> Result<(), MessageFault> {
+        let mut cdr = Cdr::new(record.data)?;
+        let logged = i64::try_from(record.log_time).unwrap_or(i64::MAX);
+        let pose = |time: i64, (position, rotation): (DVec3, DQuat)| TimedPose {
+            time,
+            logged,
+            position,
+            rotation,
+            offset: record.offset,
+        };
         match kind {
             MessageKind::PoseStamped
             | MessageKind::PoseWithCovarianceStamped
@@ -274,182 +304,131 @@ impl Log<'_> {
                 if kind == MessageKind::Odometry {
                     cdr.text()?;
                 }
-                let (position, rotation) = cdr.pose()?;
-                take()?;
-                let time = time(stamp);
-                found.push((
-                    topic(),
-                    TimedPose {
-                        time,
-                        position,
-                        rotation,
-                        offset,
-                    },
-                ));
+                let found = pose(stamp.nanoseconds(), cdr.pose()?);
+                let body = self.body_of_topic(topic, BodyKind::Moving)?;
+                self.push(body, found)?;
+            }
+            MessageKind::QuaternionStamped | MessageKind::Imu => {
+                let (stamp, _) = cdr.header()?;
+                let rotation = cdr.rotation()?;
+                // By REP 145, a sensor without an orientation writes this.
+                if kind == MessageKind::Imu && cdr.real()? == -1.0 {
+                    return Err(MessageFault::NoOrientation);
+                }
+                let found = pose(stamp.nanoseconds(), (DVec3::ZERO, rotation));
+                let body = self.body_of_topic(topic, BodyKind::Turning)?;
+                self.push(body, found)?;
             }
             MessageKind::TransformStamped | MessageKind::TransformList => {
                 let count = match kind {
                     MessageKind::TransformList => cdr.count()?,
                     _ => 1,
                 };
+                // All of a message or nothing.
+                let mut found = Vec::new();
                 for _ in 0..count {
                     let (stamp, parent) = cdr.header()?;
                     let child = cdr.text()?;
-                    let (position, rotation) = cdr.pose()?;
-                    take()?;
-                    let key = [parent, child].map(|frame| frame.trim_start_matches('/').to_owned());
-                    let time = time(stamp);
-                    found.push((
-                        key,
-                        TimedPose {
-                            time,
-                            position,
-                            rotation,
-                            offset,
-                        },
-                    ));
+                    let frames =
+                        [parent, child].map(|frame| frame.trim_start_matches('/').to_owned());
+                    found.push((frames, pose(stamp.nanoseconds(), cdr.pose()?)));
+                }
+                for (frames, pose) in found {
+                    let body = self.body_of_frames(topic, frames)?;
+                    self.push(body, pose)?;
                 }
             }
             MessageKind::Path => {
                 cdr.header()?;
-                for _ in 0..cdr.count()? {
+                let count = cdr.count()?;
+                let body = self.body_of_topic(topic, BodyKind::Path)?;
+                // A path is sent anew as a whole; what it replaces is given back first.
+                let path = &mut self.bodies[body];
+                (path.poses, path.borrowed) = (Vec::new(), None);
+                let borrowed: Borrowed<'a> = self.budget.borrow(count, POSE)?;
+                let poses = (0..count).map(|_| {
                     let (stamp, _) = cdr.header()?;
-                    let (position, rotation) = cdr.pose()?;
-                    take()?;
-                    // All poses of a path would come when its message did.
-                    let time = stamp.nanoseconds();
-                    found.push((
-                        topic(),
-                        TimedPose {
-                            time,
-                            position,
-                            rotation,
-                            offset,
-                        },
-                    ));
-                }
+                    Ok(pose(stamp.nanoseconds(), cdr.pose()?))
+                });
+                path.poses = poses.collect::<Result<_, String>>()?;
+                path.borrowed = Some(borrowed);
             }
         }
         Ok(())
     }
 
-    fn into_loaded(mut self, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-        let mut refused: Vec<Diagnostic> = self.refused.drain(..).map(|(_, fault)| fault).collect();
-        self.tracks.retain(|track| !track.poses.is_empty());
-        if !self.others.is_empty() {
-            let names: Vec<String> = self.others.iter().map(|name| format!("`{name}`")).collect();
-            self.warnings.warn(Code::McapOthers, || {
-                (
-                    None,
-                    format!("topics of other types are left out: {}", names.join(", ")),
-                )
-            });
-        }
-        let first = self
-            .tracks
-            .iter()
-            .flat_map(|track| &track.poses)
-            .map(|pose| pose.time)
-            .min();
-        let Some(first) = first else {
-            let message = "no poses; PoseStamped, Odometry, TFMessage and Path in CDR are read";
-            let none = || Diagnostic::new(self.name, Code::McapEmpty, message);
-            return Err(if refused.is_empty() {
-                none()
-            } else {
-                refused.remove(0)
-            });
-        };
-        let offset = offset_of(first.div_euclid(1_000_000_000));
-        let mut used = std::collections::HashSet::new();
-        let mut clip = Motion {
-            set: TrackSet::new(),
-            time_offset: offset,
-            ..Motion::default()
-        };
-        let mut all: Vec<BodyKeys> = Vec::new();
-        for mut track in self.tracks {
-            // Messages may overtake each other.
-            track.poses.sort_by_key(|pose| pose.time);
-            let location = |key: usize| {
-                let offset = track.poses[key].offset;
-                Location::Inside(format!("{} at byte {offset}", track.name))
-            };
-            let origin = Origin {
-                file: self.name,
-                location: &location,
-                duplicates: options.duplicates,
-            };
-            let of_track = (|| {
-                let mut keys = origin.unit(
-                    track.poses.iter().map(|pose| pose.rotation),
-                    &mut self.warnings,
-                )?;
-                let mut positions: Vec<DVec3> =
-                    track.poses.iter().map(|pose| pose.position).collect();
-                if let Some(key) = positions.iter().position(|at| !at.as_vec3().is_finite()) {
-                    let message = format!("the position {} is not a finite f32", positions[key]);
-                    let mut fault = Diagnostic::new(self.name, Code::NotFinite, message);
-                    fault.location = Some(location(key));
-                    return Err(fault);
-                }
-                let seconds = |pose: &TimedPose| {
-                    Decimal::whole(pose.time, -9).map_or(f64::NAN, |time| time.since(offset))
-                };
-                let mut times: Vec<f64> = track.poses.iter().map(seconds).collect();
-                let equal = |i: usize, j: usize| keys[i] == keys[j] && positions[i] == positions[j];
-                let kept = origin.increasing(&mut times, equal, &mut self.warnings)?;
-                select(&mut times, kept.as_deref());
-                select(&mut positions, kept.as_deref());
-                select(&mut keys, kept.as_deref());
-                Ok((
-                    unique_name(track.name.clone(), all.len(), &mut used),
-                    times,
-                    positions,
-                    keys,
-                ))
-            })();
-            match of_track {
-                Ok(track) => all.push(track),
-                Err(fault) => refused.push(fault),
-            }
-        }
-        if all.is_empty() && !refused.is_empty() {
-            return Err(refused.remove(0));
-        }
-        if !options.raw_times {
-            let mut lists: Vec<Vec<f64>> = all
-                .iter_mut()
-                .map(|track| std::mem::take(&mut track.1))
-                .collect();
-            clip.rate = restore(&mut lists, Precision::Decimals(NANOSECONDS));
-            for (track, times) in all.iter_mut().zip(lists) {
-                track.1 = times;
-            }
-        }
-        let refuse =
-            |error: TrackError| Diagnostic::new(self.name, Code::McapMessage, error.to_string());
-        for (index, (name, times, positions, keys)) in all.into_iter().enumerate() {
-            clip.set.push(&name, &times, &keys).map_err(refuse)?;
-            clip.skeleton.push(Joint {
-                parent: None,
-                rest: Transform::default(),
-            });
-            clip.set_positions(index, &times, &positions)
-                .map_err(refuse)?;
-        }
-        Ok(Loaded {
-            refused,
-            ..Loaded::of(clip, self.warnings.into_list())
-        })
+    fn push(&mut self, body: usize, pose: TimedPose) -> Result<(), OverBudget> {
+        self.budget.take(1, POSE)?;
+        self.bodies[body].poses.push(pose);
+        Ok(())
     }
+
+    fn into_loaded(mut self, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        self.bodies.retain(|body| !body.poses.is_empty());
+        let left_out = self.topics.iter().filter_map(|topic| {
+            let description = topic.left_out.as_ref()?;
+            Some(format!("`{}` ({description})", topic.name))
+        });
+        let left_out = listed(left_out.collect());
+        if self.bodies.is_empty() {
+            if !self.refused.is_empty() {
+                return Err(self.refused.remove(0));
+            }
+            let is_ros1 = |topic: &Topic| {
+                let description = topic.left_out.as_ref();
+                description.is_some_and(|text| text.ends_with(&encoded_as("ros1")))
+            };
+            let remedy = match self.topics.iter().any(is_ros1) {
+                true => "; convert messages of ROS 1 to ROS 2, for example by rosbags-convert",
+                false => "",
+            };
+            let found = match left_out {
+                Some(topics) => format!("the log has the topics {topics}"),
+                None => "the log has no messages".to_owned(),
+            };
+            let message = format!("no poses: {found}; {KNOWN_TYPES}{remedy}");
+            return Err(Diagnostic::new(self.name, Code::McapEmpty, message));
+        }
+        if let Some(topics) = left_out {
+            self.warnings.warn(Code::McapOthers, || {
+                let message =
+                    format!("topics without poses that can be read are left out: {topics}");
+                (None, message)
+            });
+        }
+        into_loaded(self.name, self.bodies, self.refused, self.warnings, options)
+    }
+}
+
+/// The type of a channel's messages, for messages.
+fn type_of(channel: &McapChannel) -> String {
+    let schema = match &*channel.schema {
+        "" => "no type",
+        schema => schema,
+    };
+    match &*channel.encoding {
+        "cdr" => schema.to_owned(),
+        encoding => format!("{schema}{}", encoded_as(encoding)),
+    }
+}
+
+fn encoded_as(encoding: &str) -> String {
+    format!(", encoded as `{encoding}`")
 }
 
 /// Why a message cannot be read.
 enum MessageFault {
     Memory(OverBudget),
+    /// The message says that it has no orientation.
+    NoOrientation,
     /// The error in the message, as a text that follows its name.
     Message(String),
+}
+
+impl From<OverBudget> for MessageFault {
+    fn from(error: OverBudget) -> Self {
+        Self::Memory(error)
+    }
 }
 
 impl From<String> for MessageFault {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::io::Read;
+use std::sync::Arc;
 
 use crate::budget::{Borrowed, Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
@@ -17,6 +18,9 @@ const MESSAGE: u8 = 5;
 const CHUNK: u8 = 6;
 const DATA_END: u8 = 15;
 
+/// The largest size of all chunks together, in budgets: work, not memory.
+const UNPACKED: u64 = 16;
+
 /// The channel of a topic: the type and encoding of its messages.
 #[derive(Debug, Clone)]
 pub(super) struct McapChannel {
@@ -24,7 +28,7 @@ pub(super) struct McapChannel {
     /// The encoding of the messages.
     pub(super) encoding: String,
     /// The name of the messages' type.
-    pub(super) schema: String,
+    pub(super) schema: Arc<str>,
 }
 
 /// A message.
@@ -43,7 +47,7 @@ pub(super) struct Records<'a> {
     budget: &'a Budget,
     bytes: &'a [u8],
     at: usize,
-    schemas: HashMap<u16, String>,
+    schemas: HashMap<u16, Arc<str>>,
     channels: HashMap<u16, McapChannel>,
     /// The records of the current chunk, the chunk's offset in the file, and the offset of the next record in it.
     chunk: Vec<u8>,
@@ -51,6 +55,10 @@ pub(super) struct Records<'a> {
     chunk_at: usize,
     /// The budget's memory of the chunk.
     borrowed: Option<Borrowed<'a>>,
+    /// Bytes of all chunks so far, unpacked.
+    unpacked: u64,
+    /// Whether the record was read that ends the data.
+    is_complete: bool,
 }
 
 /// The fields of a record, which are not parsed yet.
@@ -119,6 +127,8 @@ impl<'a> Records<'a> {
             chunk_offset: 0,
             chunk_at: 0,
             borrowed: None,
+            unpacked: 0,
+            is_complete: false,
         })
     }
 
@@ -126,6 +136,12 @@ impl<'a> Records<'a> {
         let mut fault = Diagnostic::new(self.name, Code::McapDamaged, message);
         fault.location = Some(Location::Inside(format!("byte {offset}")));
         fault
+    }
+
+    fn warn_cut(&self, warnings: &mut Warnings, offset: u64, message: &str) {
+        warnings.warn(Code::McapCut, || {
+            (Some(Location::Inside(format!("byte {offset}"))), message)
+        });
     }
 
     /// The next message; `None` at the end. A truncated file ends with a warning.
@@ -148,6 +164,14 @@ impl<'a> Records<'a> {
                 false => (self.bytes, self.at),
             };
             if at >= bytes.len() || !in_chunk && &bytes[at..] == MAGIC {
+                if !self.is_complete || !self.bytes.ends_with(MAGIC) {
+                    self.warn_cut(
+                        warnings,
+                        self.bytes.len() as u64,
+                        "the log was not finished: its end is missing, as of a recording that was interrupted; \
+                         everything that is there is read",
+                    );
+                }
                 return Ok(None);
             }
             let Some((kind, content, length)) = record(&bytes[at..]) else {
@@ -156,13 +180,11 @@ impl<'a> Records<'a> {
                         self.damaged(offset, "a record runs over the end of its chunk".to_owned())
                     );
                 }
-                warnings.warn(Code::McapCut, || {
-                    let location = Location::Inside(format!("byte {offset}"));
-                    (
-                        Some(location),
-                        "the file ends within a record; what is before it is read",
-                    )
-                });
+                self.warn_cut(
+                    warnings,
+                    offset,
+                    "the file ends within a record; what is before it is read",
+                );
                 self.at = self.bytes.len();
                 return Ok(None);
             };
@@ -177,8 +199,9 @@ impl<'a> Records<'a> {
                 SCHEMA => {
                     let mut fields = Fields(content);
                     let found = fields.u16().zip(fields.text());
-                    let found = found.map(|(id, name)| (id, name.to_owned()));
-                    let (id, name) = found.ok_or_else(|| self.damaged(offset, broken("schema")))?;
+                    let found = found.map(|(id, name)| (id, Arc::from(name)));
+                    let (id, name): (u16, Arc<str>) =
+                        found.ok_or_else(|| self.damaged(offset, broken("schema")))?;
                     self.keep(name.len())?;
                     self.schemas.insert(id, name);
                 }
@@ -240,12 +263,15 @@ impl<'a> Records<'a> {
                 CHUNK => {
                     let content = &self.bytes[at + 9..at + length];
                     (self.chunk, self.borrowed) = (Vec::new(), None);
-                    let (chunk, borrowed) = self.unpacked(content, offset)?;
+                    let (chunk, borrowed) = self.unpack(content, offset)?;
                     (self.chunk, self.chunk_offset, self.chunk_at) = (chunk, offset, 0);
                     self.borrowed = Some(borrowed);
                 }
                 // An index and a summary follow, which say the channels again.
-                DATA_END if !in_chunk => self.at = self.bytes.len(),
+                DATA_END if !in_chunk => {
+                    self.at = self.bytes.len();
+                    self.is_complete = true;
+                }
                 _ => {}
             }
         }
@@ -258,7 +284,11 @@ impl<'a> Records<'a> {
     }
 
     /// The unpacked records of a chunk.
-    fn unpacked(&self, content: &[u8], offset: u64) -> Result<(Vec<u8>, Borrowed<'a>), Diagnostic> {
+    fn unpack(
+        &mut self,
+        content: &[u8],
+        offset: u64,
+    ) -> Result<(Vec<u8>, Borrowed<'a>), Diagnostic> {
         let mut fields = Fields(content);
         let head = (|| {
             let (_, _, size, sum) = (fields.u64()?, fields.u64()?, fields.u64()?, fields.u32()?);
@@ -272,6 +302,16 @@ impl<'a> Records<'a> {
         let size = usize::try_from(size).unwrap_or(usize::MAX);
         let over = |error: OverBudget| Diagnostic::new(self.name, Code::Memory, error.to_string());
         let borrowed = self.budget.borrow(size, 1).map_err(over)?;
+        // Chunks are unpacked one after another, so that memory does not limit how many there are.
+        self.unpacked = self.unpacked.saturating_add(size as u64);
+        let most = UNPACKED.saturating_mul(self.budget.limit());
+        if self.unpacked > most {
+            let message = format!(
+                "its chunks have more than {most} bytes when they are unpacked, and an input of this length gets no \
+                 more; it states more than a recording contains"
+            );
+            return Err(Diagnostic::new(self.name, Code::Memory, message));
+        }
         let unpacked = match compression {
             "" => Ok(packed.to_vec()),
             "zstd" => {

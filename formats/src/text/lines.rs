@@ -3,7 +3,7 @@
 use std::io::{BufRead, Read};
 
 use crate::diagnostic::{Code, Diagnostic, Location};
-use crate::source::MAX_BYTES;
+use crate::source::{MAX_BYTES, ZSTD};
 
 /// The lines of one input, with their numbers; warnings about them are collected in `warnings`.
 pub(crate) struct Lines<R> {
@@ -47,8 +47,12 @@ impl Default for Limits {
 }
 
 /// The first bytes of other formats in files named `.dat`.
-const SIGNATURES: [(&[u8], &str); 6] = [
+const SIGNATURES: [(&[u8], &str); 7] = [
     (b"\x1f\x8b", "gzip; unpack it first"),
+    (
+        &ZSTD,
+        "a file that zstd compressed; decompress it first (zstd -d)",
+    ),
     (b"\x93NUMPY", "NPY; export the keys as text"),
     (b"HIERARCHY", "BVH motion capture; convert its rotations"),
     (b"glTF", "binary glTF; convert its rotation tracks"),
