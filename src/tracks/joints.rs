@@ -7,7 +7,8 @@ use crate::tracks::set::{TrackSet, default_name};
 /// The names of a clip's joints, and their parents where these are known.
 ///
 /// Joints of two clips are the same if their names are equal. Joints without names are called `box1`, `box2` … by their
-/// index, so that joints of two clips without any names are matched by index.
+/// index, so that joints of two clips without any names are matched by index. `joint0`, `joint1` …, as BVH files call joints
+/// without names, are the same names if all joints have them.
 ///
 /// ```
 /// use tumble::Joints;
@@ -129,9 +130,10 @@ impl Joints {
     pub fn named<T: Into<String>>(names: impl IntoIterator<Item = T>) -> Self {
         let mut names: Vec<String> = names.into_iter().map(Into::into).collect();
         let is_named = names.iter().any(|name| !name.is_empty());
+        let numbers = numbered(&names);
         for (joint, name) in names.iter_mut().enumerate() {
-            if name.is_empty() {
-                *name = default_name(joint);
+            if name.is_empty() || !numbers.is_empty() {
+                *name = default_name(numbers.get(joint).copied().unwrap_or(joint));
             }
         }
         Self {
@@ -317,6 +319,22 @@ impl Joints {
     }
 }
 
+/// The number of each joint if all are called `joint0`, `joint1` … in any order, as BVH files call joints without names;
+/// otherwise empty.
+fn numbered(names: &[String]) -> Vec<usize> {
+    let number = |name: &String| {
+        let number: usize = name.strip_prefix("joint")?.parse().ok()?;
+        (number < names.len()).then_some(number)
+    };
+    let numbers: Vec<usize> = names.iter().map_while(number).collect();
+    let mut is_known = vec![false; names.len()];
+    numbers.iter().for_each(|&number| is_known[number] = true);
+    match is_known.iter().all(|&known| known) {
+        true => numbers,
+        false => Vec::new(),
+    }
+}
+
 /// Whether two names differ only in case, in what separates their words, or in a prefix such as `mixamorig:`.
 fn are_near(name: &str, other: &str) -> bool {
     let plain = |name: &str| -> String {
@@ -370,6 +388,8 @@ mod tests {
         // Files that need names write these.
         let written = Joints::named(["box2", "box1"]);
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
+        let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
+        assert_eq!(unnamed(3).order_of(&of_bvh, LABELS).unwrap(), [0, 2, 1]);
         let text = "b has a joint `hip`, but the joints of a have no names; name both, or neither to match them by \
                     index";
         refused(&unnamed(2), &chain(&["hip", "arm"]), text);
