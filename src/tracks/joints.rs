@@ -27,6 +27,8 @@ use crate::tracks::set::{TrackSet, default_name};
 pub struct Joints {
     /// A name for each joint, also for those without one.
     names: Vec<String>,
+    /// The names by which joints are matched.
+    keys: Vec<String>,
     /// Whether any joint has a name.
     is_named: bool,
     /// The index of each joint's parent; `None` if the parents are not known.
@@ -130,14 +132,18 @@ impl Joints {
     pub fn named<T: Into<String>>(names: impl IntoIterator<Item = T>) -> Self {
         let mut names: Vec<String> = names.into_iter().map(Into::into).collect();
         let is_named = names.iter().any(|name| !name.is_empty());
-        let numbers = numbered(&names);
         for (joint, name) in names.iter_mut().enumerate() {
-            if name.is_empty() || !numbers.is_empty() {
-                *name = default_name(numbers.get(joint).copied().unwrap_or(joint));
+            if name.is_empty() {
+                *name = default_name(joint);
             }
         }
+        let keys = match &numbered(&names)[..] {
+            [] => names.clone(),
+            numbers => numbers.iter().map(|&number| default_name(number)).collect(),
+        };
         Self {
             names,
+            keys,
             is_named,
             parents: None,
         }
@@ -181,15 +187,15 @@ impl Joints {
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
     pub fn pairs(&self, other: &Self, clips: [&str; 2]) -> Result<JointPairs, JointMatchError> {
-        if self.names == other.names {
+        if self.keys == other.keys {
             return Ok(JointPairs {
                 pairs: (0..self.len()).map(|joint| [joint; 2]).collect(),
                 ..JointPairs::default()
             });
         }
         let [of_first, of_second] = [self.by_name(clips[0])?, other.by_name(clips[1])?];
-        let partner = |joint: usize| of_second.get(&*self.names[joint]);
-        let lone = |joint: &usize| !of_first.contains_key(&*other.names[*joint]);
+        let partner = |joint: usize| of_second.get(&*self.keys[joint]);
+        let lone = |joint: &usize| !of_first.contains_key(&*other.keys[*joint]);
         Ok(JointPairs {
             pairs: (0..self.len())
                 .filter_map(|joint| Some([joint, *partner(joint)?]))
@@ -282,7 +288,7 @@ impl Joints {
     /// The indices of joints by name.
     fn by_name(&self, clip: &str) -> Result<HashMap<&str, usize>, JointMatchError> {
         let mut indices = HashMap::with_capacity(self.len());
-        for (joint, name) in self.names.iter().enumerate() {
+        for (joint, name) in self.keys.iter().enumerate() {
             if indices.insert(&**name, joint).is_some() {
                 return Err(JointMatchError::Repeated {
                     clip: clip.to_owned(),
@@ -390,6 +396,7 @@ mod tests {
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
         let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
         assert_eq!(unnamed(3).order_of(&of_bvh, LABELS).unwrap(), [0, 2, 1]);
+        assert_eq!(of_bvh.names(), ["joint0", "joint2", "joint1"]);
         let text = "b has a joint `hip`, but the joints of a have no names; name both, or neither to match them by \
                     index";
         refused(&unnamed(2), &chain(&["hip", "arm"]), text);
