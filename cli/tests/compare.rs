@@ -291,18 +291,17 @@ fn joints_are_matched_by_name_and_parent() {
     let compared = succeed(folder, &["compare", "one.bvh", "named.bvh"]);
     let report = String::from_utf8(compared.out).unwrap();
     assert!(report.contains("only in one.bvh: left, right"), "{report}");
-    // Tracks without names keep those that they are selected by.
-    succeed(folder, &["convert", "a.dat", "-o", "a.bvh"]);
-    let line = [
-        "compare",
-        "a.dat",
-        "a.bvh",
-        "--tracks",
-        "box2",
-        "--tolerance",
-        "1e-4",
-    ];
-    succeed(folder, &line);
+    // Tracks without names keep those that they are selected by, and get names in files that need some.
+    for (file, tracks) in [("a.glb", "box2"), ("a.bvh", "1")] {
+        succeed(folder, &["convert", "a.dat", "-o", file]);
+        let compared = succeed(folder, &["compare", "a.dat", file]);
+        let report = String::from_utf8(compared.out).unwrap();
+        assert!(report.contains("2 tracks × "), "{report}");
+        assert!(!report.contains("only in"), "{report}");
+        let one = succeed(folder, &["compare", "a.dat", file, "--tracks", tracks]);
+        let report = String::from_utf8(one.out).unwrap();
+        assert!(report.contains("1 track × "), "{report}");
+    }
     // Two paths of one body each need no name, and what is assumed is told.
     let path =
         |name: &str| format!("time,{name}.x,{name}.y,{name}.z,{name}.w\n0,0,0,0,1\n1,0,0,1,0\n");

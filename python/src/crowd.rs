@@ -28,8 +28,9 @@ const MANY: usize = 1 << 20;
 /// `Crowd(clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
 /// inverse_bind=None, references=None, ticks_per_second=705600, engine=None)`
 ///
-/// `clips`: clips of one skeleton; it is that of the first clip, or given by `parents` and `offsets`. `layers`: the
-/// number of layers of an instance, 1 to 4, each blended over the ones below. `masks`: lists of a weight from 0 to 1
+/// `clips`: clips of one skeleton, whose joints are matched by name, by index only if no clip has names. The skeleton
+/// is that of the first clip, or given by `parents` and `offsets` for its tracks; without `offsets` each clip keeps its
+/// own. A clip that has parents but no offsets can only be evaluated as "rotations". `layers`: the number of layers of an instance, 1 to 4, each blended over the ones below. `masks`: lists of a weight from 0 to 1
 /// for each joint, by which a layer's weight is multiplied. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
 /// values "skinning". `references`: {clip: (other clip, seconds)}, the reference pose for additive layers of a clip;
 /// the default is the first pose of the clip.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import warnings
 
 import numpy as np
 import pytest
-from conftest import unit
+from conftest import ROOT, unit
 
 import tumble
 
@@ -213,3 +215,26 @@ def test_a_skeleton_places_the_joints_of_a_body(body):
     np.testing.assert_allclose(library.sample([0], [0.0]).positions, expected, rtol=1e-6)
     with pytest.raises(tumble.InputError, match="body_model"):
         library.sample([0, 1], [0.0, 0.0])
+
+
+def test_a_model_of_another_body_is_refused(body):
+    model = ROOT / "formats/tests/fixtures/body/models"
+    model = next(path for path in sorted(model.rglob("*.npz")))
+    words = r"joint 23 \(`left_index2`\) of the motion has the parent 22 \(`left_index1`\), that of the model has the parent 21"
+    with pytest.raises(tumble.InputError, match=words):
+        tumble.load(body, body_model=model)
+
+
+def test_offsets_with_names_are_matched_by_name(body, tmp_path):
+    clip = tumble.load(body).clip
+    offsets = np.arange(3.0 * len(clip)).reshape(-1, 3)
+    lines = [f"{name} {x} {y} {z}" for name, (x, y, z) in zip(clip.names, offsets)]
+    listed = tmp_path / "offsets.txt"
+    result = tmp_path / "world.npy"
+    listed.write_text("\n".join(reversed(lines)))
+    line = ["eval", body, "--offsets", listed, "--output", "world", "-m", "slerp", "--fps", "30", "-o", result]
+    subprocess.run([sys.executable, "-m", "tumble", *map(str, line)], check=True, timeout=300)
+    expected = tumble.Engine("cpu").world(tumble.load(body, offsets=offsets).clip, fps=30, method="slerp", layout="frame")[0]
+    found = np.load(result)
+    assert found.shape == (31, len(clip), 7)
+    np.testing.assert_allclose(found[..., :3], expected, rtol=1e-6, atol=1e-6)

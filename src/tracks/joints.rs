@@ -7,7 +7,8 @@ use crate::tracks::set::{TrackSet, default_name};
 /// The names of a clip's joints, and their parents where these are known.
 ///
 /// Joints of two clips are the same if their names are equal. Joints without names are called `box1`, `box2` … by their
-/// index, so that joints of two clips without any names are matched by index.
+/// index, so that joints of two clips without any names are matched by index. `joint0`, `joint1` …, as BVH files call joints
+/// without names, are the same names if all joints have them.
 ///
 /// ```
 /// use tumble::Joints;
@@ -26,6 +27,8 @@ use crate::tracks::set::{TrackSet, default_name};
 pub struct Joints {
     /// A name for each joint, also for those without one.
     names: Vec<String>,
+    /// The names by which joints are matched.
+    keys: Vec<String>,
     /// Whether any joint has a name.
     is_named: bool,
     /// The index of each joint's parent; `None` if the parents are not known.
@@ -134,8 +137,13 @@ impl Joints {
                 *name = default_name(joint);
             }
         }
+        let keys = match &numbered(&names)[..] {
+            [] => names.clone(),
+            numbers => numbers.iter().map(|&number| default_name(number)).collect(),
+        };
         Self {
             names,
+            keys,
             is_named,
             parents: None,
         }
@@ -179,15 +187,15 @@ impl Joints {
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
     pub fn pairs(&self, other: &Self, clips: [&str; 2]) -> Result<JointPairs, JointMatchError> {
-        if self.names == other.names {
+        if self.keys == other.keys {
             return Ok(JointPairs {
                 pairs: (0..self.len()).map(|joint| [joint; 2]).collect(),
                 ..JointPairs::default()
             });
         }
         let [of_first, of_second] = [self.by_name(clips[0])?, other.by_name(clips[1])?];
-        let partner = |joint: usize| of_second.get(&*self.names[joint]);
-        let lone = |joint: &usize| !of_first.contains_key(&*other.names[*joint]);
+        let partner = |joint: usize| of_second.get(&*self.keys[joint]);
+        let lone = |joint: &usize| !of_first.contains_key(&*other.keys[*joint]);
         Ok(JointPairs {
             pairs: (0..self.len())
                 .filter_map(|joint| Some([joint, *partner(joint)?]))
@@ -280,7 +288,7 @@ impl Joints {
     /// The indices of joints by name.
     fn by_name(&self, clip: &str) -> Result<HashMap<&str, usize>, JointMatchError> {
         let mut indices = HashMap::with_capacity(self.len());
-        for (joint, name) in self.names.iter().enumerate() {
+        for (joint, name) in self.keys.iter().enumerate() {
             if indices.insert(&**name, joint).is_some() {
                 return Err(JointMatchError::Repeated {
                     clip: clip.to_owned(),
@@ -314,6 +322,22 @@ impl Joints {
             name,
             other: other_clip,
         }
+    }
+}
+
+/// The number of each joint if all are called `joint0`, `joint1` … in any order, as BVH files call joints without names;
+/// otherwise empty.
+fn numbered(names: &[String]) -> Vec<usize> {
+    let number = |name: &String| {
+        let number: usize = name.strip_prefix("joint")?.parse().ok()?;
+        (number < names.len()).then_some(number)
+    };
+    let numbers: Vec<usize> = names.iter().map_while(number).collect();
+    let mut is_known = vec![false; names.len()];
+    numbers.iter().for_each(|&number| is_known[number] = true);
+    match is_known.iter().all(|&known| known) {
+        true => numbers,
+        false => Vec::new(),
     }
 }
 
@@ -370,6 +394,9 @@ mod tests {
         // Files that need names write these.
         let written = Joints::named(["box2", "box1"]);
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
+        let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
+        assert_eq!(unnamed(3).order_of(&of_bvh, LABELS).unwrap(), [0, 2, 1]);
+        assert_eq!(of_bvh.names(), ["joint0", "joint2", "joint1"]);
         let text = "b has a joint `hip`, but the joints of a have no names; name both, or neither to match them by \
                     index";
         refused(&unnamed(2), &chain(&["hip", "arm"]), text);
