@@ -160,6 +160,13 @@ impl EvaluationJob<'_> {
         options.check_clip(name, clip, &[method])
     }
 
+    /// The samples of a clip.
+    fn clip_frames(&self, clip: &Motion, name: &str) -> Result<ClipFrames, Failure> {
+        let outside = self.arguments.interpolation.outside();
+        self.samples
+            .of_clip(clip, &self.arguments.gaps, outside, name)
+    }
+
     /// With `--explain-route`, prints the route by which a clip's rotations are evaluated.
     fn explain(
         &mut self,
@@ -321,7 +328,7 @@ impl EvaluationJob<'_> {
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let times: Vec<ClipFrames> = clips
             .iter()
-            .map(|clip| self.samples.of_clip(clip, &self.arguments.gaps, name))
+            .map(|clip| self.clip_frames(clip, name))
             .collect::<Result<_, _>>()?;
         self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
         let is_gappy = times.iter().any(ClipFrames::is_gappy);
@@ -458,7 +465,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
+        let samples = self.clip_frames(clip, name)?;
         self.in_gaps = samples.in_gaps;
         if samples.held.is_some() && arguments.output.quantity() != Quantity::Rotation {
             return Err(Failure::usage(format!(
@@ -543,7 +550,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let set = &clip.set;
-        let samples = self.samples.of_clip(clip, &self.arguments.gaps, name)?;
+        let samples = self.clip_frames(clip, name)?;
         self.in_gaps = samples.in_gaps;
         let frames = &samples.frames;
         let timeline = samples
