@@ -1,4 +1,5 @@
-//! Where the joints of an SMPL body are if its file does not say: those of nobody, to see the motion.
+//! Offsets of a typical body, so that the motion of an SMPL body can be drawn although its file does not contain
+//! where the joints are.
 
 use tumble_formats::adjust::{OffsetsError, set_offsets};
 use tumble_formats::motion::Motion;
