@@ -727,3 +727,57 @@ fn joints_are_listed_worst_first() {
         "{text}"
     );
 }
+
+/// The times of another file that a clip has none of are refused, and times outside the keys can be left out.
+#[test]
+fn times_outside_the_keys_are_left_out_or_refused() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    std::fs::write(folder.join("late.dat"), "# 1 2\n9 1 0 0 0\n10 1 0 0 0\n").unwrap();
+    let at = [
+        "eval",
+        "a.dat",
+        "--at",
+        "late.dat",
+        "-o",
+        "at.csv",
+        "--overwrite",
+    ];
+    let refused = run(folder, &at);
+    assert_eq!(refused.code, 4, "{}", refused.words);
+    let says = "a.dat: none of the times lies between its keys: asked for 9 to 10 s, keys lie from 0 to 2 s";
+    assert!(refused.words.contains(says), "{}", refused.words);
+    // Where the motion goes on, these times have values.
+    succeed(folder, &[&at[..], &["--after", "loop"]].concat());
+    let rows = |line: &str| {
+        let line = format!("eval a.dat --overwrite -o out.csv {line}");
+        let said = succeed(folder, &line.split(' ').collect::<Vec<_>>());
+        let text = std::fs::read_to_string(folder.join("out.csv")).unwrap();
+        let times = text
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').next().unwrap().to_owned());
+        let mut times: Vec<String> = times.collect();
+        times.dedup();
+        (times, said.words)
+    };
+    let range = "--fps 2 --start -1 --end 3.5";
+    assert_eq!(rows(range).0.len(), 10);
+    let (times, said) = rows(&format!("{range} --before leave-out --after leave-out"));
+    assert_eq!(times.len(), 5, "{times:?}");
+    assert!(
+        said.contains("5 of 10 times lie outside the keys; they are left out"),
+        "{said}"
+    );
+    assert_eq!(rows(&format!("{range} --after leave-out")).0.len(), 7);
+    std::fs::write(folder.join("times.txt"), "-1\n0.3\n1.9\n2.1\n").unwrap();
+    let (times, _) = rows("--times times.txt --before leave-out --after leave-out");
+    assert_eq!(times.len(), 2, "{times:?}");
+    let line = "eval a.dat -o none.csv --fps 2 --start 5 --end 6 --after leave-out";
+    let refused = run(folder, &line.split(' ').collect::<Vec<_>>());
+    assert!(
+        refused.code == 4 && refused.words.contains("none of the times"),
+        "{}",
+        refused.words
+    );
+}

@@ -206,6 +206,37 @@ fn what_cannot_be_followed_is_refused() {
     refused(2, "--direction", &["way.csv", "--direction", "sideways"]);
     refused(2, "--seconds", &["paths/b.csv", "--seconds", "0"]);
     refused(4, "axes", &["way.csv", "--forward", "y"]);
+    refused(
+        2,
+        "--ends has no effect on a path by linear",
+        &["way.csv", "-m", "linear", "--ends", "natural"],
+    );
+    refused(
+        2,
+        "--twist has no effect on other frames than minimal",
+        &[
+            "paths/b.csv",
+            "--rate",
+            "1",
+            "--frame",
+            "fixed",
+            "--twist",
+            "free",
+        ],
+    );
+    refused(
+        2,
+        "--up has no effect on Frenet's frames",
+        &[
+            "paths/b.csv",
+            "--rate",
+            "1",
+            "--frame",
+            "frenet",
+            "--up",
+            "0,0,1",
+        ],
+    );
     for (name, words) in [
         ("one", "stands still"),
         ("still", "stands still"),

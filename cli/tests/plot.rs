@@ -8,6 +8,7 @@ use roxmltree::{Document, Node};
 
 const SLERP: &str = "#D55E00";
 const BESSEL_OVERHAUSER: &str = "#009E73";
+const AUTHORED: &str = "#E7298A";
 /// Of an SVG's units, for one of its pixels.
 const FINER: f64 = 10.0;
 
@@ -521,6 +522,11 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
 fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
     let folder = sample_folder();
     fs::write(folder.path().join("old.svg"), "old").unwrap();
+    fs::write(
+        folder.path().join("way.csv"),
+        "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n",
+    )
+    .unwrap();
     for (arguments, message) in [
         (
             "plot a.dat -o x.svg --dimension 9",
@@ -567,6 +573,26 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
             "old.svg: exists; give --overwrite to replace it",
         ),
         ("plot a.dat -o x.svg -m slurp", "slerp"),
+        (
+            "plot a.dat -o x.svg --axis x",
+            "--axis has no effect on this plot; add --show sphere",
+        ),
+        (
+            "plot a.dat -o x.svg --frame frenet",
+            "--frame has no effect on files of rotations; it is for files of paths",
+        ),
+        (
+            "plot a.dat -o x.svg -m slerp --ends natural",
+            "a.dat: --ends has no effect on slerp",
+        ),
+        (
+            "plot way.csv -o x.svg --fps 50",
+            "--fps has no effect on pictures of paths",
+        ),
+        (
+            "plot way.csv -o x.svg -m slerp",
+            "--method has no effect on files of paths",
+        ),
     ] {
         let line: Vec<&str> = arguments.split(' ').collect();
         let run = run(folder.path(), &line);
@@ -629,4 +655,43 @@ fn a_single_key_is_drawn_in_every_way() {
         };
         succeed(folder.path(), &[command, "one.dat", "-o", out]);
     }
+}
+
+/// A curve goes through its keys, whatever frames are between them, and is the one that the file states.
+#[test]
+fn curves_go_through_their_keys_as_the_file_states() {
+    let folder = sample_folder();
+    // Keys that no frame of 25 a second meets.
+    let mut text = "# 1 9\n".to_owned();
+    for i in 0..9 {
+        let (sine, cosine) = (f64::from(i * i) * 0.05).sin_cos();
+        text += &format!("{} {cosine} 0 0 {sine}\n", f64::from(i) * 0.017);
+    }
+    fs::write(folder.path().join("keys.dat"), text).unwrap();
+    let drawn = |line: &str| {
+        let line = format!("plot {line} -o k.svg --overwrite --dimension 4");
+        succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        Marks::of(&folder.path().join("k.svg"))
+    };
+    for (more, colour) in [("", BESSEL_OVERHAUSER), (" -m slerp --fps 25", SLERP)] {
+        let marks = drawn(&format!("keys.dat{more}"));
+        let curve = marks.curves(colour)[0];
+        assert_eq!(marks.dots.len(), 10);
+        for dot in &marks.dots[1..] {
+            let off = |p: &(f64, f64)| (p.0 - dot.0).hypot(p.1 - dot.1);
+            let off = curve.iter().map(off).fold(f64::INFINITY, f64::min);
+            assert!(off < 0.5, "{more}: a key lies {off} off the curve");
+        }
+    }
+    // glTF joins its keys by arcs: so does the plot.
+    succeed(folder.path(), &["convert", "keys.dat", "-o", "keys.glb"]);
+    let (authored, arcs) = (drawn("keys.glb"), drawn("keys.glb -m slerp"));
+    assert!(authored.says("authored"), "{:?}", authored.texts);
+    let (authored, arcs) = (authored.curves(AUTHORED)[0], arcs.curves(SLERP)[0]);
+    assert!(authored == arcs, "the file's curve is not drawn");
+    let smooth = drawn("keys.glb -m bessel-overhauser");
+    assert!(
+        authored != smooth.curves(BESSEL_OVERHAUSER)[0],
+        "arcs are no smooth curve"
+    );
 }

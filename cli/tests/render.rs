@@ -15,6 +15,7 @@ struct Image {
 
 const BLUE: [u8; 3] = [0x00, 0x72, 0xb2];
 const ORANGE: [u8; 3] = [0xe6, 0x9f, 0x00];
+const GREEN: [u8; 3] = [0x00, 0x9e, 0x73];
 
 impl Image {
     /// Where pixels of a box's hue are: left, top, right, bottom.
@@ -287,6 +288,26 @@ fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
         ),
         ("render bad.dat -o x.gif", 4, "bad.dat:2"),
         (
+            "render a.dat -o x.gif --drawn-frames 3",
+            2,
+            "--drawn-frames has no effect on boxes and skeletons",
+        ),
+        (
+            "render a.dat -o x.gif --twist free",
+            2,
+            "--twist has no effect on a file of rotations",
+        ),
+        (
+            "render a.dat -o x.png --fps 50",
+            2,
+            "--fps has no effect on a single picture",
+        ),
+        (
+            "render a.dat -o x.gif --tension 1",
+            2,
+            "a.dat: --tension is for kochanek-bartels",
+        ),
+        (
             "render a.dat -o nowhere/x.gif",
             7,
             "its directory nowhere does not exist",
@@ -299,4 +320,118 @@ fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
     }
     assert_eq!(fs::read(folder.path().join("old.gif")).unwrap(), b"old");
     assert_eq!(fs::read_dir(folder.path().join("used")).unwrap().count(), 1);
+}
+
+/// Two legs beside each other, from hips that are 2 apart, each with its end: bones by parents, no chain.
+#[test]
+fn bones_are_where_joints_are() {
+    let folder = sample_folder();
+    let leg = |name: &str, x: f64| {
+        format!(
+            " JOINT {name}\n {{\n  OFFSET {x} 0 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  \
+             {{\n   OFFSET 0 -4 0\n  }}\n }}\n"
+        )
+    };
+    let text = format!(
+        "HIERARCHY\nROOT hips\n{{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation \
+         Xrotation Yrotation\n{}{}}}\nMOTION\nFrames: 2\nFrame Time: 1\n0 8 0 0 0 0 0 0 0 0 0 0\n\
+         0 8 0 0 0 0 90 0 0 0 0 0\n",
+        leg("left", -2.0),
+        leg("right", 2.0)
+    );
+    fs::write(folder.path().join("legs.bvh"), text).unwrap();
+    let still = |start: &str| {
+        let line = format!(
+            "render legs.bvh --view 0,0 --start {start} --size 400x400 -o s.png --overwrite"
+        );
+        let run = succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        assert!(run.words.contains("3 joints"), "{}", run.words);
+        png(&folder.path().join("s.png"))
+    };
+    // The first joint is the root's cube, the second orange and the third green.
+    let standing = still("0");
+    let [cube, left, right] = [BLUE, ORANGE, GREEN].map(|hue| standing.extent(hue).unwrap());
+    let middle = |[l, _, r, _]: [usize; 4]| (l + r) / 2;
+    let tall = |[l, t, r, b]: [usize; 4]| b - t > (r - l) / 2;
+    assert!(
+        left[0] < middle(cube) && right[2] > middle(cube),
+        "{left:?} {right:?}"
+    );
+    assert!(tall(left) && tall(right), "{left:?} {right:?}");
+    assert!(
+        left[2] <= cube[2] && right[0] >= cube[0],
+        "{left:?} {right:?}"
+    );
+    let height = |[_, t, _, b]: [usize; 4]| b - t;
+    assert!(
+        height(left).abs_diff(height(right)) < 4,
+        "{left:?} {right:?}"
+    );
+    // The left leg turned a quarter about z points to the right, and hides nothing of the right one's foot.
+    let kicking = still("1");
+    let (left, right) = (
+        kicking.extent(ORANGE).unwrap(),
+        kicking.extent(GREEN).unwrap(),
+    );
+    assert!(right[3] > left[3] + 40, "{left:?} {right:?}");
+}
+
+/// The mesh of a glTF file follows its joints, and takes the place of bones.
+#[test]
+fn a_mesh_is_drawn_where_the_file_has_one() {
+    let fox = crate::program::root().join("../shared/data/gltf/Fox.glb");
+    if !fox.exists() {
+        eprintln!("{} is not there: no mesh was drawn", fox.display());
+        return;
+    }
+    let folder = sample_folder();
+    let shown = |more: &[&str]| {
+        let line = [
+            "render",
+            fox.to_str().unwrap(),
+            "--animation",
+            "Run",
+            "--start",
+            "0.3",
+        ];
+        let out = ["--size", "200x150", "-o", "fox.png", "--overwrite"];
+        succeed(folder.path(), &[&line[..], &out, more].concat());
+        png(&folder.path().join("fox.png"))
+    };
+    const SKIN: [u8; 3] = [0xc9, 0xb8, 0xa4];
+    let covered = |image: &Image| image.extent(SKIN).map(|[l, t, r, b]| (r - l) * (b - t));
+    let mesh = shown(&[]);
+    assert!(covered(&mesh).unwrap() > 200 * 150 / 4);
+    assert!(mesh.extent(GREEN).is_none(), "no bones");
+    // Other units make another mesh: the bones are left.
+    assert!(shown(&["--scale", "0.01"]).extent(GREEN).is_some());
+}
+
+/// A body without places is drawn as a typical one, which is said.
+#[test]
+fn a_body_without_places_is_a_typical_one() {
+    let body = crate::program::root().join("../shared/data/npz/smplh_like.npz");
+    if !body.exists() {
+        eprintln!("{} is not there: no body was drawn", body.display());
+        return;
+    }
+    let folder = sample_folder();
+    let line = [
+        "render",
+        body.to_str().unwrap(),
+        "--size",
+        "200x150",
+        "-o",
+        "body.png",
+    ];
+    let said = succeed(folder.path(), &line).words;
+    assert!(
+        said.contains("so that a typical body is drawn; give a model of it with --body-model"),
+        "{said}"
+    );
+    assert!(said.contains("52 joints"), "{said}");
+    let image = png(&folder.path().join("body.png"));
+    for hue in [BLUE, ORANGE, GREEN] {
+        assert!(image.extent(hue).is_some(), "{hue:?}");
+    }
 }

@@ -330,6 +330,16 @@ fn bad_inputs_and_lines() {
         (2, vec!["route", "hill.obj", "--max-slope", "91"], "0 to 90"),
         (
             2,
+            vec!["route", "hill.obj", "--finest", "0.1"],
+            "--finest has no effect on routes over a whole mesh",
+        ),
+        (
+            2,
+            vec!["route", "hill.obj", "--up", "0,0,1"],
+            "--up has no effect on these routes",
+        ),
+        (
+            2,
             vec!["route", "hill.obj", "--pairs", "pairs.txt"],
             "cannot be used with",
         ),

@@ -13,9 +13,10 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
     let folder = temporary.path();
     fs::copy(root().join(BVH), folder.join("walk.bvh")).unwrap();
     let run = succeed(folder, &["view", "walk.bvh", "a.dat", "-o", "view.html"]);
+    // All, and the lines by which BVH joins its frames.
     assert!(
         run.words
-            .contains(&format!("2 inputs, {} methods", tumble::METHODS.len())),
+            .contains(&format!("2 inputs, {} methods", tumble::METHODS.len() + 1)),
         "{}",
         run.words
     );
@@ -91,6 +92,20 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
 fn a_long_motion_is_refused_in_its_words() {
     let folder = sample_folder();
     fs::copy(root().join(BVH), folder.path().join("walk.bvh")).unwrap();
+    for (line, says) in [
+        (
+            "view walk.bvh -o x.html --twist free",
+            "--twist has no effect on files of rotations",
+        ),
+        (
+            "view walk.bvh -o x.html --body 2",
+            "--body has no effect on boxes and skeletons",
+        ),
+    ] {
+        let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(run.code, 2, "{}", run.words);
+        assert!(run.words.contains(says), "{}", run.words);
+    }
     let line = "view walk.bvh -o x.html --fps 1e9";
     let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
     assert_eq!(run.code, 2, "{}", run.words);

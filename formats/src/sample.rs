@@ -79,12 +79,6 @@ impl ChannelMethods<'_> {
         self.method.unwrap_or_else(|| most_common_method(clip))
     }
 
-    /// The method for the rotations of a track.
-    #[must_use]
-    pub fn method_of_track(&self, clip: &Motion, track: usize) -> Method {
-        self.rotation_method(clip.channel(track), self.resting_method(clip))
-    }
-
     fn rotation_method(&self, channels: Channels, resting: Method) -> Method {
         match channels.rotation {
             Some(ChannelInterpolation::Step) => method::STEP,

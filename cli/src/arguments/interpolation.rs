@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tumble::method::{BESSEL_OVERHAUSER, KOCHANEK_BARTELS};
 use tumble::{
-    Ends, Engine, Error, Interpolation, InterpolationWarning, KeySigns, METHODS, Method,
+    Ends, Engine, Error, FrameRate, Interpolation, InterpolationWarning, KeySigns, METHODS, Method,
     SampleTimes, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::motion::Motion;
@@ -16,7 +16,21 @@ use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::output::one_of;
 use crate::messages::colours::{self, Colour};
-use crate::messages::exit::Failure;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+/// The methods, and the options of [`InterpolationArguments`].
+pub(crate) const CURVE_OPTIONS: [(&str, &str); 9] = [
+    ("methods", "--method"),
+    ("ends", "--ends"),
+    ("path", "--path"),
+    ("speed", "--speed"),
+    ("before", "--before"),
+    ("after", "--after"),
+    ("tension", "--tension"),
+    ("continuity", "--continuity"),
+    ("bias", "--bias"),
+];
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -31,11 +45,11 @@ pub(crate) struct InterpolationArguments {
     #[arg(long, value_name = "SPEED", default_value_t, value_parser = speed())]
     speed: Speed,
     /// The values before the first key
-    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = wrap_mode())]
-    before: WrapMode,
+    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = outside())]
+    before: OutsideArgument,
     /// The values after the last key
-    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = wrap_mode())]
-    after: WrapMode,
+    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = outside())]
+    after: OutsideArgument,
     /// kochanek-bartels: 0 is neutral, 1 stops at the keys, -1 doubles the speed at the keys
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     tension: Option<f64>,
@@ -62,13 +76,21 @@ impl InterpolationArguments {
             ends: self.ends.unwrap_or(method.ends),
             quantity: tumble::Quantity::Rotation,
             speed: self.speed,
-            before: self.before,
-            after: self.after,
+            before: self.before.wrap_mode(),
+            after: self.after.wrap_mode(),
             tcb: tumble::Tcb {
                 tension: self.tension.unwrap_or_default(),
                 continuity: self.continuity.unwrap_or_default(),
                 bias: self.bias.unwrap_or_default(),
             },
+        }
+    }
+
+    /// What is done with times outside the keys.
+    pub(crate) fn outside(self) -> Outside {
+        Outside {
+            before: self.before,
+            after: self.after,
         }
     }
 
@@ -79,8 +101,8 @@ impl InterpolationArguments {
             ("ends", self.ends.map(|ends| ends.to_string())),
             ("path", self.path.map(|signs| signs.to_string())),
             ("speed", Some(self.speed.to_string())),
-            ("before", Some(self.before.to_string())),
-            ("after", Some(self.after.to_string())),
+            ("before", Some(self.before.wrap_mode().to_string())),
+            ("after", Some(self.after.wrap_mode().to_string())),
             ("tension", number(self.tension)),
             ("continuity", number(self.continuity)),
             ("bias", number(self.bias)),
@@ -109,23 +131,6 @@ impl InterpolationArguments {
         let used: Vec<Method> = used.map(|group| group.0).collect();
         let checked = self.check(&each_once(used.iter()));
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
-    }
-
-    /// An option that is set, for inputs whose curves have none of them.
-    pub(crate) fn set_option(self) -> Option<&'static str> {
-        let default = WrapMode::default();
-        [
-            ("--ends", self.ends.is_some()),
-            ("--path", self.path.is_some()),
-            ("--speed", self.speed != Speed::default()),
-            ("--before", self.before != default),
-            ("--after", self.after != default),
-            ("--tension", self.tension.is_some()),
-            ("--continuity", self.continuity.is_some()),
-            ("--bias", self.bias.is_some()),
-        ]
-        .into_iter()
-        .find_map(|(option, is_set)| is_set.then_some(option))
     }
 
     /// Refuses options that have no effect on any of these methods.
@@ -187,14 +192,149 @@ fn speed() -> impl TypedValueParser<Value = Speed> {
     one_of(Speed::ALL.map(|speed| (speed.name(), help(speed), speed)))
 }
 
-fn wrap_mode() -> impl TypedValueParser<Value = WrapMode> {
+/// What is done with times before the first or after the last key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OutsideArgument {
+    Wrap(WrapMode),
+    LeaveOut,
+}
+
+const LEAVE_OUT: &str = "leave-out";
+
+impl Default for OutsideArgument {
+    fn default() -> Self {
+        Self::Wrap(WrapMode::default())
+    }
+}
+
+impl fmt::Display for OutsideArgument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wrap(mode) => f.write_str(mode.name()),
+            Self::LeaveOut => f.write_str(LEAVE_OUT),
+        }
+    }
+}
+
+impl OutsideArgument {
+    /// Of times that are left out none is evaluated.
+    fn wrap_mode(self) -> WrapMode {
+        match self {
+            Self::Wrap(mode) => mode,
+            Self::LeaveOut => WrapMode::default(),
+        }
+    }
+
+    /// Whether a value there says anything of the motion: where the end value is held it does not.
+    fn is_motion(self) -> bool {
+        !matches!(self, Self::Wrap(WrapMode::Hold) | Self::LeaveOut)
+    }
+}
+
+/// What is done with times outside the keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Outside {
+    before: OutsideArgument,
+    after: OutsideArgument,
+}
+
+impl Outside {
+    /// Whether times before the first and after the last key are left out.
+    pub(crate) fn leaves_out(self) -> [bool; 2] {
+        [self.before, self.after].map(|it| it == OutsideArgument::LeaveOut)
+    }
+
+    /// The samples without those that are left out; frames of a rate stay such.
+    ///
+    /// # Errors
+    /// When none is left.
+    pub(crate) fn kept(
+        self,
+        frames: SampleTimes,
+        rate: Option<FrameRate>,
+        clip: &Motion,
+        name: &str,
+    ) -> Result<SampleTimes, Failure> {
+        let leaves = self.leaves_out();
+        let (true, Some((first, last))) = (leaves != [false; 2], clip.set.time_span()) else {
+            return Ok(frames);
+        };
+        let timeline = frames
+            .resolve(clip.set.track_count(), clip.set.time_span())
+            .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let is_left_out = |time: f64| leaves[0] && time < first || leaves[1] && time > last;
+        let all = timeline.len();
+        let kept: Vec<f64> = timeline.times(0).filter(|&it| !is_left_out(it)).collect();
+        let (Some(&start), Some(&end)) = (kept.first(), kept.last()) else {
+            return Err(self.nothing_in_common(timeline.times(0), clip, name));
+        };
+        let left_out = all - kept.len();
+        if left_out == 0 {
+            return Ok(frames);
+        }
+        words::note(&format!(
+            "{name}: {left_out} of {} lie outside the keys; they are left out",
+            words::count(all, "time")
+        ));
+        Ok(match rate {
+            Some(rate) => SampleTimes::rate(rate).between(start, end),
+            None => SampleTimes::at(kept),
+        })
+    }
+
+    /// Refuses times that all lie outside the keys, where values do not depend on time.
+    pub(crate) fn check_common(
+        self,
+        times: &[f64],
+        clip: &Motion,
+        name: &str,
+    ) -> Result<(), Failure> {
+        let Some((first, last)) = clip.set.time_span() else {
+            return Ok(());
+        };
+        let says_something = |&time: &f64| {
+            (time >= first || self.before.is_motion()) && (time <= last || self.after.is_motion())
+        };
+        match times.is_empty() || times.iter().any(says_something) {
+            true => Ok(()),
+            false => Err(self.nothing_in_common(times.iter().copied(), clip, name)),
+        }
+    }
+
+    fn nothing_in_common(
+        self,
+        times: impl Iterator<Item = f64>,
+        clip: &Motion,
+        name: &str,
+    ) -> Failure {
+        let (start, end) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| {
+            (time.min(low), time.max(high))
+        });
+        let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
+        let clock = clip.time_offset as f64;
+        let [start, end, first, last] = [start, end, first, last].map(|time| time + clock);
+        let message = format!(
+            "{name}: none of the times lies between its keys: asked for {start} to {end} s, keys lie from \
+             {first} to {last} s"
+        );
+        Failure::new(ALL_INPUTS, message)
+    }
+}
+
+fn outside() -> impl TypedValueParser<Value = OutsideArgument> {
     let help = |mode| match mode {
         WrapMode::Hold => "the end value",
         WrapMode::Loop => "the track repeats",
         WrapMode::Mirror => "the track runs backwards and forwards in turn",
         WrapMode::Extrapolate => "continues at the velocity of the end",
     };
-    one_of(WrapMode::ALL.map(|mode| (mode.name(), help(mode), mode)))
+    let wrapped = WrapMode::ALL.map(|mode| (mode.name(), help(mode), OutsideArgument::Wrap(mode)));
+    let left_out = (
+        LEAVE_OUT,
+        "no value: times there are left out",
+        OutsideArgument::LeaveOut,
+    );
+    one_of(wrapped.into_iter().chain([left_out]).collect::<Vec<_>>())
 }
 
 fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
@@ -312,7 +452,9 @@ impl CurveChoice {
             method: self.method.0,
             with: &with,
         };
-        with(methods.method_of_track(clip, track))
+        let groups = methods.groups_of(clip);
+        let group = groups.iter().find(|(_, tracks)| tracks.contains(&track));
+        with(group.map_or(BESSEL_OVERHAUSER, |(method, _)| *method))
     }
 
     /// All channels of a clip.

@@ -15,6 +15,7 @@ use tumble_formats::format::{Format, FormatOption};
 
 use crate::arguments::output::OutputArguments;
 use crate::batch::digest::InputFile;
+use crate::messages::exit::Failure;
 
 /// A rule about an option of this name; the name is that of its field, with `_`.
 pub(crate) struct OptionRule {
@@ -343,6 +344,22 @@ impl CommandLine {
     /// Whether the command line names the option, rather than its default.
     pub(crate) fn has(&self, option: &str) -> bool {
         self.explicit.contains(option)
+    }
+
+    /// Refuses the first of these options, `(id, name)`, that the command line names: it has no effect. `on` says
+    /// on what, and `remedy` what to do.
+    pub(crate) fn refuse(
+        &self,
+        options: &[(&str, &str)],
+        on: &str,
+        remedy: &str,
+    ) -> Result<(), Failure> {
+        match options.iter().find(|(id, _)| self.has(id)) {
+            Some((_, option)) => Err(Failure::usage(format!(
+                "{option} has no effect on {on}; {remedy}"
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Everything that determines a result besides its input: `layout=track method=slerp`. Options

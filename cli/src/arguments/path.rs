@@ -20,6 +20,22 @@ use crate::messages::names;
 /// The heading of these options in help.
 pub(crate) const PATHS: &str = "Paths";
 
+/// The options of [`PathArguments`], by their names beside arguments about rotations.
+pub(crate) const PATH_OPTIONS: [(&str, &str); 12] = [
+    ("seconds", "--seconds"),
+    ("rate", "--rate"),
+    ("path_method", "--path-method"),
+    ("path_ends", "--path-ends"),
+    ("direction", "--direction"),
+    ("path_frames", "--frame"),
+    ("path_up", "--path-up"),
+    ("no_ups", "--no-ups"),
+    ("twist", "--twist"),
+    ("path_speed", "--path-speed"),
+    ("forward", "--forward"),
+    ("upward", "--upward"),
+];
+
 /// How paths are followed. Beside arguments about rotations those of the same meaning are called
 /// `--path-…`; `follow`, which has none of these, gives them their short names.
 #[derive(Debug, Clone, Args)]

@@ -10,6 +10,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
 
+use crate::arguments::interpolation::Outside;
 use crate::arguments::output::one_of;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
@@ -24,6 +25,15 @@ const BROADCAST: [u64; 5] = [24, 30, 48, 60, 120];
 /// A decimal rate this close to a broadcast rate (relative) was probably meant to
 /// be it: 23.98 is, 24 is not.
 const BROADCAST_TOLERANCE: f64 = 2e-4;
+
+/// The options of [`SamplingArguments`].
+pub(crate) const SAMPLING_OPTIONS: [(&str, &str); 5] = [
+    ("fps", "--fps"),
+    ("times", "--times"),
+    ("start", "--start"),
+    ("end", "--end"),
+    ("from_zero", "--from-zero"),
+];
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
@@ -273,14 +283,17 @@ impl SampleRequest {
         &self,
         clip: &Motion,
         gaps: &GapArguments,
+        outside: Outside,
         end_frame: EndFrame,
         name: &str,
     ) -> Result<ClipFrames, Failure> {
-        let frames = self.of(clip, name);
+        let frames = self.of(clip, outside, name)?;
         let all = match *self {
             Self::Rate { rate, end, .. } => {
                 let last = clip.set.time_span().map_or(0.0, |span| span.1);
                 let end = end.map_or(last, |end| clip.time_in_set(end));
+                let [_, leaves_out_after] = outside.leaves_out();
+                let end = if leaves_out_after { end.min(last) } else { end };
                 ClipFrames::at_rate(frames, rate, (clip, end), end_frame, name)?
             }
             Self::Times(_) | Self::Keys(_) => frames.into(),
@@ -349,14 +362,23 @@ impl SampleRequest {
     }
 
     /// The samples for one clip; warns when they exceed its keys.
-    pub(crate) fn of(&self, clip: &Motion, name: &str) -> SampleTimes {
+    ///
+    /// # Errors
+    /// When the clip has none of the times: of those of another file, or where times outside its keys are left
+    /// out.
+    pub(crate) fn of(
+        &self,
+        clip: &Motion,
+        outside: Outside,
+        name: &str,
+    ) -> Result<SampleTimes, Failure> {
         let at = |times: Vec<f64>| {
             let start = times.iter().copied().fold(f64::INFINITY, f64::min);
             let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            warn_outside_keys(start, end, clip, name);
+            warn_outside_keys(start, end, clip, outside, name);
             SampleTimes::at(times)
         };
-        match self {
+        let frames = match self {
             Self::Rate {
                 rate,
                 end,
@@ -365,42 +387,55 @@ impl SampleRequest {
             } => {
                 let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
                 let end = end.map_or(last, |end| clip.time_in_set(end));
-                warn_outside_keys(first, end, clip, name);
+                warn_outside_keys(first, end, clip, outside, name);
                 SampleTimes::rate(*rate).between(first.min(0.0), end)
             }
             Self::Rate {
                 rate, start, end, ..
-            } => in_frames(*rate, *start, *end, clip, name),
+            } => return in_frames(*rate, [*start, *end], clip, outside, name),
             Self::Times(times) => at(times.iter().map(|&time| clip.time_in_set(time)).collect()),
             Self::Keys(keys) => {
                 // Each clip has its own time offset, in whole seconds.
                 let shift = (keys.from - clip.time_offset) as f64;
-                at(keys.times.iter().map(|time| time + shift).collect())
+                let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
+                outside.check_common(&times, clip, name)?;
+                at(times)
             }
-        }
+        };
+        let rate = match self {
+            Self::Rate { rate, .. } => Some(*rate),
+            Self::Times(_) | Self::Keys(_) => None,
+        };
+        outside.kept(frames, rate, clip, name)
     }
 }
 
 /// Frames from `start`, or the first key, to `end`, or the last key; warns when they exceed the keys.
+///
+/// # Errors
+/// When times outside the keys are left out, and none is left.
 pub(crate) fn in_frames(
     rate: FrameRate,
-    start: Option<f64>,
-    end: Option<f64>,
+    [start, end]: [Option<f64>; 2],
     clip: &Motion,
+    outside: Outside,
     name: &str,
-) -> SampleTimes {
+) -> Result<SampleTimes, Failure> {
     if (start, end) == (None, None) {
-        return SampleTimes::rate(rate);
+        return Ok(SampleTimes::rate(rate));
     }
     let whole = clip.set.time_span().unwrap_or((0.0, 0.0));
     let (start, end) = clip.range_in_set(start, end, whole);
-    warn_outside_keys(start, end, clip, name);
-    SampleTimes::rate(rate).between(start, end)
+    warn_outside_keys(start, end, clip, outside, name);
+    let frames = SampleTimes::rate(rate).between(start, end);
+    outside.kept(frames, Some(rate), clip, name)
 }
 
-fn warn_outside_keys(start: f64, end: f64, clip: &Motion, name: &str) {
+fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    if start < first || end > last {
+    // Those that are left out are told with their number.
+    let [before, after] = outside.leaves_out();
+    if start < first && !before || end > last && !after {
         let [start, end, first, last] =
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(

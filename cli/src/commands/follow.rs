@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
 use glam::Vec3;
-use tumble::paths::{Follow, FollowError, Followed};
-use tumble::{Engine, Error, Layout, SampleTimes, TrackSet};
+use tumble::paths::{Follow, FollowError, Followed, PathFrame};
+use tumble::{Engine, Error, Layout, SampleTimes, TrackSet, VectorMethod};
 use tumble_formats::PATHS;
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::path::PathFormat;
@@ -14,6 +14,7 @@ use tumble_formats::sample::Samples;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::GatheredInputs;
+use crate::arguments::interpolation::Outside;
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
@@ -97,6 +98,33 @@ impl Arguments {
         format!("follow {} times={times}", self.command_line.options())
     }
 
+    /// Refuses options that have no effect on these paths.
+    fn check_effects(&self, frame: PathFrame, name: &str) -> Result<(), Failure> {
+        let line = &self.command_line;
+        let refuse = |option: (&str, &str), on: &str, remedy: &str| {
+            let refused = line.refuse(&[option], on, remedy);
+            refused.map_err(|failure| failure.of(name))
+        };
+        let method = self.path.method();
+        if matches!(method, VectorMethod::Step | VectorMethod::Linear) {
+            let curve = format!("a path by {}", method.name());
+            let remedy = "its curve depends on the two points that it joins; leave it out";
+            refuse(("path_ends", "--ends"), &curve, remedy)?;
+        }
+        if frame == PathFrame::Frenet {
+            refuse(
+                ("path_up", "--up"),
+                "Frenet's frames",
+                "they follow from the path; leave it out",
+            )?;
+        }
+        if frame != PathFrame::Minimal {
+            let remedy = "only minimal frames have a rotation left over; leave it out";
+            refuse(("twist", "--twist"), "other frames than minimal", remedy)?;
+        }
+        Ok(())
+    }
+
     /// Evaluates and writes the bodies on the paths of one file.
     fn body(
         &self,
@@ -111,8 +139,9 @@ impl Arguments {
         let [frame] = self.path.frames()[..] else {
             return Err(Failure::usage("give a single --frame"));
         };
+        self.check_effects(frame, name)?;
         let follow = self.path.follow(paths, name, frame)?;
-        let frames = samples.of(paths, name);
+        let frames = samples.of(paths, Outside::default(), name)?;
         let found = followed(device, name, set, &follow, &frames)?;
         let written = write(paths, &frames, samples, &found, target, name)?;
         let done = format!(

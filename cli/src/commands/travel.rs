@@ -29,6 +29,13 @@ const CURVE_POINTS: usize = 600;
 /// How many facets along a side a net of control points is drawn with.
 const FACETS: usize = 32;
 
+/// The options of [`Scenery`].
+pub(crate) const SCENERY_OPTIONS: [(&str, &str); 3] = [
+    ("meshes", "--mesh"),
+    ("body", "--body"),
+    ("drawn_frames", "--drawn-frames"),
+];
+
 /// What is drawn beside the bodies on paths.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Scenery {

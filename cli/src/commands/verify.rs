@@ -143,7 +143,8 @@ impl Arguments {
         progress: &mut Progress,
     ) -> Result<Vec<VerificationLine>, Failure> {
         let set = &clip.set;
-        let frames = progress.suspend(|| samples.of(clip, name));
+        let outside = self.interpolation.outside();
+        let frames = progress.suspend(|| samples.of(clip, outside, name))?;
         // Two results are in memory at once.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();

@@ -194,11 +194,11 @@ fn loss(
             "that channels hold each key until the next one",
         ),
         Feature::Lines => (
-            is_at_keys(sampled) && bends_by(clip, Some(ChannelInterpolation::Linear)),
+            are_keys(sampled) && bends_by(clip, Some(ChannelInterpolation::Linear)),
             "that lines and arcs join the keys (evaluate them with the method slerp)",
         ),
         Feature::Curves => (
-            is_at_keys(sampled) && bends_by(clip, None),
+            are_keys(sampled) && bends_by(clip, None),
             "that smooth curves join the keys (lines and arcs join them there; more frames are nearer to the curves)",
         ),
         Feature::Bvh => (
@@ -219,9 +219,11 @@ fn loss(
     has_it.then_some(loss)
 }
 
-/// Whether the samples are those of the clip's keys, which a reader interpolates again.
-fn is_at_keys(sampled: &SampledClip<'_>) -> bool {
-    sampled.is_at_keys || sampled.times == sampled.clip.key_times()
+/// Whether the samples are the clip's keys, which a reader interpolates again. Samples that a method made are frames,
+/// at whichever times.
+fn are_keys(sampled: &SampledClip<'_>) -> bool {
+    let is_evaluated = sampled.notes.iter().any(|(name, _)| *name == "method");
+    sampled.is_at_keys || !is_evaluated && sampled.times == sampled.clip.key_times()
 }
 
 /// Whether a channel has this interpolation, and lines and a smooth method would join its keys differently: two keys

@@ -178,6 +178,18 @@ impl EvaluationJob<'_> {
         options.check_clip(name, clip, &[method])
     }
 
+    /// The samples of a clip.
+    fn clip_frames(
+        &self,
+        clip: &Motion,
+        end_frame: EndFrame,
+        name: &str,
+    ) -> Result<ClipFrames, Failure> {
+        let outside = self.arguments.interpolation.outside();
+        self.samples
+            .of_clip(clip, &self.arguments.gaps, outside, end_frame, name)
+    }
+
     /// With `--explain-route`, prints the route by which a clip's rotations are evaluated.
     fn explain(
         &mut self,
@@ -345,7 +357,7 @@ impl EvaluationJob<'_> {
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let times: Vec<ClipFrames> = clips
             .iter()
-            .map(|clip| (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name))
+            .map(|clip| self.clip_frames(clip, end_frame, name))
             .collect::<Result<_, _>>()?;
         self.written(name, clips, &times, target, None)
     }
@@ -507,7 +519,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let samples = (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name)?;
+        let samples = self.clip_frames(clip, end_frame, name)?;
         self.note_frames(std::slice::from_ref(&samples), target);
         if samples.is_held() && arguments.output.quantity() != Quantity::Rotation {
             return Err(Failure::usage(format!(
@@ -590,7 +602,7 @@ impl EvaluationJob<'_> {
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let set = &clip.set;
-        let samples = (self.samples).of_clip(clip, &self.arguments.gaps, end_frame, name)?;
+        let samples = self.clip_frames(clip, end_frame, name)?;
         self.note_frames(std::slice::from_ref(&samples), target);
         let frames = &samples.frames;
         let timeline = samples.written_times(clip, name)?;

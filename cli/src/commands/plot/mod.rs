@@ -20,12 +20,12 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, curve_warning,
-    each_once, method_arguments,
+    CURVE_OPTIONS, CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection,
+    curve_warning, each_once, method_arguments,
 };
 use crate::arguments::options::CommandLine;
-use crate::arguments::path::{PATHS, PathArguments};
-use crate::arguments::time::SamplingArguments;
+use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
+use crate::arguments::time::{SAMPLING_OPTIONS, SamplingArguments};
 use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::curves::PlotSubject;
@@ -183,8 +183,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = PlotSamples {
         request: arguments.sampling.samples()?,
         is_rate_chosen: arguments.command_line.has("fps"),
+        outside: arguments.interpolation.outside(),
     };
     refuse_shared_names(&inputs)?;
+    arguments.check_effects(&inputs)?;
     let out = arguments.output(&inputs)?;
     let mut writer = FigureWriter {
         device: arguments.device.open()?,
@@ -274,6 +276,35 @@ impl Arguments {
             options: self.interpolation,
         };
         Ok(methods.into_iter().map(choice).collect())
+    }
+
+    /// Refuses options that have no effect on what is drawn of these inputs.
+    fn check_effects(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        let line = &self.command_line;
+        let path_files = inputs.iter().filter(|path| is_path_file(path)).count();
+        if path_files == 0 {
+            let remedy = "it is for files of paths; leave it out";
+            line.refuse(&PATH_OPTIONS, "files of rotations", remedy)?;
+        }
+        if path_files == inputs.len() {
+            let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
+            line.refuse(&CURVE_OPTIONS, "files of paths", remedy)?;
+        }
+        let is_path = match self.show {
+            Some(show) => show == PlotQuantity::Path,
+            None => path_files == inputs.len(),
+        };
+        if is_path {
+            let subjects = [("boxes", "--box"), ("dimensions", "--dimension")];
+            let options = [&SAMPLING_OPTIONS[..], &subjects].concat();
+            let remedy = "each is drawn from its first key to its last; leave it out";
+            line.refuse(&options, "pictures of paths", remedy)?;
+        }
+        if self.show != Some(PlotQuantity::Sphere) {
+            let remedy = "add --show sphere, or leave it out";
+            line.refuse(&[("axis", "--axis")], "this plot", remedy)?;
+        }
+        Ok(())
     }
 
     fn show(&self) -> PlotQuantity {

@@ -7,7 +7,7 @@ use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
 use tumble_formats::motion::Motion;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::CurveChoice;
+use crate::arguments::interpolation::{CurveChoice, Outside};
 use crate::arguments::time::SampleRequest;
 use crate::batch::room;
 use crate::commands::plot::figure::TimeAxis;
@@ -25,6 +25,7 @@ pub(crate) struct PlotSamples {
     pub(crate) request: SampleRequest,
     /// Whether the command line says the rate of frames; else a curve has as many as the picture needs.
     pub(crate) is_rate_chosen: bool,
+    pub(crate) outside: Outside,
 }
 
 /// The times of a curve that goes through its keys: frames of a rate that was chosen, else even times, and
@@ -68,7 +69,7 @@ impl<'a> PlotSource<'a> {
         samples: &PlotSamples,
     ) -> Result<Self, Failure> {
         let set = &clip.set;
-        let mut frames = samples.request.of(clip, &name);
+        let mut frames = samples.request.of(clip, samples.outside, &name)?;
         let resolve = |frames: &SampleTimes| {
             let timeline = frames.resolve(set.track_count(), set.time_span());
             timeline.map_err(|error| Failure::evaluating(&name, &error.into()))
@@ -97,9 +98,12 @@ impl<'a> PlotSource<'a> {
         };
         if let SampleRequest::Rate { end, .. } = samples.request {
             let times: Vec<f64> = timeline.times(0).collect();
-            let last = end
-                .map(|end| clip.time_in_set(end))
-                .or(set.time_span().map(|span| span.1));
+            let last_key = set.time_span().map(|span| span.1);
+            let end = end.map(|end| clip.time_in_set(end));
+            let last = match samples.outside.leaves_out()[1] {
+                true => end.into_iter().chain(last_key).reduce(f64::min),
+                false => end.or(last_key),
+            };
             let times = with_keys(times, last, clip, samples.is_rate_chosen);
             frames = SampleTimes::at(times);
             timeline = resolve(&frames)?;

@@ -15,6 +15,7 @@ use crate::batch::room;
 use crate::commands::render::bones::{Bones, Skin};
 use crate::commands::render::scene::{Actor, Shape, Surroundings};
 use crate::commands::render::solids::{Body, meshes, trails};
+use crate::commands::render::typical_body::place_joints;
 use crate::commands::travel::{Maker, Scenery, TravelSource, positions_of, scene_origin};
 use crate::messages::colours::Colour;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -37,12 +38,18 @@ impl Subject {
     /// How a clip is drawn: tracks without positions are the boxes of a chain.
     ///
     /// # Errors
-    /// When its joints have parents, and positions that the file does not say.
+    /// When the file says why its joints have no positions.
     pub(super) fn new(
-        clip: Motion,
+        mut clip: Motion,
         mesh: Option<CarriedMesh>,
         name: &str,
     ) -> Result<Self, Failure> {
+        if clip.no_world.is_some() && clip.body.is_some() && place_joints(&mut clip).is_ok() {
+            words::warning(&format!(
+                "{name}: does not say where the body's joints are, so that a typical body is drawn; give a model of \
+                 it with --body-model, or their places with --offsets"
+            ));
+        }
         if let Some(reason) = &clip.no_world {
             return Err(Failure::new(ALL_INPUTS, format!("{name}: {reason}")));
         }

@@ -24,7 +24,7 @@ const SKIN: Colour = [0xc9, 0xb8, 0xa4];
 #[derive(Debug, Clone)]
 pub(crate) struct Bones {
     parents: Vec<Option<usize>>,
-    /// Where bones end that have no joint at their end, relative to the joint that they belong to.
+    /// The End Sites of BVH: a joint, and where its last bone ends relative to it.
     tips: Vec<(usize, Vec3)>,
     /// For each joint, the axis of its parent that turns the bone about itself.
     across: Vec<Vec3>,
@@ -38,8 +38,7 @@ impl Bones {
         let joints = clip.set.track_count();
         let parent = |joint: usize| clip.skeleton.get(joint).and_then(|it| it.parent);
         let parents: Vec<Option<usize>> = (0..joints).map(parent).collect();
-        // What tables and logs call children of the world are poses, without End Sites.
-        let sites = clip.bvh.iter().enumerate().filter(|_| !clip.is_world);
+        let sites = clip.bvh.iter().enumerate();
         let tips: Vec<(usize, Vec3)> = sites
             .flat_map(|(joint, written)| written.end_sites.iter().map(move |&tip| (joint, tip)))
             .filter(|(_, tip)| tip.length() > 0.0)

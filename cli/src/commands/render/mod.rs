@@ -5,6 +5,7 @@ mod bones;
 pub(crate) mod film;
 pub(crate) mod scene;
 pub(crate) mod solids;
+mod typical_body;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,10 +17,11 @@ use tumble_formats::carried_mesh::CarriedMesh;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
-    method_arguments,
+    CURVE_OPTIONS, CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection,
+    each_once, method_arguments,
 };
-use crate::arguments::path::{PATHS, PathArguments};
+use crate::arguments::options::CommandLine;
+use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
 use crate::arguments::tracks::selected;
 use crate::batch::room;
@@ -30,7 +32,9 @@ use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
-use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
+use crate::commands::travel::{
+    Maker, SCENERY_OPTIONS, Scenery, TravelSource, is_path_file, is_travel,
+};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, signals, words};
@@ -58,6 +62,8 @@ Examples:
   tumble render road.csv --frame frenet,minimal -o both.gif
   tumble render walk.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    command_line: CommandLine,
     /// A keyframe file, or one of paths (`-`: standard input)
     #[command(flatten)]
     inputs: Inputs,
@@ -199,9 +205,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let name = names::input(path);
     let Input { source, mesh, rest } = arguments.source(path, &name)?;
+    arguments.check_effects(&source, kind)?;
     let choices = arguments.choices(&name, &source, methods)?;
     let set = source.set();
-    let mut frames = samples.of(source.clip(), &name);
+    let mut frames = samples.of(source.clip(), arguments.interpolation.outside(), &name)?;
     let mut timeline = frames
         .resolve(set.track_count(), set.time_span())
         .map_err(|error| Failure::evaluating(&name, &error.into()))?;
@@ -293,6 +300,34 @@ impl Arguments {
             mesh,
             rest,
         })
+    }
+
+    /// Refuses options that have no effect on what is drawn.
+    fn check_effects(&self, source: &TravelSource, kind: RenderOutput) -> Result<(), Failure> {
+        let line = &self.command_line;
+        match source {
+            TravelSource::Paths(..) => {
+                let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
+                line.refuse(&CURVE_OPTIONS, "a file of paths", remedy)?;
+            }
+            TravelSource::Clip(clip) => {
+                let remedy = "it is for files of paths; leave it out";
+                line.refuse(&PATH_OPTIONS, "a file of rotations", remedy)?;
+                if !is_travel(clip) {
+                    let remedy = "it is for bodies on paths; leave it out";
+                    line.refuse(&SCENERY_OPTIONS, "boxes and skeletons", remedy)?;
+                }
+            }
+        }
+        if kind == RenderOutput::Still {
+            let remedy = "it shows the first frame (--start); leave it out, or write a film";
+            line.refuse(
+                &[("fps", "--fps"), ("end", "--end")],
+                "a single picture",
+                remedy,
+            )?;
+        }
+        Ok(())
     }
 
     /// The methods that draw a clip, each differently; none for paths.

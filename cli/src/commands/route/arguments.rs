@@ -7,7 +7,8 @@ use glam::DVec3;
 use tumble_routes::net::NetBy;
 use tumble_routes::route::By;
 
-use crate::commands::route::surface::kinds;
+use crate::arguments::options::CommandLine;
+use crate::commands::route::surface::{Surface, kinds};
 use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
 use crate::messages::names;
@@ -31,6 +32,8 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = format!("The surface is {}.\n{NOTES}", kinds()))]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    command_line: CommandLine,
     /// A mesh, or a net of control points
     pub(crate) surface: PathBuf,
     /// The start of the route
@@ -103,6 +106,28 @@ impl Arguments {
                 "give --start-point and --end-point, --pairs, or --walkers",
             )),
         }
+    }
+
+    /// Refuses options that have no effect on routes over this surface.
+    pub(crate) fn check_effects(&self, surface: &Surface) -> Result<(), Failure> {
+        let line = &self.command_line;
+        if let Surface::Net(_) = surface {
+            let remedy = "it is for meshes; leave it out";
+            line.refuse(&[("weld", "--weld")], "a net of control points", remedy)?;
+        }
+        if !self.wants_ground() {
+            let remedy = "it is for areas closed by --avoid and --max-slope; leave it out";
+            line.refuse(
+                &[("finest", "--finest")],
+                "routes over a whole mesh",
+                remedy,
+            )?;
+        }
+        if self.max_slope.is_none() && self.plot.is_none() {
+            let remedy = "it is for --max-slope and --plot; leave it out";
+            line.refuse(&[("up", "--up")], "these routes", remedy)?;
+        }
+        Ok(())
     }
 
     pub(crate) fn method(&self) -> Result<RouteMethod, Failure> {

@@ -48,6 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let participants = arguments.participants()?;
     let results = RouteResults::new(arguments, &participants)?;
     let surface = Surface::read(&arguments.surface, arguments.weld)?;
+    arguments.check_effects(&surface)?;
     let avoided = match &arguments.avoid {
         Some(path) => match Surface::read(path, arguments.weld)? {
             Surface::Mesh(mesh) => Some(mesh),

@@ -18,13 +18,15 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{
-    InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once, method_arguments,
+    CURVE_OPTIONS, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
+    method_arguments,
 };
-use crate::arguments::path::{PATHS, PathArguments};
+use crate::arguments::options::CommandLine;
+use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
 use crate::batch::target::Destination;
-use crate::commands::travel::{Scenery, TravelSource, is_path_file};
+use crate::commands::travel::{SCENERY_OPTIONS, Scenery, TravelSource, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
@@ -52,6 +54,8 @@ Examples:
   tumble view road.csv --frame minimal,frenet --path-speed constant --open
   tumble view walk.glb --mesh hill.obj,rocks.obj -o walk.html")]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     /// Where to write: a page (`-`: standard output) [default with --open: a temporary file]
@@ -138,6 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             shown.push(arguments.sampled(one)?);
         }
     }
+    arguments.check_effects(&shown)?;
     let methods = arguments.methods(&shown)?;
     let mut device = arguments.device.open()?;
     let menu = if inputs.len() > 1 {
@@ -173,6 +178,24 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// Refuses options that have no effect on any of the inputs.
+    fn check_effects(&self, shown: &[ShownClip]) -> Result<(), Failure> {
+        let line = &self.command_line;
+        if !shown.iter().any(|one| one.path.is_some()) {
+            let remedy = "it is for files of paths; leave it out";
+            line.refuse(&PATH_OPTIONS, "files of rotations", remedy)?;
+        }
+        if !shown.is_empty() && shown.iter().all(|one| one.path.is_some()) {
+            let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
+            line.refuse(&CURVE_OPTIONS, "files of paths", remedy)?;
+        }
+        if !shown.iter().any(ShownClip::is_travel) {
+            let remedy = "it is for bodies on paths; leave it out";
+            line.refuse(&SCENERY_OPTIONS, "boxes and skeletons", remedy)?;
+        }
+        Ok(())
+    }
+
     /// The clip with the selected tracks and their ancestors: joints, or the boxes of a chain before them.
     fn select_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
         let (name, tracks) = (names::input(path), &self.inputs.tracks);
@@ -246,8 +269,8 @@ impl Arguments {
     /// The frames, and the keys between them where those are not many more: a key is
     /// shown as it is.
     fn sampled(&self, one: ShownClip) -> Result<ShownClip, Failure> {
-        let name = &one.name;
-        let frames = in_frames(self.fps, self.start, self.end, &one.clip, name);
+        let (name, outside) = (&one.name, self.interpolation.outside());
+        let frames = in_frames(self.fps, [self.start, self.end], &one.clip, outside, name)?;
         let timeline = one.timeline(&frames)?;
         if one.bytes(timeline.len()) > MAX_PAGE_BYTES {
             return Err(Failure::usage(format!(
