@@ -226,7 +226,7 @@ codes! {
     OneClip = "E315" elsewhere, "not one clip", "An NPZ file holds one clip.";
     Layout = "E316" elsewhere, "samples that do not fit the layout", "If the layout of a file is kept, the number of tracks must not change, and a file without a list of times needs frames at a constant rate.";
     NotPerFrame = "E317" elsewhere, "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, accepts names of numeric arrays that have an entry for each frame and are not keys.";
-    RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` is only for files without times. This file has the time of every key.";
+    RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
     BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one for each gender. It must belong to the kind of body in the motion.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
@@ -302,10 +302,11 @@ codes! {
     NameChanged = "W207" elsewhere, "a name is changed", "The format does not allow line ends, braces or control characters in names, nor two equal names.";
     NoRoom = "W208" elsewhere, "data that the format cannot store", "It is left out. The table in docs/formats.md shows what each format can store.";
     EndHeld = "W209" elsewhere, "a clip that ends between two frames", "The format stores frames of one rate and no times. One frame more has the value of the end, so that nothing is missing and loops continue; its time is that of the frame after the end. `--end-frame leave-out` ends with the last frame before the end instead. A format with times has a key at the end.";
+    FrameTimeRounded = "W210", "a frame time of few digits", "A frame time such as 0.033 is probably that of a common rate, 30 frames a second, rounded to few digits. This rate makes the clip longer or shorter by more than 0.5 %. `--raw-times` keeps the frame time as written, `--override-fps` replaces it.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
-    TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times or its duration. `--source-fps` overrides the rate.";
+    TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file; `--source-fps` is for files that state none.";
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds have nineteen (ORB-SLAM writes them). `--time-unit ns` states the unit and avoids this warning.";
     ArraysNotRead = "W306", "arrays that are not read", "This is no error: the rotations were found in other arrays, and the names of these are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. `betas` and `gender` are the shape of a body, which only `--body-model` uses. A result in the same layout keeps arrays that are constant.";
     Bridged = "W401" elsewhere, "keys that are missing", "Cells are blank or NaN. Because of `--bridge-gaps`, the track is interpolated between its other keys there.";

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
-use tumble_formats::end_frame::EndFrame;
+use tumble_formats::end_frame::{EndFrame, sample_to_end};
 use tumble_formats::format::{FormatOption, MotionOptions, ReadOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Channels, Motion};
@@ -101,7 +101,7 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
             let timeline = frames.resolve(1, input.set.time_span()).unwrap();
             assert_eq!(timeline.len(), 34);
             let end = EndFrame::of_clips(to).sample(&timeline, rate(30), last);
-            let samples = ChannelMethods::AUTHORED.sample_to_end(&engine, &input, &frames, end);
+            let samples = sample_to_end(&ChannelMethods::AUTHORED, &engine, &input, &frames, end);
             let even = end.is_some_and(|end| end.is_held()).then(|| rate(30));
             let bytes = write(to, &input, &samples.unwrap(), even);
             let found = read(to, bytes, 30);
