@@ -64,7 +64,7 @@ fn clips_end_with_a_key_or_a_held_frame_and_arrays_with_a_frame() {
         assert!((found.2 - last).abs() < 1e-12, "{output}: {}", found.2);
     }
     let csv = fs::read_to_string(at.join("out.csv")).unwrap();
-    assert!(csv.contains("\n34,1.125,"), "{csv}");
+    assert!(csv.contains("\n34,1.125000000,"), "{csv}");
 }
 
 /// Rotations that are streamed have the bits of those without an end, and the end behind them.
@@ -199,4 +199,40 @@ fn reductions_of_frames_keep_the_end() {
         evaluated(at, "few.glb --fps 24 -o out.csv"),
         (28, 0.0, 1.125)
     );
+}
+
+/// A rate for files that state none leaves the others alone, and one that replaces a rate is reported.
+#[test]
+fn rates_of_options_contradict_no_file_silently() {
+    let folder = sample_folder();
+    let at = folder.path();
+    let bvh = "HIERARCHY\nROOT hip\n{\n OFFSET 0 0 0\n CHANNELS 3 Zrotation Xrotation Yrotation\n}\nMOTION\nFrames: 3\n\
+               Frame Time: 0.0166\n0 0 0\n1 0 0\n2 0 0\n";
+    fs::write(at.join("hip.bvh"), bvh).unwrap();
+    line(at, "convert hip.bvh -o as-stated.csv");
+    assert!(
+        fs::read_to_string(at.join("as-stated.csv"))
+            .unwrap()
+            .contains("\n2,0.03333333333333333,")
+    );
+    let words = line(at, "convert hip.bvh --override-fps 10 -o overridden.csv");
+    let expected = "the file says 60 frames a second; because of --override-fps it is read at 10";
+    assert!(words.contains(expected), "{words}");
+    assert!(
+        fs::read_to_string(at.join("overridden.csv"))
+            .unwrap()
+            .contains("\n2,0.2,")
+    );
+    for (option, words) in [
+        ("--source-fps 10", "--source-fps has no effect on bvh"),
+        ("--source-fps 10 --override-fps 10", "cannot be used with"),
+    ] {
+        let arguments = format!("convert hip.bvh {option} -o out.csv");
+        let run = run(at, &arguments.split(' ').collect::<Vec<_>>());
+        assert!(
+            run.code != 0 && run.words.contains(words),
+            "{option}: {}",
+            run.words
+        );
+    }
 }

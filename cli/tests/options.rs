@@ -28,6 +28,7 @@ const OPTIONS: &[&[&str]] = &[
     &["--start", "0.3"],
     &["--from-zero"],
     &["--end", "1.3"],
+    &["--end-frame", "hold"],
     &["--ends", "natural"],
     &["--path", "as-authored"],
     &["--speed", "constant"],
@@ -63,6 +64,7 @@ const OPTIONS: &[&[&str]] = &[
     &["--bridge-gaps"],
     &["--duplicates", "last"],
     &["--source-fps", "10"],
+    &["--override-fps", "10"],
     &["--map", "rotations=keys:wxyz"],
     &["--time-unit", "ms"],
     &["--animation", "0"],
@@ -306,6 +308,8 @@ fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
         ["--layout", "track"] | ["--order", "xyzw"] | ["--from", _] => true,
         ["--layout", "frame"] => are_frames,
         ["--order", "wxyz"] => has("csv"),
+        // BVH has no times.
+        ["--end-frame", _] => has("bvh"),
         // These files have quaternions whose signs continue.
         ["--path", _] => input != "keys.dat",
         // A clip of a thousandth of the length has one frame.

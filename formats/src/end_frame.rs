@@ -7,11 +7,14 @@
 use std::borrow::Cow;
 
 use glam::Quat;
-use tumble::{FrameRate, Layout, Timeline};
+use tumble::{Engine, Error, FrameRate, Layout, SampleTimes, Timeline};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::Format;
+use crate::motion::Motion;
+use crate::sample::{ChannelMethods, Samples};
+use crate::signs::continue_signs;
 
 /// What a result that is sampled at the frames of a rate has at the end of its clip, if the end lies between two
 /// frames. If it lies on one, that is the last sample.
@@ -103,6 +106,29 @@ impl EndFrame {
     }
 }
 
+/// The samples of a clip at some frames, as [`ChannelMethods::sample`] makes them, and that at its end, if there is one.
+///
+/// # Errors
+/// As [`Engine::evaluate`].
+pub fn sample_to_end(
+    methods: &ChannelMethods<'_>,
+    engine: &Engine,
+    clip: &Motion,
+    frames: &SampleTimes,
+    end: Option<EndSample>,
+) -> Result<Samples, Error> {
+    let mut samples = methods.sample(engine, clip, frames)?;
+    if let Some(end) = end {
+        let last = methods.sample(engine, clip, &SampleTimes::at(vec![end.at]))?;
+        samples.times.push(end.time);
+        samples.rotations.extend(last.rotations);
+        samples.translations.extend(last.translations);
+        samples.scales.extend(last.scales);
+        continue_signs(&mut samples.rotations, clip.set.track_count());
+    }
+    Ok(samples)
+}
+
 /// The values of all tracks at the end of a clip, which are put after those of its frames while they are streamed.
 #[derive(Debug)]
 pub struct EndRows {
@@ -152,8 +178,6 @@ impl EndRows {
 
 #[cfg(test)]
 mod tests {
-    use tumble::SampleTimes;
-
     use super::*;
 
     fn sample(end_frame: EndFrame, start: f64, end: f64) -> Option<EndSample> {

@@ -69,6 +69,8 @@ pub enum FormatOption {
     Duplicates,
     /// [`ReadOptions::source_rate`].
     SourceRate,
+    /// [`ReadOptions::override_rate`].
+    OverrideRate,
     /// [`ReadOptions::frame_times`] and [`MotionOptions::times_apart`].
     TimesApart,
     /// [`ReadOptions::map`].
@@ -132,8 +134,11 @@ pub struct ReadOptions {
     pub raw_times: bool,
     /// What is done with two different keys at the same time.
     pub duplicates: Duplicates,
-    /// The rate of the keys, for files that do not contain it.
+    /// The rate of the keys, for files that do not contain it. A file that contains another rate keeps its own, and a
+    /// warning is returned.
     pub source_rate: Option<FrameRate>,
+    /// The rate of the keys, whatever the file says. If it says another rate, a warning is returned.
+    pub override_rate: Option<FrameRate>,
     /// The times of the poses, for formats that store them in a separate file (KITTI).
     pub frame_times: Option<Arc<FrameTimes>>,
     /// The meaning of a file's columns or arrays, for files that do not specify it: `rotations=keys:wxyz,time=t`; see

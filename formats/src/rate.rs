@@ -181,10 +181,28 @@ fn of_number(number: f64) -> Option<FrameRate> {
 
 // ---- a frame's time
 
+/// The largest change of a duration, as a part of it, that is made without a warning.
+const UNNOTICED: f64 = 5e-3;
+
+/// The largest change of a duration that few digits may cause.
+const MAX_CHANGE: f64 = 0.025;
+
+/// By which part a clip becomes longer if its frame time is read as that of a rate; `None` if nobody notices it.
+pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
+    let change = rate.time_of(1) / period - 1.0;
+    (change.abs() > UNNOTICED).then_some(change)
+}
+
+/// The warning that a file's rate is replaced.
+pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
+    format!("the file says {rate} frames a second; because of --override-fps it is read at {other}")
+}
+
 /// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number
-/// times 1000/1001, or the number itself. With few digits, such as 0.017, several rates are possible: the common one
-/// is chosen if there is only one, otherwise the number itself. Some programs print the digits of an f32, so that the
-/// time may also have been rounded to f32. `None` for times outside 1e-9 s to 1e9 s.
+/// times 1000/1001, or the number itself. Digits may have been rounded, as in 0.017, or cut off, as in 0.0166. If several
+/// rates are possible, the common one is chosen if there is only one. A rate that would change the duration by more than
+/// [`MAX_CHANGE`], or for digits that were cut off by more than [`UNNOTICED`], is not meant. Some programs print the
+/// digits of an f32, so that the time may also have been rounded to f32. `None` for times outside 1e-9 s to 1e9 s.
 fn of_period(digits: &str) -> Option<FrameRate> {
     let period: f64 = digits.parse().ok()?;
     if !(1e-9..=1e9).contains(&period) {
@@ -194,8 +212,9 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     if written.is_some_and(is_whole) {
         return written;
     }
-    let half = 0.5 * whole_power(10.0, last_digit_power(digits));
-    let fits = |rate: FrameRate| {
+    let digit = whole_power(10.0, last_digit_power(digits));
+    let half = 0.5 * digit;
+    let was_rounded = |rate: FrameRate| {
         let exact = rate.time_of(1);
         let near = |time: f64| (time - period).abs() <= half;
         near(exact) || near(f64::from(exact as f32))
@@ -206,7 +225,22 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     } else {
         MAX_RATE
     };
-    choose(1.0 / (period + margin), high, fits).or(written)
+    let change = |rate: &FrameRate| (rate.time_of(1) / period - 1.0).abs();
+    let rounded = choose(1.0 / (period + margin), high, was_rounded);
+    let rounded = rounded.filter(|rate| change(rate) <= MAX_CHANGE);
+    let cut = || {
+        let was_cut = |rate: FrameRate| (0.0..digit).contains(&(rate.time_of(1) - period));
+        let cut = choose(1.0 / (period + digit), 1.0 / period, was_cut)?;
+        (is_common(cut) && change(&cut) <= UNNOTICED).then_some(cut)
+    };
+    rounded.or_else(cut).or(written)
+}
+
+/// Whether a rate, or 1.001 times it, is one of the common ones.
+fn is_common(rate: FrameRate) -> bool {
+    let common = COMMON_RATES.iter().copied();
+    let mut both = common.flat_map(|number| [(number, 1), (number * 1000, 1001)]);
+    both.any(|(frames, seconds)| FrameRate::new(frames, seconds).ok() == Some(rate))
 }
 
 /// The power of ten of a number's last digit.

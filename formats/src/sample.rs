@@ -8,7 +8,6 @@ use tumble::{
     TrackSet, VectorMethod, Vectors, method,
 };
 
-use crate::end_frame::EndSample;
 use crate::motion::{ChannelInterpolation, Channels, Motion, SampledClip};
 use crate::signs::continue_signs;
 
@@ -121,29 +120,6 @@ impl ChannelMethods<'_> {
         continue_signs(&mut samples.rotations, tracks);
         samples.translations = self.vectors(engine, clip, &frames, Channel::Translation)?;
         samples.scales = self.vectors(engine, clip, &frames, Channel::Scale)?;
-        Ok(samples)
-    }
-
-    /// As [`ChannelMethods::sample`], and the sample at the [end](EndSample) of the clip, if there is one.
-    ///
-    /// # Errors
-    /// As [`Engine::evaluate`].
-    pub fn sample_to_end(
-        &self,
-        engine: &Engine,
-        clip: &Motion,
-        frames: &SampleTimes,
-        end: Option<EndSample>,
-    ) -> Result<Samples, Error> {
-        let mut samples = self.sample(engine, clip, frames)?;
-        if let Some(end) = end {
-            let last = self.sample(engine, clip, &SampleTimes::at(vec![end.at]))?;
-            samples.times.push(end.time);
-            samples.rotations.extend(last.rotations);
-            samples.translations.extend(last.translations);
-            samples.scales.extend(last.scales);
-            continue_signs(&mut samples.rotations, clip.set.track_count());
-        }
         Ok(samples)
     }
 

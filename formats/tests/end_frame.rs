@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
-use tumble_formats::end_frame::EndFrame;
+use tumble_formats::end_frame::{EndFrame, sample_to_end};
 use tumble_formats::format::{FormatOption, MotionOptions, ReadOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Channels, Motion};
@@ -101,7 +101,7 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
             let timeline = frames.resolve(1, input.set.time_span()).unwrap();
             assert_eq!(timeline.len(), 34);
             let end = EndFrame::of_clips(to).sample(&timeline, rate(30), last);
-            let samples = ChannelMethods::AUTHORED.sample_to_end(&engine, &input, &frames, end);
+            let samples = sample_to_end(&ChannelMethods::AUTHORED, &engine, &input, &frames, end);
             let even = end.is_some_and(|end| end.is_held()).then(|| rate(30));
             let bytes = write(to, &input, &samples.unwrap(), even);
             let found = read(to, bytes, 30);
@@ -127,4 +127,91 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
         .unwrap();
     let cut = clip.with_keys(&cut).unwrap();
     assert!(seam(&engine, &cut).0 > 5.0);
+}
+
+/// The picture of the documents: the end of the loop, sampled in each of the three ways.
+fn picture() -> String {
+    const WIDTH: f64 = 760.0;
+    const ROW: f64 = 130.0;
+    let length = FRAMES as f64 / 24.0;
+    let (from, to) = (0.9, 1.2);
+    let x = |time: f64| 20.0 + (time - from) / (to - from) * (WIDTH - 40.0);
+    let value = |time: f64| (TAU * time / length).sin();
+    let frames = SampleTimes::rate(rate(30)).between(0.0, length);
+    let timeline = frames.resolve(1, None).unwrap();
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {}\" font-family=\"sans-serif\" \
+         font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
+        3.0 * ROW + 20.0
+    );
+    for (row, end_frame) in EndFrame::ALL.into_iter().enumerate() {
+        let top = 10.0 + row as f64 * ROW;
+        let y = |value: f64| top + 55.0 - 55.0 * value;
+        let said = match end_frame {
+            EndFrame::Key => "key: a sample at the end (formats with times)",
+            EndFrame::Hold => "hold: one frame more, with the value of the end (formats of frames)",
+            EndFrame::LeaveOut => "leave-out: the last frame before the end; a loop jumps from it",
+        };
+        let mut lines = format!(
+            "<text x=\"24\" y=\"{:.1}\" fill=\"#222\">{said}</text>\n",
+            top + 14.0
+        );
+        for frame in 27..=36u64 {
+            let at = x(rate(30).time_of(frame));
+            lines += &format!(
+                "<path d=\"M{at:.1} {:.1}V{:.1}\" stroke=\"#ddd\"/>\n",
+                top + 22.0,
+                top + 118.0
+            );
+        }
+        let end = x(length);
+        lines += &format!(
+            "<path d=\"M{end:.1} {:.1}V{:.1}\" stroke=\"#b33\" stroke-dasharray=\"4 3\"/>\n\
+             <text x=\"{end:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"11\" fill=\"#b33\">end</text>\n",
+            top + 22.0,
+            top + 118.0,
+            top + 18.0
+        );
+        let curve = (0..=90).map(|step| from + f64::from(step) / 90.0 * (length - from));
+        let points: Vec<String> = curve
+            .map(|time| format!("{:.1},{:.1}", x(time), y(value(time))))
+            .collect();
+        lines += &format!(
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"#888\" stroke-width=\"2\"/>\n",
+            points.join(" ")
+        );
+        let last = end_frame.sample(&timeline, rate(30), length);
+        let frames = timeline.times(0).map(|time| (time, time));
+        let samples = frames.chain(last.map(|end| (end.time, end.at)));
+        for (time, at) in samples.filter(|(time, _)| *time >= from) {
+            lines += &format!(
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"5\" fill=\"#2a6db0\"/>\n",
+                x(time),
+                y(value(at))
+            );
+        }
+        svg += &lines;
+    }
+    let under = 3.0 * ROW + 12.0;
+    let mut label = |at: f64, text: &str| {
+        svg += &format!(
+            "<text x=\"{:.1}\" y=\"{under:.1}\" text-anchor=\"middle\" font-size=\"11\" fill=\"#666\">{text}</text>\n",
+            x(at)
+        );
+    };
+    for frame in 28..=35u64 {
+        label(rate(30).time_of(frame), &format!("frame {frame}"));
+    }
+    svg + "</svg>\n"
+}
+
+/// `UPDATE_EXPECTED=1` writes it.
+#[test]
+fn the_picture_of_the_documents_is_that_of_the_rule() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/end-frame.svg");
+    let picture = picture();
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        std::fs::write(path, &picture).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(path).unwrap(), picture);
 }

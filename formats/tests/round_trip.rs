@@ -523,3 +523,45 @@ fn signs_continue_whatever_writes_them() {
         );
     }
 }
+
+/// Whatever the names of the tracks are, a file that is written can be read.
+#[test]
+fn files_with_any_names_are_read_again() {
+    let names = [
+        "left\0arm",
+        "a,b\"c\"",
+        "=1+1",
+        "line\nend",
+        "{brace}",
+        " ",
+        "räder",
+    ];
+    let mut clip = Motion {
+        rate: FrameRate::new(10, 1).ok(),
+        ..Motion::default()
+    };
+    for name in names {
+        clip.set
+            .push(name, &[0.0, 0.1], &[Quat::IDENTITY; 2])
+            .unwrap();
+    }
+    let keys = keyed(&clip).unwrap();
+    for format in FORMATS.iter().filter(|format| format.writes_clips()) {
+        if !format.supports(Feature::SeveralTracks) {
+            continue;
+        }
+        let mut bytes = Vec::new();
+        let sampled = [keys.of(&clip, clip.rate, &[])];
+        let options = MotionOptions::default();
+        let warnings = format.write_clips(&sampled, &options, &mut bytes).unwrap();
+        let loaded = (format.read_bytes)("clip", bytes, &ReadOptions::default());
+        let loaded = loaded.unwrap_or_else(|error| panic!("{}: {error}", format.name));
+        let set = &loaded.clips[0].set;
+        assert_eq!(set.track_count(), names.len(), "{}", format.name);
+        let is_changed = set.track_name(0) != names[0] && format.supports(Feature::TrackNames);
+        let is_told = warnings
+            .iter()
+            .any(|warning| warning.code == Code::NameChanged);
+        assert!(!is_changed || is_told, "{}: {warnings:?}", format.name);
+    }
+}

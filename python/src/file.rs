@@ -7,6 +7,7 @@ use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
+use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
 use tumble_formats::npz::body_offsets;
@@ -162,11 +163,12 @@ impl File {
 /// Reads a motion file of any format (docs/formats.md lists them). An invalid file raises an `InputError` with the
 /// position of the error; oddities are reported as `InputWarning`.
 ///
-/// `load(path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
-/// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
+/// `load(path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None,
+/// duplicates=None, raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
 ///
 /// `format`: the file's format; by default it is recognised by its first bytes and its name. `source_fps`: the
-/// frame rate of a file without times. `source_times`: a text file of times, for KITTI, one time in seconds per line.
+/// frame rate of a file that states neither times nor a rate. `override_fps`: the frame rate of a file of NPZ or BVH
+/// without times, instead of the one that it states. `source_times`: a text file of times, for KITTI, one time in seconds per line.
 /// `time_unit`: the unit of times that are whole numbers, "s", "ms", "us" or "ns". `map`: what arrays or columns
 /// contain, if their names do not say it, such as "rotations=keys:wxyz,time=t". It has entries NAME=SOURCE, separated
 /// by commas. NAME is `rotations`, `translations` or `time` for arrays, and a known column or a track for tables.
@@ -189,7 +191,7 @@ impl File {
 /// tumble.MissingFileError: missing.glb: error[E001]: ...
 #[pyfunction]
 #[pyo3(signature = (
-    path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
+    path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
     raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body_model=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -198,6 +200,7 @@ pub(crate) fn load(
     path: PathBuf,
     format: Option<&str>,
     source_fps: Option<&Bound<'_, PyAny>>,
+    override_fps: Option<&Bound<'_, PyAny>>,
     source_times: Option<PathBuf>,
     map: Option<String>,
     time_unit: Option<&Bound<'_, PyAny>>,
@@ -210,12 +213,19 @@ pub(crate) fn load(
     scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
-    if source_fps.is_some() && source_times.is_some() {
-        return Err(input(
-            "source_fps and source_times both say when the keys are; give one",
-        ));
+    let given = [
+        ("source_fps", source_fps.is_some()),
+        ("override_fps", override_fps.is_some()),
+        ("source_times", source_times.is_some()),
+    ];
+    let mut given = given.iter().filter(|(_, is_given)| *is_given);
+    if let (Some((first, _)), Some((second, _))) = (given.next(), given.next()) {
+        return Err(input(format!(
+            "{first} and {second} both say when the keys are; give one"
+        )));
     }
     let is_changed = source_fps.is_some()
+        || override_fps.is_some()
         || source_times.is_some()
         || map.is_some()
         || time_unit.is_some()
@@ -245,6 +255,7 @@ pub(crate) fn load(
             )?,
         },
         source_rate: source_fps.map(frame_rate).transpose()?,
+        override_rate: override_fps.map(frame_rate).transpose()?,
         frame_times: frame_times.map(Arc::new),
         map,
         time_unit: time_unit
@@ -274,10 +285,15 @@ pub(crate) fn load(
     }
     let file = path.clone();
     let mut loaded = interruptible(py, move || {
-        let read = match format {
-            Some(format) => format.open(&file, &options),
-            None => Format::open_detected(&file, &options),
-        };
+        let format = format.unwrap_or_else(|| Format::detected(&file));
+        if options.override_rate.is_some() && !format.takes(FormatOption::OverrideRate) {
+            return Err(input(format!(
+                "override_fps has no effect on {}; it is for {}; leave it out",
+                format.name,
+                Format::names_taking(FormatOption::OverrideRate)
+            )));
+        }
+        let read = format.open(&file, &options);
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
         if let Some(offsets) = &offsets {
             for clip in &mut loaded.clips {

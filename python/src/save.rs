@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop, Timeline};
 use tumble_formats::diagnostic::Code;
-use tumble_formats::end_frame::{EndFrame, EndRows, EndSample};
+use tumble_formats::end_frame::{EndFrame, EndRows, EndSample, sample_to_end};
 use tumble_formats::format::{
     Document, Format, FormatOption, MotionOptions, Quantization, ResultShape, WriteError,
     WriteResults, left_behind,
@@ -540,7 +540,7 @@ impl Save {
                 method: self.request.method,
                 with: &self.request.with(Quantity::Rotation),
             };
-            let samples = methods.sample_to_end(&engine, clip, &frames.frames, frames.end);
+            let samples = sample_to_end(&methods, &engine, clip, &frames.frames, frames.end);
             all.push(samples.map_err(|error| of_engine(&error))?);
         }
         let notes = self.notes();

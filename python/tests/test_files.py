@@ -539,3 +539,41 @@ def test_columns_that_are_left_out_are_said(tmp_path):
         tumble.load(tmp_path / "a.parquet", map="hand=state[3:7]")
     with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[7:8\]`; name the keys"):
         tumble.load(tmp_path / "a.parquet", map="hand=state[3:7],hand.translation=state[0:3]")
+
+
+@pytest.mark.parametrize(
+    ("name", "end_frame", "frames", "last"),
+    [
+        ("out.npz", None, 35, 1.125),
+        ("out.glb", None, 35, 1.125),
+        ("out.csv", None, 35, 1.125),
+        ("out.dat", None, 35, 1.125),
+        ("out.bvh", "hold", 35, 34 / 30),
+        ("out.bvh", "leave-out", 34, 33 / 30),
+        ("out.csv", "hold", 35, 34 / 30),
+    ],
+)
+def test_clips_keep_their_end(tmp_path, name, end_frame, frames, last):
+    door = [[0, 0, 0, 1], [0, 0, 0.6, 0.8], [0, 0, 0, 1]]
+    clip = tumble.Clip([0.0, 0.5, 1.125], door, names=["door"])
+    path = tmp_path / name
+    tumble.save(path, clip, fps=30, method="slerp", end_frame=end_frame)
+    found = tumble.load(path).clip
+    assert found.duration == pytest.approx(last, abs=1e-7)
+    assert found.key_count == frames
+    if end_frame != "leave-out":
+        assert found.evaluate(at=[found.duration])[0, 0] == pytest.approx([0, 0, 0, 1], abs=1e-6)
+
+
+def test_an_end_that_is_held_is_told(tmp_path):
+    clip = tumble.Clip([0.0, 1.125], [[0, 0, 0, 1], [0, 0, 0.6, 0.8]])
+    with pytest.warns(tumble.InputWarning, match="W210"):
+        tumble.save(tmp_path / "out.bvh", clip, fps=30)
+    tumble.save(tmp_path / "out.npy", clip, fps=30)
+    assert np.load(tmp_path / "out.npy").shape == (1, 34, 4)
+    tumble.save(tmp_path / "out.npy", clip, fps=30, end_frame="hold")
+    assert np.load(tmp_path / "out.npy").shape == (1, 35, 4)
+    with pytest.raises(ValueError, match="no times; give end_frame"):
+        tumble.save(tmp_path / "out.bvh", clip, fps=30, end_frame="key")
+    with pytest.raises(ValueError, match="`end_frame` needs `fps`"):
+        tumble.save(tmp_path / "out.glb", clip, end_frame="key")

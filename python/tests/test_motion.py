@@ -257,3 +257,26 @@ def test_the_way_of_a_trainer_gives_the_same_bits_everywhere(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith("all have the same bits\n") and "the same bits: True" in done.stdout
+
+
+def test_source_fps_is_for_files_that_state_no_rate(tmp_path):
+    n = 31
+    body = {"poses": np.zeros((n, 156)), "trans": np.zeros((n, 3))}
+    stated, silent = tmp_path / "stated.npz", tmp_path / "silent.npz"
+    np.savez(stated, **body, mocap_framerate=30.0)
+    np.savez(silent, **body)
+    with pytest.warns(tumble.InputWarning, match="says 30 frames a second, which is used"):
+        library = tumble.MotionLibrary.load([stated, silent], source_fps=120)
+    assert library.lengths.tolist() == [1.0, 0.25]
+    with pytest.warns(tumble.InputWarning, match="--override-fps it is read at 120"):
+        library = tumble.MotionLibrary.load([stated, silent], override_fps=120)
+    assert library.lengths.tolist() == [0.25, 0.25]
+
+
+def test_override_fps_is_for_files_without_times(tmp_path):
+    clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    tumble.save(tmp_path / "door.glb", clip)
+    with pytest.raises(ValueError, match="override_fps has no effect on glb; it is for bvh"):
+        tumble.load(tmp_path / "door.glb", override_fps=30)
+    with pytest.raises(ValueError, match="source_fps and override_fps both say"):
+        tumble.load(tmp_path / "door.glb", source_fps=30, override_fps=30)

@@ -126,6 +126,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     reading("raw_times", FormatOption::RawTimes),
     reading("duplicates", FormatOption::Duplicates),
     reading("source_fps", FormatOption::SourceRate),
+    reading("override_fps", FormatOption::OverrideRate),
     OptionRule {
         bytes: Bytes::ByContent,
         ..reading("source_times", FormatOption::TimesApart)

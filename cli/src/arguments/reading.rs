@@ -35,11 +35,14 @@ pub(crate) struct ReadingArguments {
     /// Which of two different keys at the same time to keep
     #[arg(long, value_enum, value_name = "WHICH")]
     duplicates: Option<DuplicatesArgument>,
-    /// The frame rate of the keys of files without times; overrides a rate that the file states
+    /// The frame rate of the keys of files that state neither times nor a rate
     #[arg(long, value_name = "FPS")]
     source_fps: Option<FrameRate>,
+    /// The frame rate of the keys of files without times, instead of the one that they state
+    #[arg(long, value_name = "FPS", conflicts_with = "source_fps")]
+    override_fps: Option<FrameRate>,
     /// The key times of files without times (KITTI): a file of seconds, one line for each pose
-    #[arg(long, value_name = "FILE", conflicts_with = "source_fps")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["source_fps", "override_fps"])]
     source_times: Option<PathBuf>,
     /// What arrays or columns contain, if their names do not say it, such as rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
@@ -148,6 +151,7 @@ impl ReadingArguments {
     pub(crate) fn changes_keys(&self) -> bool {
         self.duplicates.is_some()
             || self.source_fps.is_some()
+            || self.override_fps.is_some()
             || self.source_times.is_some()
             || self.map.is_some()
             || self.time_unit.is_some()
@@ -165,6 +169,7 @@ impl ReadingArguments {
             raw_times,
             duplicates,
             source_fps,
+            override_fps,
             source_times,
             map,
             time_unit,
@@ -183,6 +188,7 @@ impl ReadingArguments {
             || animation.is_some()
             || duplicates.is_some()
             || source_fps.is_some()
+            || override_fps.is_some()
             || source_times.is_some()
             || map.is_some()
             || time_unit.is_some()
@@ -206,6 +212,7 @@ impl ReadingArguments {
                 Some(DuplicatesArgument::Both) => Duplicates::Both,
             },
             source_rate: self.source_fps,
+            override_rate: self.override_fps,
             frame_times: frame_times.transpose()?.map(Arc::new),
             map: self.map.clone(),
             time_unit: self.time_unit,
@@ -221,6 +228,7 @@ impl ReadingArguments {
             FormatOption::RawTimes => self.raw_times,
             FormatOption::Duplicates => self.duplicates.is_some(),
             FormatOption::SourceRate => self.source_fps.is_some(),
+            FormatOption::OverrideRate => self.override_fps.is_some(),
             FormatOption::TimesApart => self.source_times.is_some(),
             FormatOption::Map => self.map.is_some(),
             FormatOption::TimeUnit => self.time_unit.is_some(),

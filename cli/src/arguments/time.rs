@@ -118,7 +118,7 @@ pub(crate) struct EndFrameArguments {
     /// Where a clip ends between two frames: add a sample at its end (`key`), one frame more with the value of
     /// the end (`hold`), or nothing [default: key; hold in clips of formats without times; leave-out in NPY, and
     /// in results other than rotations]
-    #[arg(long, value_name = "HOW", value_parser = end_frame())]
+    #[arg(long, value_name = "HOW", value_parser = end_frame(), conflicts_with_all = ["times", "at"])]
     pub(crate) end_frame: Option<EndFrame>,
 }
 

@@ -49,7 +49,11 @@ pub static FORMAT: Format = Format {
         Feature::Lines,
         Feature::Bvh,
     ],
-    options: &[FormatOption::RawTimes, FormatOption::Sequence],
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::OverrideRate,
+        FormatOption::Sequence,
+    ],
 };
 
 /// Reads a BVH file; `-` is standard input.
@@ -74,7 +78,7 @@ pub fn read_bvh(
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     let hierarchy = Hierarchy::read(&mut lines)?;
-    let rows = FrameKeys::read(&mut lines, &hierarchy, options.raw_times)?;
+    let rows = FrameKeys::read(&mut lines, &hierarchy, options)?;
     let clip = rows.into_clip(&lines, &hierarchy)?;
     Ok(Loaded::of(clip, lines.warnings))
 }

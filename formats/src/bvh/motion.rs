@@ -8,10 +8,11 @@ use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::format::ReadOptions;
 use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use crate::origin::{SMALL, origin_at_rest, relative};
 use crate::quaternion::rounded;
-use crate::rate::{RateSource, itself, of};
+use crate::rate::{RateSource, itself, noticed_change, of, overridden};
 use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
@@ -28,19 +29,18 @@ pub(super) struct FrameKeys {
 }
 
 impl FrameKeys {
-    /// Reads everything after `MOTION`. With `raw_times` the frame time is the printed number, not that of a common
-    /// rate.
+    /// Reads everything after `MOTION`.
     pub(super) fn read<R: BufRead>(
         lines: &mut Lines<R>,
         hierarchy: &Hierarchy,
-        raw_times: bool,
+        options: &ReadOptions,
     ) -> Result<Self, Diagnostic> {
         let frames = read_frames(lines)?;
         let joints = || hierarchy.joints.iter();
         let rotating = joints().filter(|joint| !joint.rotations.is_empty());
         let moving = joints().filter(|joint| !joint.positions.is_empty());
         let mut rows = Self {
-            rate: read_rate(lines, raw_times)?,
+            rate: read_rate(lines, options)?,
             count: 0,
             rotations: Blocks::new(rotating.count()),
             positions: Blocks::new(moving.count()),
@@ -227,8 +227,12 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
     })
 }
 
-/// Reads the rate of `Frame Time: 0.0083333`.
-fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, Diagnostic> {
+/// Reads the rate of `Frame Time: 0.0083333`. With `raw_times` the frame time is the printed number, not that of a common
+/// rate.
+fn read_rate<R: BufRead>(
+    lines: &mut Lines<R>,
+    options: &ReadOptions,
+) -> Result<FrameRate, Diagnostic> {
     let Field { column, text } = read_field(
         lines,
         &["frame", "time"],
@@ -238,14 +242,32 @@ fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, D
     let period = number::parse(&text)
         .map_err(|(code, message)| lines.refuse(column, code, message))?
         .value;
-    let rate = match raw {
+    let rate = match options.raw_times {
         true => itself(period),
         false => of(&RateSource::FrameTime(&text)).map(|found| found.grid),
     };
-    rate.ok_or_else(|| {
+    let rate = rate.ok_or_else(|| {
         let message = format!("a frame time of {text} s; it is from 1e-9 to 1e9");
         lines.refuse(column, Code::BvhFrameTime, message)
-    })
+    })?;
+    if let Some(other) = options.override_rate {
+        if other != rate {
+            lines.warn(column, Code::TwoRates, overridden(rate, other));
+        }
+        return Ok(other);
+    }
+    if let Some(change) = noticed_change(period, rate) {
+        let (longer, percent) = match change > 0.0 {
+            true => ("longer", 100.0 * change),
+            false => ("shorter", -100.0 * change),
+        };
+        let message = format!(
+            "the frame time {text} is read as that of {rate} frames a second, which makes the clip {percent:.1} % \
+             {longer}; --raw-times keeps {text}"
+        );
+        lines.warn(column, Code::FrameTimeRounded, message);
+    }
+    Ok(rate)
 }
 
 /// The text after a line's keyword and colon.

@@ -12,6 +12,7 @@ use crate::motion::{ChannelInterpolation, Motion, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::printable::printable;
 use crate::signs::{continue_signs, signs_jump};
+use crate::text::cell::without_nul;
 
 /// Scales this close to 1 count as 1, because of rounding.
 const UNSCALED: f32 = 1e-5;
@@ -129,7 +130,24 @@ fn warnings(
         );
         Some(Diagnostic::new(&options.name, Code::NameChanged, message))
     });
-    left_out.into_iter().chain(changed).collect()
+    let has_nul = |clip: &SampledClip<'_>| {
+        let set = &clip.clip.set;
+        let mut names = (0..set.track_count()).map(|track| set.track_name(track));
+        names.find(|name| name.contains('\0'))
+    };
+    // Other formats replace it themselves, or store it.
+    let is_table = format.is_text && format.numbers_repeated_names;
+    let nul = clips.iter().filter(|_| is_table).find_map(has_nul);
+    let replaced = nul.map(|name| {
+        let written = without_nul(&name);
+        let message = format!("`{}` is written as `{written}`", printable(&name));
+        Diagnostic::new(&options.name, Code::NameChanged, message)
+    });
+    left_out
+        .into_iter()
+        .chain(changed)
+        .chain(replaced)
+        .collect()
 }
 
 fn no_room(

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble::{Channel, Engine, Error, FrameRate, SampleTimes, TrackError, TrackSet};
 
-use crate::end_frame::EndFrame;
+use crate::end_frame::{EndFrame, sample_to_end};
 use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::sample::{ChannelMethods, Samples};
 
@@ -45,7 +45,7 @@ impl Motion {
         let span = self.set.time_span();
         let timeline = frames.resolve(self.set.track_count(), span)?;
         let end = span.and_then(|span| EndFrame::Key.sample(&timeline, rate, span.1));
-        let samples = ChannelMethods::AUTHORED.sample_to_end(engine, self, &frames, end)?;
+        let samples = sample_to_end(&ChannelMethods::AUTHORED, engine, self, &frames, end)?;
         Ok(self.with_keys(&samples)?)
     }
 

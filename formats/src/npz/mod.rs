@@ -68,6 +68,7 @@ pub static FORMAT: Format = Format {
         FormatOption::RawTimes,
         FormatOption::Duplicates,
         FormatOption::SourceRate,
+        FormatOption::OverrideRate,
         FormatOption::Map,
         FormatOption::TimeUnit,
         FormatOption::Linear,

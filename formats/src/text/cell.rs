@@ -4,10 +4,19 @@ use std::borrow::Cow;
 
 /// A text as a cell. Spreadsheets interpret cells that begin with `=`, `+`, `-` or `@` as formulas, which may run
 /// programs. Such cells, and texts that look like escaped cells, get a leading quote, which spreadsheets do not
-/// display. This is not for numbers.
+/// display. NUL, which no reader of text takes, becomes `_`. This is not for numbers.
 pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
+    let text = without_nul(text);
     match is_formula(text.trim_start_matches(QUOTE)) {
         true => Cow::Owned(format!("{QUOTE}{text}")),
+        false => text,
+    }
+}
+
+/// A text in which NUL is `_`.
+pub(crate) fn without_nul(text: &str) -> Cow<'_, str> {
+    match text.contains('\0') {
+        true => Cow::Owned(text.replace('\0', "_")),
         false => Cow::Borrowed(text),
     }
 }
@@ -46,5 +55,6 @@ mod tests {
         ] {
             assert_eq!((&*text_cell(text), cell_text(cell)), (cell, text));
         }
+        assert_eq!(text_cell("left\0arm"), "left_arm");
     }
 }

@@ -122,10 +122,12 @@ class MotionLibrary:
         skeleton: _Skeleton | None = None,
         method: str = "slerp",
         source_fps: float | str | None = None,
+        override_fps: float | str | None = None,
         engine: Engine | None = None,
     ) -> MotionLibrary:
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them. Every clip of
         every file belongs to the library, in the order of the names. `source_fps`: of files without a rate.
+        `override_fps`: of all files without times, whatever rate they state.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
@@ -143,7 +145,7 @@ class MotionLibrary:
             paths += found
         clips: list[Clip] = []
         for path in paths:
-            clips += load(path, source_fps=source_fps).clips
+            clips += load(path, source_fps=source_fps, override_fps=override_fps).clips
         return cls(clips, method=method, skeleton=skeleton, engine=engine)
 
     def sample(

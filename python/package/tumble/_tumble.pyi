@@ -1060,6 +1060,7 @@ def load(
     *,
     format: str | None = None,
     source_fps: _Rate | None = None,
+    override_fps: _Rate | None = None,
     source_times: _Path | None = None,
     map: str | None = None,
     time_unit: _TimeUnit | None = None,

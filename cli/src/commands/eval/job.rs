@@ -8,7 +8,7 @@ use serde::Serialize;
 use tumble::method::SLERP;
 use tumble::{Engine, Error, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline};
 use tumble_formats::Feature;
-use tumble_formats::end_frame::{EndFrame, EndRows};
+use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::origin::origin_of;
@@ -251,7 +251,7 @@ impl EvaluationJob<'_> {
         let found = timeline.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
             self.device
-                .work(|engine| methods.sample_to_end(engine, clip, frames, samples.end))
+                .work(|engine| sample_to_end(&methods, engine, clip, frames, samples.end))
         });
         found.map_err(|error| Failure::evaluating(name, &error))
     }

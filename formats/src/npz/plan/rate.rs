@@ -1,12 +1,14 @@
 //! Frame rates in files: numbers that were rounded, perhaps several times.
 
+use tumble::FrameRate;
+
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::motion::grid;
 use crate::npz::archive::Archive;
 use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, read_numbers};
-use crate::rate::{Precision, RateSource, of, on_frames};
+use crate::rate::{Precision, RateSource, of, on_frames, overridden};
 
 impl ArchivePlan {
     /// Reads the rate in the first of these arrays that exists.
@@ -42,7 +44,7 @@ impl ArchivePlan {
                 Some(first) if first != rate => {
                     self.two_rates = Some(format!(
                         "`{before}` says {first} frames a second, `{name}` {rate}; the first is used, \
-                         --source-fps overrides it"
+                         --override-fps replaces it"
                     ));
                 }
                 Some(_) => {}
@@ -74,7 +76,7 @@ impl ArchivePlan {
         self.two_rates.get_or_insert_with(|| {
             format!(
                 "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
-                 {by_length:.3} a second; the first is used, --source-fps overrides it",
+                 {by_length:.3} a second; the first is used, --override-fps replaces it",
                 self.frames
             )
         });
@@ -90,22 +92,34 @@ impl ArchivePlan {
         options: &ReadOptions,
     ) -> Result<Vec<f64>, Diagnostic> {
         let Some(list) = self.times else {
-            let rate = options.source_rate.or(self.rate).ok_or_else(|| {
+            let rates = [options.override_rate, self.rate, options.source_rate];
+            let rate = rates.into_iter().flatten().next().ok_or_else(|| {
                 let message =
                     "the file has neither times nor a frame rate; give the rate with --source-fps";
                 Diagnostic::new(&archive.file, Code::NoRate, message)
             })?;
-            self.rate = Some(rate);
-            if options.source_rate.is_some() {
-                self.two_rates = None;
+            let is_other = |other: &FrameRate| self.rate.is_some_and(|stated| stated != *other);
+            if let Some(other) = options.override_rate {
+                let stated = self.rate.filter(|_| is_other(&other));
+                self.two_rates = stated.map(|stated| overridden(stated, other));
+            } else if let Some(other) = options.source_rate.filter(is_other) {
+                self.two_rates = Some(format!(
+                    "the file says {rate} frames a second, which is used; --source-fps {other} is for files that say \
+                     none, --override-fps replaces a rate"
+                ));
             }
+            self.rate = Some(rate);
             return Ok((0..self.frames as u64)
                 .map(|frame| rate.time_of(frame))
                 .collect());
         };
-        if let Some(rate) = options.source_rate {
+        if let Some(rate) = options.override_rate.or(options.source_rate) {
+            let option = match options.override_rate {
+                Some(_) => "--override-fps",
+                None => "--source-fps",
+            };
             let message = format!(
-                "the file has the time of every frame; --source-fps {rate} would be another, leave it out"
+                "the file has the time of every frame; {option} {rate} would be another, leave it out"
             );
             return Err(archive.refuse(list.member, Code::RateBesideTimes, message));
         }
