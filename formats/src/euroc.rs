@@ -58,6 +58,8 @@ pub static FORMAT: Format = Format {
         FormatOption::Duplicates,
         FormatOption::TimeUnit,
         FormatOption::Map,
+        FormatOption::BridgeGaps,
+        FormatOption::SourceOrder,
     ],
 };
 
