@@ -52,6 +52,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &[
         FormatOption::RawTimes,

@@ -35,17 +35,21 @@ pub enum Feature {
     BoxLength,
     /// Several clips in one file. For a format without this feature, each clip is written to a separate file.
     SeveralClips,
-    /// Separate key times for each channel. A format without this feature refuses such keys.
+    /// Separate key times for each track. A format without this feature refuses such keys.
+    TimesPerTrack,
+    /// Separate key times for each channel of a track. A format without this feature refuses such keys.
     TimesPerChannel,
     /// Times that are not frames of a rate. A format without this feature refuses them.
     UnevenTimes,
     /// Times that start elsewhere than at 0, for example times since 1970.
     Start,
+    /// The nanoseconds of times since 1970, which f64 rounds to 0.24 µs.
+    Nanoseconds,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -60,14 +64,16 @@ impl Feature {
         Self::World,
         Self::BoxLength,
         Self::SeveralClips,
+        Self::TimesPerTrack,
         Self::TimesPerChannel,
         Self::UnevenTimes,
         Self::Start,
+        Self::Nanoseconds,
     ];
 
     /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 11] = [
+    pub(crate) const OF_TABLES: [Self; 13] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -77,8 +83,10 @@ impl Feature {
         Self::Scales,
         Self::World,
         Self::SeveralClips,
+        Self::TimesPerTrack,
         Self::UnevenTimes,
         Self::Start,
+        Self::Nanoseconds,
     ];
 
     /// A short description.
@@ -99,9 +107,11 @@ impl Feature {
             Self::World => "poses in the world",
             Self::BoxLength => "length of boxes",
             Self::SeveralClips => "several clips",
+            Self::TimesPerTrack => "separate key times for each track",
             Self::TimesPerChannel => "separate key times for each channel",
             Self::UnevenTimes => "uneven times",
             Self::Start => "start",
+            Self::Nanoseconds => "nanoseconds of times since 1970",
         }
     }
 }

@@ -42,9 +42,11 @@ pub static FORMAT: Format = Format {
         Feature::Quaternions,
         Feature::TrackNames,
         Feature::Translations,
+        Feature::TimesPerTrack,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &[
         FormatOption::RawTimes,
