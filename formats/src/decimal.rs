@@ -5,6 +5,7 @@ use std::fmt;
 /// Units of this type in a second.
 const SECOND: i128 = 10i128.pow(SECOND_DECIMALS);
 const SECOND_DECIMALS: u32 = 24;
+const NANOSECOND: i128 = SECOND / 1_000_000_000;
 
 /// The largest magnitude of a time, three million years.
 const LARGEST: i128 = 100_000_000_000_000 * SECOND;
@@ -25,9 +26,16 @@ pub(crate) fn offset_of(first: i64) -> i64 {
     }
 }
 
-/// Seconds after a whole second as text, with their shortest decimals.
+/// Whether times that count from this whole second are of a clock, rather than of a recording that begins near 0.
+pub(crate) fn is_clock(whole: i64) -> bool {
+    offset_of(whole) != 0
+}
+
+/// Seconds after a whole second as text, with their shortest decimals. Times of a clock have nanoseconds: further
+/// digits would be those of the difference to the whole second.
 pub(crate) fn time_text(whole: i64, time: f64) -> String {
     match Decimal::of(whole, time).filter(|_| whole != 0) {
+        Some(sum) if is_clock(whole) => sum.to_clock().to_string(),
         Some(sum) => sum.to_string(),
         None => (whole as f64 + time).to_string(),
     }
@@ -93,9 +101,13 @@ impl Decimal {
         self.0 % SECOND == 0
     }
 
+    /// The time rounded to nanoseconds.
+    pub(crate) fn to_clock(self) -> Self {
+        Self(self.nanoseconds() * NANOSECOND)
+    }
+
     /// The nearest whole nanosecond.
     pub(crate) fn nanoseconds(self) -> i128 {
-        const NANOSECOND: i128 = SECOND / 1_000_000_000;
         (self.0 + NANOSECOND / 2).div_euclid(NANOSECOND)
     }
 
@@ -143,6 +155,19 @@ mod tests {
         let [first, last] = [first, last].map(|text| Decimal::parse(text).unwrap());
         let apart = last.since(first.whole_seconds());
         assert!((apart - 199_999_999_999_999.57).abs() < 0.02, "{apart}");
+    }
+
+    #[test]
+    fn times_of_a_clock_have_nanoseconds() {
+        for (whole, time, text) in [
+            (1_700_000_000, 0.000_796_556_5, "1700000000.000796557"),
+            (1_700_000_000, 1.0 / 3.0, "1700000000.333333333"),
+            (1_700_000_000, 2.0, "1700000002"),
+            (-1_700_000_000, 0.25, "-1699999999.75"),
+            (0, 1.0 / 3.0, "0.3333333333333333"),
+        ] {
+            assert_eq!(time_text(whole, time), text);
+        }
     }
 
     #[test]

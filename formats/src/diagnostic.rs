@@ -241,6 +241,7 @@ codes! {
     WholeTimes = "E410", "times that are whole numbers", "The unit is not known; give it by `--time-unit s`, `ms`, `us` or `ns`.";
     ListLength = "E411" elsewhere, "a list of another length", "A rotation needs four numbers of a list, a translation or a scale three; `--map NAME=LIST[3:7]` selects them.";
     NoRows = "E412", "a table without rows", "It has columns but no keys.";
+    ColumnsAmbiguous = "E414", "columns of two meanings", "The names `x y z` are a quaternion's with `w`, and a position's beside a quaternion whose columns have a number after their names (`x_1`, `x.1`). `--map` says which they are.";
     SeveralClips = "E413" elsewhere, "several clips for one table", "A table with a row for each time contains one clip. Write the clips to separate files, or as Parquet.";
     // E5xx and W5xx: trajectories.
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
@@ -309,9 +310,10 @@ codes! {
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
     TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file; `--source-fps` is for files that state none.";
-    Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds have nineteen (ORB-SLAM writes them). `--time-unit ns` states the unit and avoids this warning.";
+    TimeUnit = "W305", "times in another unit than seconds", "Seconds since 1970 have ten digits, milliseconds thirteen, microseconds sixteen, nanoseconds nineteen (ORB-SLAM writes them). A first time from 1e11 on is taken for milliseconds, from 1e14 on for microseconds, from 1e17 on for nanoseconds. `--time-unit` states the unit and avoids this warning.";
     ArraysNotRead = "W306", "arrays that are not read", "This is no error: the rotations were found in other arrays, and the names of these are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. `betas` and `gender` are the shape of a body, which only `--body-model` uses. A result in the same layout keeps arrays that are constant.";
     Bridged = "W401" elsewhere, "keys that are missing", "Cells are blank or NaN. Because of `--bridge-gaps`, the track is interpolated between its other keys there.";
+    RowsSorted = "W403", "rows that are not in the order of their times", "The rows of a track are sorted by time. If the clock was set back instead, so that sorting would mix two recordings, they are refused (E026).";
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are not known, or a list has more numbers than `--map` uses. `--map` says what columns are.";
     FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory has a time, a position and a quaternion, or the twelve numbers of a matrix in KITTI. Numbers after these, such as a covariance or velocities, are not read.";
     FbxBeside = "W701", "content that is not motion", "Only nodes and their animation are read from FBX. Meshes, skins, materials and other content are not.";

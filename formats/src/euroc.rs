@@ -53,12 +53,15 @@ pub static FORMAT: Format = Format {
         Feature::Curves,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,
         FormatOption::TimeUnit,
         FormatOption::Map,
+        FormatOption::BridgeGaps,
+        FormatOption::SourceOrder,
     ],
 };
 

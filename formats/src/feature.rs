@@ -38,17 +38,21 @@ pub enum Feature {
     BoxLength,
     /// Several clips in one file. For a format without this feature, each clip is written to a separate file.
     SeveralClips,
-    /// Separate key times for each channel. A format without this feature refuses such keys.
+    /// Separate key times for each track. A format without this feature refuses such keys.
+    TimesPerTrack,
+    /// Separate key times for each channel of a track. A format without this feature refuses such keys.
     TimesPerChannel,
     /// Times that are not frames of a rate. A format without this feature refuses them.
     UnevenTimes,
     /// Times that start elsewhere than at 0, for example times since 1970.
     Start,
+    /// The nanoseconds of times since 1970, which f64 rounds to 0.24 µs.
+    Nanoseconds,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -64,14 +68,16 @@ impl Feature {
         Self::World,
         Self::BoxLength,
         Self::SeveralClips,
+        Self::TimesPerTrack,
         Self::TimesPerChannel,
         Self::UnevenTimes,
         Self::Start,
+        Self::Nanoseconds,
     ];
 
     /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 12] = [
+    pub(crate) const OF_TABLES: [Self; 14] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -82,8 +88,10 @@ impl Feature {
         Self::Curves,
         Self::World,
         Self::SeveralClips,
+        Self::TimesPerTrack,
         Self::UnevenTimes,
         Self::Start,
+        Self::Nanoseconds,
     ];
 
     /// A short description.
@@ -105,9 +113,11 @@ impl Feature {
             Self::World => "poses in the world",
             Self::BoxLength => "length of boxes",
             Self::SeveralClips => "several clips",
+            Self::TimesPerTrack => "separate key times for each track",
             Self::TimesPerChannel => "separate key times for each channel",
             Self::UnevenTimes => "uneven times",
             Self::Start => "start",
+            Self::Nanoseconds => "nanoseconds of times since 1970",
         }
     }
 }

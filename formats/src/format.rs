@@ -79,6 +79,8 @@ pub enum FormatOption {
     TimeUnit,
     /// [`ReadOptions::bridge_gaps`].
     BridgeGaps,
+    /// [`ReadOptions::source_order`].
+    SourceOrder,
     /// [`ReadOptions::keyframes`].
     Keyframes,
     /// [`MotionOptions::sequence`].
@@ -146,6 +148,9 @@ pub struct ReadOptions {
     pub map: Option<String>,
     /// The unit of times that are whole numbers: `s`, `ms`, `us` or `ns`.
     pub time_unit: Option<TimeUnit>,
+    /// The order of a quaternion's components, for trajectories whose lines have another one than their format
+    /// defines.
+    pub source_order: Option<ComponentOrder>,
     /// Whether keys with missing numbers (blank cells, nulls, NaN) are left out, so that their track is interpolated
     /// across them. Otherwise missing numbers are an error.
     pub bridge_gaps: bool,
@@ -178,7 +183,32 @@ tumble::names! {
     Nanoseconds => "ns",
 }
 
+/// Larger times are not seconds since 1970: it is the year 5138.
+pub(crate) const LARGEST_SECONDS: f64 = 1e11;
+
 impl TimeUnit {
+    /// The unit of times since 1970 that are too large to be seconds, from the first of them; `None` if it may be
+    /// seconds. Each unit has the years from 1973 to 5138 for itself.
+    pub(crate) fn of_large(first: f64) -> Option<Self> {
+        match first.abs() {
+            size if size >= 1e17 => Some(Self::Nanoseconds),
+            size if size >= 1e14 => Some(Self::Microseconds),
+            size if size >= LARGEST_SECONDS => Some(Self::Milliseconds),
+            _ => None,
+        }
+    }
+
+    /// The words of a warning that times, of which this is the first, are taken for times in this unit.
+    pub(crate) fn assumed(self, first: impl fmt::Display) -> String {
+        let word = match self {
+            Self::Seconds => "seconds",
+            Self::Milliseconds => "milliseconds",
+            Self::Microseconds => "microseconds",
+            Self::Nanoseconds => "nanoseconds",
+        };
+        format!("the time {first} is taken for {word}")
+    }
+
     /// The power of ten of this unit in seconds.
     pub(crate) fn power(self) -> i32 {
         match self {

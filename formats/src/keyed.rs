@@ -16,7 +16,7 @@ pub enum KeyedError {
     /// Channels have keys at different times.
     #[error(
         "track {track} (`{name}`) has keys at other times than those before it; sample them \
-         together with `tumble eval --fps`"
+         together with `tumble eval --fps`, or write Parquet or Arrow, in which each track may have its own times"
     )]
     TimesDiffer {
         /// Index of the first track whose times differ, from 0.
@@ -50,7 +50,7 @@ pub enum KeysError {
 }
 
 /// The keys of a clip as a file of `format` stores them, as samples with a flag. If the flag is `true`, the format
-/// takes the keys of each channel from the clip, at their separate times
+/// takes the keys of each channel or of each track from the clip, at their separate times
 /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)), and the samples are only those at the first
 /// and the last key. This is so in a format with separate key times, if the keys are not samples ([`keyed`]) or if
 /// `is_kept`: the input's file is written again with other keys.
@@ -64,9 +64,18 @@ pub fn keys_for(
     is_kept: bool,
 ) -> Result<(Samples, bool), KeysError> {
     let keys_per_channel = format.supports(Feature::TimesPerChannel);
+    let has_one_list = |track| {
+        track_times(clip, track).is_some() && !clip.channel(track).has(ChannelInterpolation::Cubic)
+    };
+    let takes_keys = match keys_per_channel {
+        true => !clip.is_world,
+        false => {
+            format.supports(Feature::TimesPerTrack) && (0..clip.set.track_count()).all(has_one_list)
+        }
+    };
     match keyed(clip) {
         Ok(samples) if !(is_kept && keys_per_channel) => Ok((samples, false)),
-        Err(error) if !keys_per_channel || clip.is_world => Err(error.into()),
+        Err(error) if !takes_keys => Err(error.into()),
         _ => Ok((clip.ends(&Engine::new(Device::Cpu)?)?, true)),
     }
 }
@@ -135,7 +144,27 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
     Ok(samples)
 }
 
+/// The times of all channels of a track that have several keys; `None` if they differ.
+pub(crate) fn track_times(clip: &Motion, track: usize) -> Option<&[f64]> {
+    let channels = [Channel::Translation, Channel::Scale];
+    let vectors = channels
+        .into_iter()
+        .filter_map(|channel| clip.set.vector_keys(channel, track));
+    let rotations = clip.set.track(track).times;
+    let mut longest = rotations;
+    for keys in vectors {
+        let has_several = keys.times.len() > 1 && longest.len() > 1;
+        if has_several && keys.times != longest {
+            return None;
+        }
+        if keys.times.len() > longest.len() {
+            longest = keys.times;
+        }
+    }
+    Some(longest)
+}
+
 /// The key of a sample, or the last one.
-fn at<T: Copy>(keys: &[T], sample: usize) -> Option<T> {
+pub(crate) fn at<T: Copy>(keys: &[T], sample: usize) -> Option<T> {
     keys.get(sample).or(keys.last()).copied()
 }

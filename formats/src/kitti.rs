@@ -12,7 +12,9 @@ use tumble::FrameRate;
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
-use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
+use crate::format::{
+    Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
+};
 use crate::motion::SampledClip;
 use crate::rotation_matrix::of_matrix;
 use crate::source::Source;
@@ -66,17 +68,26 @@ pub fn read_frame_times(
     let mut found = FrameTimes {
         times: Vec::new(),
         decimals: 0,
+        warnings: Vec::new(),
     };
+    let mut unit = None;
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
         for (column, token) in tokens(&text) {
             let read = number::parse(token);
-            read.map_err(|(code, message)| lines.refuse(column, code, message))?;
-            let Some(time) = Decimal::parse(token) else {
+            let read = read.map_err(|(code, message)| lines.refuse(column, code, message))?;
+            if found.times.is_empty()
+                && let Some(large) = TimeUnit::of_large(read.value)
+            {
+                unit = Some(large);
+                lines.warn(column, Code::TimeUnit, large.assumed(token));
+            }
+            let power = unit.map_or(0, TimeUnit::power);
+            let Some(time) = Decimal::parse_in(token, power) else {
                 let message = format!("the time {token} is out of range");
                 return Err(lines.refuse(column, Code::TumTime, message));
             };
-            found.decimals = found.decimals.max(decimal_count(token, 0));
+            found.decimals = found.decimals.max(decimal_count(token, power));
             found.times.push(time);
         }
         lines.reuse(line);
@@ -85,6 +96,7 @@ pub fn read_frame_times(
         let message = "no times; write the seconds of each frame, one a line".to_owned();
         return Err(lines.refuse_end(Code::Time, message));
     }
+    found.warnings = lines.warnings;
     Ok(found)
 }
 
@@ -149,7 +161,8 @@ pub fn read_kitti(
             }
             poses.times.clone_from(&found.times);
             poses.decimals = found.decimals;
-            poses.into_clip(name, lines.warnings, options)
+            let warnings = [&*found.warnings, &*lines.warnings].concat();
+            poses.into_clip(name, warnings, options)
         }
         (None, Some(rate)) => {
             let times = (0..count as u64).map(|frame| rate.time_of(frame)).collect();

@@ -11,7 +11,7 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, is_clock};
 use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
@@ -403,9 +403,20 @@ impl SampledClip<'_> {
     }
 
     /// The time of a sample as text; `None` if it is out of range. If the samples are not frames of a rate, it has at
-    /// least nine decimals, so that readers do not take it for a rounded time.
+    /// least nine decimals, so that readers do not take it for a rounded time. Times of a clock have nanoseconds,
+    /// unless two samples are nearer to each other.
     pub(crate) fn time_digits(&self, sample: usize) -> Option<String> {
-        let time = Decimal::of(self.clip.time_offset, self.times[sample])?;
+        const NEAR: f64 = 2e-9;
+        let exact = Decimal::of(self.clip.time_offset, self.times[sample])?;
+        let beside = [sample.checked_sub(1), Some(sample + 1)]
+            .into_iter()
+            .flatten();
+        let mut beside = beside.filter_map(|beside| self.times.get(beside));
+        let is_near = beside.any(|time| (time - self.times[sample]).abs() < NEAR);
+        let time = match is_clock(self.clip.time_offset) && !is_near {
+            true => exact.to_clock(),
+            false => exact,
+        };
         Some(match self.rate {
             Some(_) => time.to_string(),
             None if time.is_whole() => time.to_string(),

@@ -16,6 +16,8 @@ pub struct FrameTimes {
     pub(crate) times: Vec<Decimal>,
     /// The largest number of decimals of a time.
     pub(crate) decimals: u32,
+    /// The warnings about the file.
+    pub(crate) warnings: Vec<Diagnostic>,
 }
 
 /// Reads the times in a file, in seconds; `-` is standard input.

@@ -18,6 +18,7 @@ use crate::keys::{Origin, select};
 use crate::motion::grid::restore;
 use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::TRAJECTORY_TRACK;
+use crate::quaternion::ComponentOrder;
 use crate::rate::{Precision, last_digit_power};
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
@@ -67,11 +68,14 @@ pub static FORMAT: Format = Format {
         Feature::Curves,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,
         FormatOption::TimeUnit,
+        FormatOption::BridgeGaps,
+        FormatOption::SourceOrder,
     ],
 };
 
@@ -109,6 +113,11 @@ pub(crate) fn read_lines(
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     let mut poses = TrajectoryPoses {
         unit: options.time_unit.or(format.unit),
+        is_w_first: match options.source_order {
+            Some(order) => order == ComponentOrder::Wxyz,
+            None => format.is_w_first,
+        },
+        bridges_gaps: options.bridge_gaps,
         ..TrajectoryPoses::default()
     };
     while let Some(line) = lines.next()? {
@@ -122,11 +131,9 @@ pub(crate) fn read_lines(
         let message = format!("no poses; a line is `{}`", format.numbers);
         return Err(lines.refuse_end(Code::TumEmpty, message));
     }
+    poses.leave_out_gaps(&mut lines)?;
     poses.into_clip(name, lines.warnings, options)
 }
-
-/// If the first time is at least this many seconds (three billion years), times are nanoseconds since 1970.
-const NANOSECONDS: f64 = 1e17;
 
 /// The poses of a body in a file.
 #[derive(Default)]
@@ -138,6 +145,10 @@ pub(crate) struct TrajectoryPoses {
     columns: usize,
     /// The unit of the times.
     unit: Option<TimeUnit>,
+    /// Whether w is the first component of quaternions.
+    is_w_first: bool,
+    /// Whether poses with numbers that are NaN are left out.
+    bridges_gaps: bool,
     pub(crate) positions: Vec<DVec3>,
     pub(crate) rotations: Vec<DQuat>,
     /// The line of each pose.
@@ -180,20 +191,31 @@ impl TrajectoryPoses {
             return Err(lines.refuse(column, Code::TumPose, message));
         }
         let mut numbers = [0.0; 8];
-        for (number, (column, token)) in numbers.iter_mut().zip(tokens(line)) {
-            let read = number::parse(token)
-                .map_err(|(code, message)| lines.refuse(column, code, message))?;
+        for (index, (column, token)) in tokens(line).enumerate().take(numbers.len()) {
+            if index > 0 && self.bridges_gaps && number::is_nan(token) {
+                numbers[index] = f64::NAN;
+                continue;
+            }
+            let read = number::parse(token).map_err(|(code, message)| {
+                let remedy = match code {
+                    Code::NotFinite if index > 0 => ", or leave the pose out with --bridge-gaps",
+                    _ => "",
+                };
+                lines.refuse(column, code, message + remedy)
+            })?;
             if read.vanished {
                 let message = format!("`{token}` is too small for f32; it becomes 0");
                 lines.warn(column, Code::Tiny, message);
             }
-            *number = read.value;
+            numbers[index] = read.value;
         }
         let (column, token) = tokens(line).next().unwrap_or((1, ""));
-        if self.unit.is_none() && self.times.is_empty() && numbers[0].abs() >= NANOSECONDS {
-            self.unit = Some(TimeUnit::Nanoseconds);
-            let message = format!("the time {token} is taken for nanoseconds");
-            lines.warn(column, Code::Nanoseconds, message);
+        if self.unit.is_none()
+            && self.times.is_empty()
+            && let Some(unit) = TimeUnit::of_large(numbers[0])
+        {
+            self.unit = Some(unit);
+            lines.warn(column, Code::TimeUnit, unit.assumed(token));
         }
         let power = self.unit.map_or(0, TimeUnit::power);
         let Some(time) = Decimal::parse_in(token, power) else {
@@ -203,7 +225,7 @@ impl TrajectoryPoses {
             return Err(lines.refuse(column, Code::TumTime, message));
         };
         self.decimals = self.decimals.max(decimal_count(token, power));
-        if format.is_w_first {
+        if self.is_w_first {
             numbers[4..].rotate_left(1);
         }
         let [_, x, y, z, qx, qy, qz, qw] = numbers;
@@ -212,6 +234,41 @@ impl TrajectoryPoses {
         self.positions.push(DVec3::new(x, y, z));
         self.rotations.push(DQuat::from_xyzw(qx, qy, qz, qw));
         self.lines.push(lines.number);
+        Ok(())
+    }
+
+    /// Removes the poses that have a number that is NaN.
+    fn leave_out_gaps<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(), Diagnostic> {
+        let poses = self.positions.iter().zip(&self.rotations);
+        let gaps = poses.map(|(position, rotation)| position.is_nan() || rotation.is_nan());
+        let gaps: Vec<bool> = gaps.collect();
+        let Some(first) = gaps.iter().position(|&is_gap| is_gap) else {
+            return Ok(());
+        };
+        let count = gaps.iter().filter(|&&is_gap| is_gap).count();
+        if count == gaps.len() {
+            let message = "no pose is without a gap".to_owned();
+            return Err(lines.refuse_end(Code::NotFinite, message));
+        }
+        let mut warning = Diagnostic {
+            location: Some(Location::Text {
+                line: self.lines[first],
+                column: 1,
+            }),
+            ..Diagnostic::new(
+                lines.file(),
+                Code::Bridged,
+                format!(
+                    "{count} poses have numbers that are missing; the path is interpolated from the others"
+                ),
+            )
+        };
+        warning.count = count as u64;
+        lines.warnings.push(warning);
+        retain(&mut self.times, &gaps);
+        retain(&mut self.positions, &gaps);
+        retain(&mut self.rotations, &gaps);
+        retain(&mut self.lines, &gaps);
         Ok(())
     }
 
@@ -287,6 +344,12 @@ impl TrajectoryPoses {
             .chain(warnings.into_list().into_iter().map(from_offset));
         Ok(Loaded::of(clip, warnings.collect()))
     }
+}
+
+/// Removes the entries of a list that are gaps.
+fn retain<T>(list: &mut Vec<T>, gaps: &[bool]) {
+    let mut gaps = gaps.iter();
+    list.retain(|_| !gaps.next().is_some_and(|&is_gap| is_gap));
 }
 
 /// Number of decimals in seconds of a number in a unit of `10^power` seconds.

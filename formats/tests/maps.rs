@@ -1,8 +1,11 @@
 //! Tables whose rotations are no quaternions, and those with gaps.
 
 use glam::{Quat, Vec3};
+use tumble::Channel;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::{Code, Diagnostic, Loaded, ReadOptions};
+
+use crate::support::shared_data;
 
 fn read(text: &str, map: Option<&str>, bridge_gaps: bool) -> Result<Loaded, Diagnostic> {
     let options = ReadOptions {
@@ -118,4 +121,278 @@ fn gaps_are_refused_or_bridged() {
     }
     let infinite = text.replace("nan", "inf");
     assert!(read(&infinite, None, true).is_err());
+}
+
+fn rows(text: &str, map: Option<&str>) -> Result<Loaded, Diagnostic> {
+    let options = ReadOptions {
+        map: map.map(str::to_owned),
+        source_rate: tumble::FrameRate::new(10, 1).ok(),
+        ..ReadOptions::default()
+    };
+    read_csv("a.csv", text.into(), &options)
+}
+
+/// The positions of the first track, as they are in the file.
+fn positions(loaded: &Loaded) -> Vec<Vec3> {
+    let keys = loaded.clips[0].set.vector_keys(Channel::Translation, 0);
+    keys.map_or(Vec::new(), |keys| keys.keys.to_vec())
+}
+
+#[test]
+fn columns_that_a_map_names_are_never_left_out() {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let quarter = Quat::from_xyzw(0.0, 0.0, half, half);
+    let robot = "frame,root_x,root_y,root_z,rot_w,rot_x,rot_y,rot_z,knee(rad)\n\
+                 0,0,0,0,1,0,0,0,0.1\n\
+                 1,1,2,3,0.70710678,0,0,0.70710678,0.1\n";
+    let named = robot.replace("root_x,root_y,root_z", "root.tx,root.ty,root.tz");
+    let angles = "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n0.1,1,2,3,0,0,90\n";
+    for (text, map, left_out) in [
+        (
+            robot,
+            "tx=root_x,ty=root_y,tz=root_z,root=rot_w..rot_z:wxyz",
+            1,
+        ),
+        (
+            robot,
+            "root.tx=root_x,root.ty=root_y,root.tz=root_z,root=rot_w..rot_z:wxyz",
+            1,
+        ),
+        (&named, "root=rot_w..rot_z:wxyz", 1),
+        (
+            robot,
+            "root=rot_w..rot_z:wxyz,root.translation=root_x..root_z",
+            1,
+        ),
+        (angles, "tx=x,ty=y,tz=z,body=roll..yaw:xyz:deg", 0),
+    ] {
+        let loaded = match text.starts_with("frame") {
+            true => rows(text, Some(map)),
+            false => read(text, Some(map), false),
+        };
+        let loaded = loaded.unwrap_or_else(|error| panic!("{map}: {error}"));
+        assert_eq!(
+            positions(&loaded),
+            [Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)],
+            "{map}"
+        );
+        let track = loaded.clips[0].set.track(0);
+        assert_eq!(track.times, [0.0, 0.1], "{map}");
+        assert!(
+            track.keys[1].abs_diff_eq(quarter, 1e-7),
+            "{map}: {}",
+            track.keys[1]
+        );
+        assert_eq!(
+            loaded.warnings.len(),
+            left_out,
+            "{map}: {:?}",
+            loaded.warnings
+        );
+    }
+    // Whose position it is cannot be told, or is no position.
+    for map in [
+        "tx=x,ty=y,tz=z,a=roll..yaw:xyz,b=roll..yaw:rotvec",
+        "qw=x,body=roll..yaw:xyz",
+    ] {
+        let refused = read(angles, Some(map), false).unwrap_err();
+        assert_eq!(refused.code, Code::Map, "{refused}");
+        assert!(refused.message.contains("nothing reads `"), "{refused}");
+    }
+    let both = "time,a.x,a.y,a.z,a.w,r,p,q\n0,0,0,0,1,0,0,0\n";
+    let loaded = read(both, Some("b=r..q:xyz"), false).unwrap();
+    assert_eq!(loaded.clips[0].set.track_count(), 2);
+    let refused = read(both, Some("a=r..q:xyz"), false).unwrap_err();
+    assert_eq!(refused.code, Code::ColumnTwice, "{refused}");
+    // The rows of several bodies are not one track.
+    let bodies = "time,body,r,p,q\n0,a,0,0,0\n0,b,0,0,1\n1,a,0,0,2\n1,b,0,0,3\n";
+    let loaded = read(bodies, Some("rotation=r..q:xyz"), false).unwrap();
+    let set = &loaded.clips[0].set;
+    assert_eq!(
+        (set.track_name(0), set.track_name(1)),
+        ("a".to_owned(), "b".to_owned())
+    );
+    assert_eq!(set.track(1).times, [0.0, 1.0]);
+}
+
+#[test]
+fn a_position_is_not_taken_for_a_quaternion() {
+    for (x, y, z) in [
+        ("x_1", "y_1", "z_1"),
+        ("x.1", "y.1", "z.1"),
+        ("qx", "qy", "qz"),
+    ] {
+        let text =
+            format!("time,x,y,z,{x},{y},{z},w\n0,0,0,0.01,0,0,0,1\n1,0.05,0.02,0.01,0,0,0.6,0.8\n");
+        let refused = read(&text, None, false).unwrap_err();
+        assert_eq!(refused.code, Code::ColumnsAmbiguous, "{refused}");
+        // The message has the remedy.
+        let (_, map) = refused.message.split_once("--map '").unwrap();
+        let loaded = read(&text, map.strip_suffix('\''), false).unwrap();
+        assert_eq!(loaded.warnings, []);
+        assert_eq!(positions(&loaded)[1], Vec3::new(0.05, 0.02, 0.01));
+        assert_eq!(
+            loaded.clips[0].set.track(0).keys[1],
+            Quat::from_xyzw(0.0, 0.0, 0.6, 0.8)
+        );
+    }
+    // Columns of one name are told apart by their numbers.
+    let text = "time,X,Y,Z,W,X,Y,Z,\n0,0,0,0,1,1,2,3,\n1,0,0,0.6,0.8,4,5,6,\n";
+    let loaded = read(text, Some("body=X..W,body.translation=X.1..Z.1"), false).unwrap();
+    assert_eq!(positions(&loaded)[1], Vec3::new(4.0, 5.0, 6.0));
+    let refused = read(&text.to_lowercase(), None, false).unwrap_err();
+    assert!(refused.message.contains("the second is `x.1`"), "{refused}");
+}
+
+#[test]
+fn rows_are_frames_where_nothing_else_says_their_times() {
+    let text = "x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,2,3,0,0,0.6,0.8\n";
+    let loaded = rows(text, None).unwrap();
+    assert_eq!(loaded.clips[0].set.track(0).times, [0.0, 0.1]);
+    assert_eq!(loaded.clips[0].rate, tumble::FrameRate::new(10, 1).ok());
+    assert_eq!(positions(&loaded)[1], Vec3::new(1.0, 2.0, 3.0));
+    // Each clip and each track begins anew.
+    let long = "clip,track,x,y,z,w\na,hip,0,0,0,1\na,knee,0,0,0,1\na,hip,0,0,0,1\nb,hip,0,0,0,1\n";
+    let loaded = rows(long, None).unwrap();
+    let times = |clip: usize, track| loaded.clips[clip].set.track(track).times.to_vec();
+    assert_eq!(
+        (times(0, 0), times(0, 1), times(1, 0)),
+        (vec![0.0, 0.1], vec![0.0], vec![0.0])
+    );
+    assert_eq!(read(text, None, false).unwrap_err().code, Code::NoTimes);
+    assert_eq!(
+        rows("0,0,0,1\n0,0,0,1\n", None).unwrap_err().code,
+        Code::NoTimes
+    );
+}
+
+#[test]
+fn rows_are_sorted_with_a_warning_in_all_tables() {
+    for text in [
+        "time,a.x,a.y,a.z,a.w\n0,0,0,0,1\n2,0,0,0,1\n1,0,0,0.6,0.8\n",
+        "time,x,y,z,w\n0,0,0,0,1\n2,0,0,0,1\n1,0,0,0.6,0.8\n",
+        "time,track,x,y,z,w\n0,a,0,0,0,1\n2,a,0,0,0,1\n1,a,0,0,0.6,0.8\n",
+    ] {
+        let loaded = read(text, None, false).unwrap();
+        let warning = &loaded.warnings[0];
+        assert!(
+            warning.to_string().starts_with("a.csv:4:1: warning[W403]"),
+            "{warning}"
+        );
+        let track = loaded.clips[0].set.track(0);
+        assert_eq!(track.times, [0.0, 1.0, 2.0]);
+        assert_eq!(track.keys[1], Quat::from_xyzw(0.0, 0.0, 0.6, 0.8));
+    }
+    let rows = [0.0, 1.0, 2.0, 0.5, 1.5, 2.5].map(|time| format!("{time},0,0,0,1\n"));
+    for names in ["time,x,y,z,w", "time,a.x,a.y,a.z,a.w"] {
+        let refused = read(&format!("{names}\n{}", rows.concat()), None, false).unwrap_err();
+        assert_eq!(refused.code, Code::TimeNotIncreasing);
+        assert!(refused.to_string().starts_with("a.csv:5:1: "), "{refused}");
+        assert!(
+            refused.message.contains("set back from 2 s to 0.5 s"),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
+fn times_too_large_for_seconds_have_their_unit() {
+    for (factor, decimals) in [("", ""), ("125", ""), ("125000", ".5"), ("125000000", "")] {
+        let row = |second: u32, z: f32, w: f32| format!("{second}{factor}{decimals},0,0,{z},{w}\n");
+        let text = format!(
+            "time,x,y,z,w\n{}{}",
+            row(1_700_000_000, 0.0, 1.0),
+            row(1_700_000_001, 0.6, 0.8)
+        );
+        let loaded = read(&text, None, false).unwrap();
+        let clip = &loaded.clips[0];
+        assert_eq!(clip.time_offset, 1_700_000_000, "{text}");
+        let times = clip.set.track(0).times;
+        assert!((times[1] - times[0] - 1.0).abs() < 1e-9, "{times:?}");
+        let codes: Vec<Code> = loaded.warnings.iter().map(|it| it.code).collect();
+        let expected: &[Code] = if factor.is_empty() {
+            &[]
+        } else {
+            &[Code::TimeUnit]
+        };
+        assert_eq!(codes, expected, "{text}");
+    }
+}
+
+/// A row for each of many tracks is read in a time that grows with their number, which a search for each column among
+/// all would not: 60 000 tracks took 40 s.
+#[test]
+fn tables_of_many_tracks_are_read() {
+    let tracks = 30_000;
+    let names = (0..tracks).map(|track| format!(",t{track}.x,t{track}.y,t{track}.z,t{track}.w"));
+    let text = format!(
+        "time{}\n0{}\n",
+        names.collect::<String>(),
+        ",0,0,0,1".repeat(tracks)
+    );
+    assert_eq!(
+        read(&text, None, false).unwrap().clips[0].set.track_count(),
+        tracks
+    );
+}
+
+/// The tables of others, with values by SciPy.
+#[test]
+fn tables_of_others_have_their_values() {
+    let Some(folder) = shared_data().map(|folder| folder.join("meaning")) else {
+        return;
+    };
+    let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let last = |loaded: &Loaded| {
+        let track = loaded.clips[0].set.track(0);
+        let key = *track.keys.last().unwrap();
+        (
+            *track.times.last().unwrap(),
+            *positions(loaded).last().unwrap(),
+            key,
+        )
+    };
+    let options = |map: &str| ReadOptions {
+        map: Some(map.to_owned()),
+        source_rate: tumble::FrameRate::new(50, 1).ok(),
+        ..ReadOptions::default()
+    };
+    let map = "tx=root_pos_x,ty=root_pos_y,tz=root_pos_z,root=root_rot_w..root_rot_z:wxyz";
+    let loaded = read_csv(
+        "md.csv",
+        text("csv-map-entry-ignored/md.csv").into(),
+        &options(map),
+    )
+    .unwrap();
+    let (time, position, key) = last(&loaded);
+    assert_eq!((time, position), (0.6, Vec3::new(1.0, 2.0, 0.0)));
+    assert!(
+        key.abs_diff_eq(Quat::from_xyzw(0.0, 0.0, 0.258_819_04, 0.965_925_8), 2e-7),
+        "{key}"
+    );
+    let map = "tx=x,ty=y,tz=z,body=roll..yaw:xyz:deg";
+    let loaded = read(&text("csv-map-entry-ignored/rpy.csv"), Some(map), false).unwrap();
+    let (time, position, key) = last(&loaded);
+    assert_eq!((time, position), (1.0, Vec3::new(10.0, 20.0, 30.0)));
+    assert!(
+        key.abs_diff_eq(Quat::from_xyzw(0.0, 0.0, 0.766_044_44, 0.642_787_64), 2e-7),
+        "{key}"
+    );
+    let x1 = text("csv-position-as-quaternion/x1.csv");
+    assert_eq!(
+        read(&x1, None, false).unwrap_err().code,
+        Code::ColumnsAmbiguous
+    );
+    let loaded = rows(&text("csv-messages/g1h.csv"), None).unwrap();
+    assert_eq!(positions(&loaded)[1], Vec3::new(0.033_333, 0.066_667, 0.0));
+    for (name, words) in [
+        ("motive.csv", "delete the lines before it"),
+        ("vicon.csv", "frame_index=Frame"),
+        ("vins.csv", "--from euroc"),
+        ("g1.csv", "begin the file with the names"),
+    ] {
+        let refused = read(&text(&format!("csv-messages/{name}")), None, false).unwrap_err();
+        assert_eq!(refused.code, Code::NoTimes, "{refused}");
+        assert!(refused.message.contains(words), "{refused}");
+    }
 }

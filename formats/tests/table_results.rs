@@ -16,6 +16,7 @@ use tumble::{
 use tumble_formats::arrow::read_arrow;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::{MotionOptions, ResultShape, WriteError};
+use tumble_formats::keyed::{keyed, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::parquet::read_parquet;
 use tumble_formats::poses::{Poses, TRANSFORM};
@@ -427,4 +428,99 @@ fn rows_are_handed_on_before_the_end() {
             );
         }
     }
+}
+
+/// Times since 1970 are timestamps of nanoseconds, which f64 would round to 0.24 µs.
+#[test]
+fn nanoseconds_of_a_clock_come_back() {
+    let times = [0.763_555_584, 0.813_555_585, 2.000_000_001];
+    let mut clip = Motion {
+        time_offset: 1_403_636_579,
+        ..Motion::default()
+    };
+    clip.set.push("a", &times, &rotations(3)).unwrap();
+    let samples = keyed(&clip).unwrap();
+    let sampled = [samples.of(&clip, None, &[])];
+    for (format, left_out) in [
+        ("parquet", 0),
+        ("arrow", 0),
+        ("csv", 0),
+        ("npz", 1),
+        ("dat", 1),
+    ] {
+        let mut bytes = Vec::new();
+        let written = Format::named(format).unwrap();
+        let warnings = written
+            .write_clips(&sampled, &MotionOptions::default(), &mut bytes)
+            .unwrap();
+        let told = |it: &&Diagnostic| it.message.contains("nanoseconds of times since 1970");
+        assert_eq!(
+            warnings.iter().filter(told).count(),
+            left_out,
+            "{format}: {warnings:?}"
+        );
+        if left_out == 0 {
+            let again = &read(format, &bytes).unwrap().clips[0];
+            assert_eq!(
+                (again.time_offset, again.set.track(0).times),
+                (1_403_636_579, &times[..])
+            );
+        }
+    }
+    let shape = Shape::new(2, 31);
+    let mut result = shape.result(Layout::TrackMajor, Encoding::F32);
+    result.time_offset = 1_700_000_000;
+    let bytes = write("arrow", &result, &rotations(62), 62).unwrap();
+    let clip = &read("arrow", &bytes).unwrap().clips[0];
+    assert_eq!(
+        (clip.time_offset, clip.rate),
+        (1_700_000_000, FrameRate::new(60, 1).ok())
+    );
+    assert_eq!(clip.set.track(1).times[30], 0.5);
+}
+
+/// Topics of different rates go into one table as they are.
+#[test]
+fn tracks_keep_their_own_times() {
+    let mut clip = Motion::default();
+    let lists: [(&str, &[f64]); 3] = [
+        ("slow", &[0.0, 1.0]),
+        ("fast", &[0.0, 0.3, 0.7, 1.1]),
+        ("still", &[0.0]),
+    ];
+    for (name, times) in lists {
+        clip.set.push(name, times, &rotations(times.len())).unwrap();
+    }
+    let points = [1.0, 2.0, 3.0, 4.0].map(|x| Vec3::new(x, 0.0, 0.0));
+    clip.set
+        .set_translations(1, lists[1].1, &points, &[])
+        .unwrap();
+    for format in ["parquet", "arrow"] {
+        let written = Format::named(format).unwrap();
+        let (samples, is_at_keys) = keys_for(&clip, written, false).unwrap();
+        assert!(is_at_keys);
+        let sampled = [SampledClip {
+            is_at_keys,
+            ..samples.of(&clip, None, &[])
+        }];
+        let mut bytes = Vec::new();
+        written
+            .write_clips(&sampled, &MotionOptions::default(), &mut bytes)
+            .unwrap();
+        let again = &read(format, &bytes).unwrap().clips[0];
+        for (track, (name, times)) in lists.into_iter().enumerate() {
+            assert_eq!(
+                (again.set.track(track).name, again.set.track(track).times),
+                (Some(name), times)
+            );
+            assert_eq!(again.set.track(track).keys, clip.set.track(track).keys);
+        }
+        let moved = again.set.vector_keys(Channel::Translation, 1).unwrap();
+        assert_eq!(moved.keys, points);
+    }
+    let refused = keys_for(&clip, Format::named("csv").unwrap(), false).unwrap_err();
+    assert!(
+        refused.to_string().contains("write Parquet or Arrow"),
+        "{refused}"
+    );
 }

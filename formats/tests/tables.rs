@@ -42,7 +42,12 @@ fn a_row_for_each_key_is_read_whatever_packs_it_and_in_any_order() {
         "long.arrow",
     ] {
         let loaded = open(&folder.join("parquet").join(name), &ReadOptions::default()).unwrap();
-        assert!(loaded.warnings.is_empty(), "{name}: {:?}", loaded.warnings);
+        let codes: Vec<Code> = loaded.warnings.iter().map(|it| it.code).collect();
+        let expected: &[Code] = match name {
+            "long_shuffled.parquet" => &[Code::RowsSorted],
+            _ => &[],
+        };
+        assert_eq!(codes, expected, "{name}");
         let [clip] = &loaded.clips[..] else {
             panic!("{name}")
         };

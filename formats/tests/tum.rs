@@ -10,8 +10,9 @@ use tumble_formats::format::{MotionOptions, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::tum::{FORMAT, open_tum, read_tum};
-use tumble_formats::{Code, Diagnostic, Format, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Format, Location, ReadOptions};
 
 use crate::support::shared_data;
 
@@ -162,7 +163,7 @@ fn nanoseconds_keep_their_digits() {
             (1_403_636_579, FrameRate::new(20, 1).ok())
         );
         assert_eq!(clip.set.track(0).times[..2], [0.763_555_584, 0.813_555_584]);
-        assert_eq!(loaded.warnings[0].code, Code::Nanoseconds);
+        assert_eq!(loaded.warnings[0].code, Code::TimeUnit);
         let options = ReadOptions {
             time_unit: Some(tumble_formats::format::TimeUnit::Nanoseconds),
             ..options
@@ -245,7 +246,12 @@ proptest! {
     ) {
         let keys: Vec<Quat> =
             axes.iter().map(|&[x, y, z]| Quat::from_scaled_axis([x, y, z].into())).collect();
-        let times: Vec<f64> = (0..keys.len()).map(|i| start + i as f64 * step).collect();
+        // Times of a clock have nanoseconds.
+        let stored = |time: f64| match offset.abs() > 100 {
+            true => (time * 1e9).round() / 1e9,
+            false => time,
+        };
+        let times: Vec<f64> = (0..keys.len()).map(|i| stored(start + i as f64 * step)).collect();
         let mut set = TrackSet::with_shared_times(&times, &keys).unwrap();
         let moved: Vec<Vec3> =
             (0..keys.len()).map(|i| Vec3::from_array(positions) * (i as f32 + 0.1)).collect();
@@ -281,5 +287,50 @@ let step = (offset.abs() as f64 + time) * f64::EPSILON;
         bytes[offset] = byte;
         bytes.truncate(cut);
         let _ = read_tum("t", &*bytes, &ReadOptions::default());
+    }
+}
+
+#[test]
+fn quaternions_of_another_order_are_read_by_an_option() {
+    let text = "0 1 2 3 1 0 0 0\n0.1 1 2 3 0.8 0 0 0.6\n";
+    let options = ReadOptions {
+        source_order: Some(ComponentOrder::Wxyz),
+        ..ReadOptions::default()
+    };
+    let loaded = read_tum("t", text.as_bytes(), &options).unwrap();
+    let keys = loaded.clips[0].set.track(0).keys;
+    assert_eq!(keys, [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, 0.6, 0.8)]);
+}
+
+#[test]
+fn poses_with_nan_are_left_out_if_asked() {
+    let text =
+        "0 1 2 3 0 0 0 1\n1 nan nan nan 0 0 0 1\n2 1 2 3 NaN -nan 0 1\n3 4 5 6 0 0 0.6 0.8\n";
+    let refused = read_tum("t", text.as_bytes(), &ReadOptions::default()).unwrap_err();
+    assert_eq!(refused.code, Code::NotFinite);
+    assert!(
+        refused
+            .message
+            .ends_with("leave the pose out with --bridge-gaps"),
+        "{refused}"
+    );
+    let options = ReadOptions {
+        bridge_gaps: true,
+        ..ReadOptions::default()
+    };
+    let loaded = read_tum("t", text.as_bytes(), &options).unwrap();
+    assert_eq!(loaded.clips[0].set.track(0).times, [0.0, 3.0]);
+    let warning = &loaded.warnings[0];
+    assert_eq!((warning.code, warning.count), (Code::Bridged, 2));
+    assert_eq!(
+        warning.location,
+        Some(Location::Text { line: 2, column: 1 })
+    );
+    for bad in [
+        "0 nan 0 0 0 0 0 1\n",
+        "nan 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n",
+    ] {
+        let refused = read_tum("t", bad.as_bytes(), &options).unwrap_err();
+        assert_eq!(refused.code, Code::NotFinite, "{bad}");
     }
 }

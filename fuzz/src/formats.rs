@@ -9,6 +9,7 @@ use tumble::{Device, Engine, FrameRate, Interpolation, SampleTimes};
 use tumble_formats::format::{FormatOption, MotionOptions, TimeUnit, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::Motion;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{
     Code, Diagnostic, FORMATS, Feature, Format, Limits, Loaded, ReadOptions, Severity,
@@ -76,6 +77,8 @@ fn options(format: &Format, length: usize) -> ReadOptions {
         map: map
             .filter(|_| format.takes(FormatOption::Map))
             .map(str::to_owned),
+        source_order: takes(FormatOption::SourceOrder, length.is_multiple_of(3))
+            .then_some(ComponentOrder::Wxyz),
         bridge_gaps: takes(FormatOption::BridgeGaps, length.is_multiple_of(2)),
         keyframes: takes(FormatOption::Keyframes, length.is_multiple_of(2)),
         ..ReadOptions::default()

@@ -164,12 +164,14 @@ impl File {
 /// position of the error; oddities are reported as `InputWarning`.
 ///
 /// `load(path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None,
-/// duplicates=None, raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
+/// source_order=None, duplicates=None, raw_times=False, bridge_gaps=False, keyframes=False, offsets=None,
+/// body_model=None, scale=None, up=None)`
 ///
 /// `format`: the file's format; by default it is recognised by its first bytes and its name. `source_fps`: the
 /// frame rate of a file that states neither times nor a rate. `override_fps`: the frame rate of a file of NPZ or BVH
 /// without times, instead of the one that it states. `source_times`: a text file of times, for KITTI, one time in seconds per line.
-/// `time_unit`: the unit of times that are whole numbers, "s", "ms", "us" or "ns". `map`: what arrays or columns
+/// `time_unit`: the unit of times that are whole numbers, "s", "ms", "us" or "ns". `source_order`: the order of a
+/// quaternion's components in TUM and EuRoC files that have another one than these formats, "xyzw" or "wxyz". `map`: what arrays or columns
 /// contain, if their names do not say it, such as "rotations=keys:wxyz,time=t". It has entries NAME=SOURCE, separated
 /// by commas. NAME is `rotations`, `translations` or `time` for arrays, and a known column or a track for tables.
 /// SOURCE is an array, a column, a part of a list such as `state[3:7]`, or a range of columns `rx..rz`; a suffix such
@@ -177,7 +179,7 @@ impl File {
 /// `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`. `duplicates`: which of two different keys at the
 /// same time to keep: "first", "last" or "both", which makes a jump.
 /// `raw_times`: keep times as stored, instead of moving them to exact frame times. `bridge_gaps`: skip keys with
-/// missing numbers in a table, instead of refusing it. `keyframes`: read only the keys of an FBX file at its key
+/// missing numbers in a table, a trajectory or a log, instead of refusing it. `keyframes`: read only the keys of an FBX file at its key
 /// times, instead of adding keys until its curves are followed. `offsets`: the positions of joints relative to their
 /// parents, (joints, 3), for files that do not store them, such as those of AMASS. `body_model`: computes the offsets
 /// from a model of SMPL, SMPL-H or SMPL-X as NPZ, or from a folder with one per gender. `scale`: a factor for
@@ -191,8 +193,9 @@ impl File {
 /// tumble.MissingFileError: missing.glb: error[E001]: ...
 #[pyfunction]
 #[pyo3(signature = (
-    path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
-    raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body_model=None, scale=None, up=None
+    path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None,
+    source_order=None, duplicates=None, raw_times=false, bridge_gaps=false, keyframes=false, offsets=None,
+    body_model=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load(
@@ -204,6 +207,7 @@ pub(crate) fn load(
     source_times: Option<PathBuf>,
     map: Option<String>,
     time_unit: Option<&Bound<'_, PyAny>>,
+    source_order: Option<&Bound<'_, PyAny>>,
     duplicates: Option<&Bound<'_, PyAny>>,
     raw_times: bool,
     bridge_gaps: bool,
@@ -229,6 +233,7 @@ pub(crate) fn load(
         || source_times.is_some()
         || map.is_some()
         || time_unit.is_some()
+        || source_order.is_some()
         || duplicates.is_some()
         || bridge_gaps
         || keyframes
@@ -260,6 +265,9 @@ pub(crate) fn load(
         map,
         time_unit: time_unit
             .map(|unit| option_of(unit, "time_unit"))
+            .transpose()?,
+        source_order: source_order
+            .map(|order| option_of(order, "source_order"))
             .transpose()?,
         bridge_gaps,
         keyframes,

@@ -133,6 +133,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     },
     reading("map", FormatOption::Map),
     reading("time_unit", FormatOption::TimeUnit),
+    reading("source_order", FormatOption::SourceOrder),
     reading("bridge_gaps", FormatOption::BridgeGaps),
     reading("keyframes", FormatOption::Keyframes),
     OptionRule {

@@ -12,10 +12,11 @@ use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::body_offsets;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::options::{AppliesTo, OPTIONS};
-use crate::arguments::output::one_of;
+use crate::arguments::output::{component_order, one_of};
 use crate::messages::exit::{self, Failure};
 use crate::messages::names;
 
@@ -50,8 +51,11 @@ pub(crate) struct ReadingArguments {
     /// The unit of times that are whole numbers
     #[arg(long, value_name = "UNIT", value_parser = time_unit())]
     time_unit: Option<TimeUnit>,
-    /// Skip keys with missing numbers in a table (blank cells, nulls, NaN): the track is interpolated
-    /// from the keys beside them
+    /// The order of a quaternion's components in TUM and EuRoC files that have another one than these formats
+    #[arg(long, value_name = "ORDER", value_parser = component_order())]
+    source_order: Option<ComponentOrder>,
+    /// Skip keys with missing numbers in tables, trajectories and logs (blank cells, nulls, NaN): the
+    /// track is interpolated from the keys beside them
     #[arg(long)]
     bridge_gaps: bool,
     /// FBX: read only the keys at the file's key times, instead of as many as it takes to follow its
@@ -155,6 +159,7 @@ impl ReadingArguments {
             || self.source_times.is_some()
             || self.map.is_some()
             || self.time_unit.is_some()
+            || self.source_order.is_some()
             || self.bridge_gaps
             || self.keyframes
             || self.offsets.is_some()
@@ -173,6 +178,7 @@ impl ReadingArguments {
             source_times,
             map,
             time_unit,
+            source_order,
             bridge_gaps,
             keyframes,
             names_method: _,
@@ -192,6 +198,7 @@ impl ReadingArguments {
             || source_times.is_some()
             || map.is_some()
             || time_unit.is_some()
+            || source_order.is_some()
             || offsets.is_some()
             || body_model.is_some()
             || scale.is_some()
@@ -216,6 +223,7 @@ impl ReadingArguments {
             frame_times: frame_times.transpose()?.map(Arc::new),
             map: self.map.clone(),
             time_unit: self.time_unit,
+            source_order: self.source_order,
             bridge_gaps: self.bridge_gaps,
             keyframes: self.reads_file_keys(),
             has_body_model: self.body_model.is_some(),
@@ -232,6 +240,7 @@ impl ReadingArguments {
             FormatOption::TimesApart => self.source_times.is_some(),
             FormatOption::Map => self.map.is_some(),
             FormatOption::TimeUnit => self.time_unit.is_some(),
+            FormatOption::SourceOrder => self.source_order.is_some(),
             FormatOption::BridgeGaps => self.bridge_gaps,
             FormatOption::Keyframes => self.keyframes,
             _ => false,

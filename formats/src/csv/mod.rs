@@ -59,6 +59,7 @@ pub static FORMAT: Format = Format {
         Feature::World,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &FormatOption::OF_TABLES,
 };

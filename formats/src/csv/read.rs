@@ -13,7 +13,7 @@ use crate::rate::last_digit_power;
 use crate::source::Source;
 use crate::table::clips::clips;
 use crate::table::columns::{Column, ColumnNeed, ColumnNumbers, ColumnValues, Table};
-use crate::table::plan::TablePlan;
+use crate::table::plan::{TablePlan, TimeSource};
 use crate::text::cell::cell_text;
 use crate::text::number;
 use crate::warnings::Warnings;
@@ -35,7 +35,8 @@ pub fn open_csv(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
 pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut warnings = Warnings::new(name);
     let start = check_encoding(name, &bytes, &mut warnings)?;
-    let sheet = Sheet {
+    let mut options = Cow::Borrowed(options);
+    let mut sheet = Sheet {
         name,
         bytes: &bytes[start..],
         time_power: options.time_unit.map_or(0, TimeUnit::power),
@@ -51,7 +52,8 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         .iter()
         .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned());
     let names: Vec<String> = names.collect();
-    let plan = TablePlan::of(name, &names, options)?;
+    let plan = TablePlan::of(name, &names, &options)
+        .map_err(|refusal| sheet.with_names_below(&mut reader, refusal))?;
     let mut columns = Vec::with_capacity(plan.columns.len());
     for requested in &plan.columns {
         let values = match requested.need {
@@ -85,7 +87,15 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     // Where each row begins, and how many lines are before it.
     let mut starts = Vec::new();
     while sheet.next(&mut reader, &mut record)? {
-        sheet.check_width(&record, names.len())?;
+        sheet.check_width(&record, &names)?;
+        if starts.is_empty()
+            && options.time_unit.is_none()
+            && let Some((unit, warning)) = sheet.large_unit(&record, &plan)
+        {
+            sheet.time_power = unit.power();
+            options.to_mut().time_unit = Some(unit);
+            warnings.warn(Code::TimeUnit, || warning);
+        }
         let outputs = columns.iter_mut().zip(&mut known).zip(&plan.columns);
         for ((column, known), requested) in outputs {
             let cell = TextCell {
@@ -109,7 +119,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
             cell_location(&bytes[start..], starts[row], column)
         })),
     };
-    let mut loaded = clips(&table, &plan, options)?;
+    let mut loaded = clips(&table, &plan, &options)?;
     let mut all = warnings.into_list();
     all.append(&mut loaded.warnings);
     loaded.warnings = all;
@@ -145,8 +155,8 @@ struct Sheet<'a> {
     bridges_gaps: bool,
 }
 
-impl Sheet<'_> {
-    fn reader(&self) -> Reader<&[u8]> {
+impl<'a> Sheet<'a> {
+    fn reader(&self) -> Reader<&'a [u8]> {
         let mut builder = ReaderBuilder::new();
         builder
             .has_headers(false)
@@ -172,16 +182,92 @@ impl Sheet<'_> {
         })
     }
 
-    fn check_width(&self, record: &ByteRecord, width: usize) -> Result<(), Diagnostic> {
-        if record.len() == width {
+    /// Refuses a row of another number of cells than there are names. A comma at the end of a line makes an empty
+    /// cell, in rows or in the names.
+    fn check_width(&self, record: &ByteRecord, names: &[String]) -> Result<(), Diagnostic> {
+        let (width, found) = (names.len(), record.len());
+        let is_last_empty = |cell: Option<&[u8]>| cell.is_some_and(|it| it.trim_ascii().is_empty());
+        let is_whole = found == width
+            || found == width + 1 && is_last_empty(record.get(width))
+            || found + 1 == width && names.last().is_some_and(String::is_empty);
+        if is_whole {
             return Ok(());
         }
-        let location = self.cell(record, width.min(record.len()));
+        let location = self.cell(record, width.min(found));
+        // `0,5,1,25` has a cell for each part of a number.
+        let is_digits = |cell: &[u8]| cell.iter().all(|it| it.is_ascii_digit() || *it == b'-');
+        let hint = match found > width && record.iter().all(is_digits) {
+            true => "; if numbers have decimal commas, write them with points",
+            false => "",
+        };
         let message = format!(
-            "{} cells where the header has {width}; every row has as many as the header",
-            record.len()
+            "{found} cells where the header has {width}; every row has as many as the header{hint}"
         );
         Err(self.refuse(location, Code::Columns, message))
+    }
+
+    /// The unit of times whose first one, in this record, is too large for seconds, with a warning that says it.
+    fn large_unit(
+        &self,
+        record: &ByteRecord,
+        plan: &TablePlan,
+    ) -> Option<(TimeUnit, (Option<Location>, String))> {
+        let column = plan.columns.get(plan.time)?;
+        if plan.time_source != TimeSource::Times {
+            return None;
+        }
+        let text = as_text(record.get(column.index)?.trim_ascii());
+        let unit = TimeUnit::of_large(text.parse().ok()?)?;
+        let location = self.cell(record, column.index);
+        Some((unit, (Some(location), unit.assumed(text))))
+    }
+
+    /// The refusal of a first row without the names of columns; if a later row has them, as in the tables of motion
+    /// capture systems, it says so.
+    fn with_names_below(&self, reader: &mut Reader<&[u8]>, mut refusal: Diagnostic) -> Diagnostic {
+        /// How many rows may be before the names.
+        const MAX_ROWS: usize = 32;
+        if refusal.code != Code::NoTimes {
+            return refusal;
+        }
+        let mut record = ByteRecord::new();
+        for _ in 0..MAX_ROWS {
+            if !matches!(self.next(reader, &mut record), Ok(true)) {
+                break;
+            }
+            let cells: Vec<Cow<'_, str>> =
+                record.iter().map(|it| as_text(it.trim_ascii())).collect();
+            let named = |start: &str| {
+                let mut all = cells.iter();
+                all.find(|cell| cell.to_lowercase().starts_with(start))
+            };
+            let (time, frame) = (named("time"), named("frame"));
+            let has_numbers = cells.iter().any(|cell| cell.parse::<f64>().is_ok());
+            if has_numbers || cells.len() < 5 || time.or(frame).is_none() {
+                continue;
+            }
+            let location = self.cell(&record, 0);
+            let remedy = match (time, frame) {
+                (Some(time), _) => format!("--map 'time={time}'"),
+                (None, frame) => format!(
+                    "--map 'frame_index={}' and --source-fps",
+                    frame.map_or("", |it| it)
+                ),
+            };
+            let shown: Vec<String> = cells
+                .iter()
+                .take(8)
+                .map(|cell| format!("`{cell}`"))
+                .collect();
+            refusal.message = format!(
+                "the names of the columns are in this line ({}, …), below others, as Motive and Vicon write tables: \
+                 delete the lines before it, and one of units after it, and give {remedy}",
+                shown.join(", ")
+            );
+            refusal.location = Some(location);
+            break;
+        }
+        refusal
     }
 
     /// The location of a cell of a record.
@@ -262,7 +348,7 @@ impl TextCell<'_> {
         // A cell without a value is stored as a placeholder; its column is refused for it.
         if need == ColumnNeed::Number
             && self.sheet.bridges_gaps
-            && (self.text.is_empty() || self.text.eq_ignore_ascii_case(b"nan"))
+            && (self.text.is_empty() || number::is_nan(&as_text(self.text)))
             && let ColumnValues::Numbers(ColumnNumbers::F64(numbers)) = values
         {
             numbers.push(f64::NAN);

@@ -63,6 +63,7 @@ pub static FORMAT: Format = Format {
         Feature::Steps,
         Feature::Lines,
         Feature::SeveralClips,
+        Feature::TimesPerTrack,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,

@@ -157,6 +157,9 @@ fn no_room(
 ) -> Option<Diagnostic> {
     let missing = Feature::ALL.into_iter();
     let missing = missing.filter(|feature| !format.features.contains(feature));
+    // Where times begin at 0, another warning says that they are moved.
+    let has_start = format.supports(Feature::Start);
+    let missing = missing.filter(|feature| has_start || *feature != Feature::Nanoseconds);
     let left_out: Vec<&str> = missing
         .filter_map(|feature| {
             let mut each = clips.iter();
@@ -223,11 +226,20 @@ fn loss(
             !clip.bvh.is_empty() && !clip.is_world,
             "the order of the channels and the End Sites",
         ),
+        Feature::Nanoseconds => {
+            let offset = clip.time_offset as f64;
+            let is_rounded = |&time: &f64| ((time + offset) - offset - time).abs() > 1e-9;
+            (
+                sampled.times.iter().any(is_rounded),
+                "the nanoseconds of times since 1970 (it stores them in f64)",
+            )
+        }
         Feature::BoxLength => (options.box_length.is_some(), "the length of the boxes"),
         Feature::SeveralTracks
         | Feature::Quaternions
         | Feature::World
         | Feature::SeveralClips
+        | Feature::TimesPerTrack
         | Feature::TimesPerChannel
         | Feature::UnevenTimes
         | Feature::Start => {

@@ -79,6 +79,7 @@ pub static FORMAT: Format = Format {
         Feature::Lines,
         Feature::Bvh,
         Feature::SeveralClips,
+        Feature::TimesPerTrack,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,
     ],

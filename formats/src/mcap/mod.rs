@@ -43,9 +43,11 @@ pub static FORMAT: Format = Format {
         Feature::TrackNames,
         Feature::Translations,
         Feature::Curves,
+        Feature::TimesPerTrack,
         Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,
+        Feature::Nanoseconds,
     ],
     options: &[
         FormatOption::RawTimes,

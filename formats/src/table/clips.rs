@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::decimal::time_text;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions};
 use crate::keys::Origin;
@@ -20,7 +21,8 @@ use crate::table::groups::{labels, numbered, rows_by_code};
 use crate::table::plan::{Parts, RowLayout, TablePlan};
 #[cfg(feature = "parquet")]
 use crate::table::skeleton;
-use crate::table::times::{RowTimes, times};
+use crate::table::times::{RowGroups, RowTimes, times};
+use crate::time_order::{TimeOrder, time_order};
 use crate::warnings::Warnings;
 
 /// Makes the clips of a table that contains the columns of its plan.
@@ -49,11 +51,23 @@ pub(crate) fn clips(
             (None, message)
         });
     }
-    let times = times(table, plan, options)?;
+    let tracks = match plan.rows {
+        RowLayout::Keys {
+            track: Some(track), ..
+        } => Some(labels(table, track)),
+        _ => None,
+    };
+    let named_clips = plan
+        .clip
+        .map(|(column, prefix)| (labels(table, column), prefix));
+    let row_groups = RowGroups {
+        clips: named_clips.as_ref().map(|((codes, _), _)| &**codes),
+        tracks: tracks.as_ref().map(|(codes, _)| &**codes),
+    };
+    let times = times(table, plan, &row_groups, options, &mut warnings)?;
     let mut loaded = Loaded::default();
-    let groups = match plan.clip {
-        Some((column, prefix)) => {
-            let (codes, names) = labels(table, column);
+    let groups = match named_clips {
+        Some(((codes, names), prefix)) => {
             let (rows, ranges) = rows_by_code(&codes, names.len());
             let named = names
                 .into_iter()
@@ -64,12 +78,6 @@ pub(crate) fn clips(
                 .collect()
         }
         None => vec![(None, None)],
-    };
-    let tracks = match plan.rows {
-        RowLayout::Keys {
-            track: Some(track), ..
-        } => Some(labels(table, track)),
-        _ => None,
     };
     let alone = groups.len() == 1;
     for (index, (name, rows)) in groups.into_iter().enumerate() {
@@ -150,8 +158,10 @@ impl TableClip<'_> {
         let (mut shared, is_world) = match &plan.rows {
             RowLayout::Keys {
                 parts, is_world, ..
-            } => (self.share_out(parts), *is_world),
-            RowLayout::Times { tracks, is_world } => (self.share_all(tracks), *is_world),
+            } => (self.share_out(parts, plan, warnings)?, *is_world),
+            RowLayout::Times { tracks, is_world } => {
+                (self.share_all(tracks, plan, warnings)?, *is_world)
+            }
         };
         if self.options.bridge_gaps {
             self.leave_out_gaps(plan, &mut shared, warnings)?;
@@ -198,19 +208,68 @@ impl TableClip<'_> {
     }
 
     /// Assigns every row to every track, in a wide table.
-    fn share_all<'a>(&self, tracks: &'a [(String, Parts)]) -> SharedRows<'a> {
+    fn share_all<'a>(
+        &self,
+        tracks: &'a [(String, Parts)],
+        plan: &TablePlan,
+        warnings: &mut Warnings,
+    ) -> Result<SharedRows<'a>, Diagnostic> {
         let track = |(name, parts): &'a (String, Parts)| TableTrack {
             name: name.clone(),
             parts,
             range: 0..self.len(),
             list: 0,
         };
-        let order: Vec<u32> = (0..self.len() as u32).collect();
-        SharedRows {
+        let mut order: Vec<u32> = (0..self.len() as u32).collect();
+        let times = self.sorted(&mut order, plan, warnings)?;
+        Ok(SharedRows {
             tracks: tracks.iter().map(track).collect(),
-            lists: vec![self.times_of(&order)],
+            lists: vec![times],
             order,
+        })
+    }
+
+    /// Sorts the positions of one track's rows by time if they are not, and returns the times.
+    ///
+    /// # Errors
+    /// When the clock was set back, so that sorting would mix two recordings.
+    fn sorted(
+        &self,
+        positions: &mut [u32],
+        plan: &TablePlan,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<f64>, Diagnostic> {
+        let times = self.times_of(positions);
+        let at = |row: usize| {
+            let offset = self.times.offset;
+            let [before, time] = [row - 1, row].map(|row| time_text(offset, times[row]));
+            let location = self
+                .table
+                .location(plan.time, self.row(positions[row] as usize));
+            (location, before, time)
+        };
+        match time_order(&times) {
+            TimeOrder::Sorted => return Ok(times),
+            TimeOrder::Reset { row } => {
+                let (location, before, time) = at(row);
+                let message = format!(
+                    "the clock was set back from {before} s to {time} s; the rows before and after this one are at \
+                     the same times: split the table here, or sort it by time if it is one recording"
+                );
+                let mut refusal = self.table.refuse(Code::TimeNotIncreasing, message);
+                refusal.location = Some(location);
+                return Err(refusal);
+            }
+            TimeOrder::Unsorted { row } => warnings.warn(Code::RowsSorted, || {
+                let (location, before, time) = at(row);
+                let message = format!(
+                    "the time {time} is before the previous time, {before}; the rows are sorted by time"
+                );
+                (Some(location), message)
+            }),
         }
+        positions.sort_by(|&a, &b| self.time(a).total_cmp(&self.time(b)));
+        Ok(self.times_of(positions))
     }
 
     /// Removes from each track the rows in which one of its numbers is missing.
@@ -269,7 +328,12 @@ impl TableClip<'_> {
     }
 
     /// Assigns each row to the track that a column names.
-    fn share_out<'a>(&self, parts: &'a Parts) -> SharedRows<'a> {
+    fn share_out<'a>(
+        &self,
+        parts: &'a Parts,
+        plan: &TablePlan,
+        warnings: &mut Warnings,
+    ) -> Result<SharedRows<'a>, Diagnostic> {
         let (codes, names) = match (self.tracks, self.rows) {
             (None, _) => (Cow::Owned(vec![0; self.len()]), vec![String::new()]),
             (Some((codes, names)), None) => (Cow::Borrowed(&**codes), names.clone()),
@@ -284,13 +348,7 @@ impl TableClip<'_> {
         let mut tracks = Vec::with_capacity(names.len());
         let mut lists: Vec<Vec<f64>> = Vec::new();
         for (name, range) in names.into_iter().zip(ranges) {
-            let positions = &mut order[range.clone()];
-            let mut times = self.times_of(positions);
-            // Rows of a long table may come in any order.
-            if !times.is_sorted() {
-                positions.sort_by(|&a, &b| self.time(a).total_cmp(&self.time(b)));
-                times = self.times_of(positions);
-            }
+            let times = self.sorted(&mut order[range.clone()], plan, warnings)?;
             // Tracks mostly have the times of the track before.
             if lists.last() != Some(&times) {
                 lists.push(times);
@@ -302,11 +360,11 @@ impl TableClip<'_> {
                 list: lists.len() - 1,
             });
         }
-        SharedRows {
+        Ok(SharedRows {
             tracks,
             order,
             lists,
-        }
+        })
     }
 
     fn time(&self, position: u32) -> f64 {

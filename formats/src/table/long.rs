@@ -5,15 +5,17 @@ use std::io;
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, StringArray};
-use glam::Quat;
-use tumble::{Encoding, Layout, Timeline};
+use glam::{DVec3, Quat, Vec3};
+use tumble::{Channel, Encoding, Layout, Timeline};
 
 use crate::format::{ResultShape, ResultWriter, WriteError};
-use crate::motion::SampledClip;
+use crate::keyed::{at, track_times};
+use crate::motion::{Motion, SampledClip};
 use crate::names::distinct_names;
 use crate::poses::{Poses, TRANSFORM, WORLD};
 use crate::quaternion::ComponentOrder;
-use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, invalid, names};
+use crate::signs::continue_signs;
+use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, TimeColumn, invalid, names};
 use crate::table::skeleton;
 
 /// Begins the table of a result's rotations.
@@ -30,7 +32,12 @@ pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
     let columns = components
         .into_iter()
         .map(|name| (name.to_owned(), ComponentColumn::of(result.encoding)));
-    let batch = Batch::new(columns, names(result.set), None)?;
+    let batch = Batch::new(
+        columns,
+        TimeColumn::of([result.time_offset]),
+        names(result.set),
+        None,
+    )?;
     let notes = result
         .notes
         .iter()
@@ -43,7 +50,7 @@ pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
         sink,
         batch,
         timeline: result.timeline,
-        time_offset: result.time_offset as f64,
+        time_offset: result.time_offset,
         layout: result.layout,
         encoding: result.encoding,
         is_w_first,
@@ -57,7 +64,7 @@ struct Rotations<'a, S> {
     sink: S,
     batch: Batch,
     timeline: &'a Timeline,
-    time_offset: f64,
+    time_offset: i64,
     layout: Layout,
     encoding: Encoding,
     /// Whether w is the first component of quaternions.
@@ -88,7 +95,7 @@ impl<S: RowSink> ResultWriter for Rotations<'_, S> {
                 Layout::FrameMajor => (self.written % self.tracks, self.written / self.tracks),
             };
             let time = self.timeline.time(track, frame).unwrap_or(f64::NAN);
-            self.batch.row(frame, time + self.time_offset, track);
+            self.batch.row(frame, (self.time_offset, time), track);
             let mut numbers = q.to_array();
             if self.is_w_first {
                 numbers.rotate_right(1);
@@ -129,7 +136,12 @@ pub(crate) fn write_poses<S: RowSink>(
         let is_wide = index < 3 && poses.has_origins();
         ((*name).to_owned(), ComponentColumn::of_positions(is_wide))
     });
-    let mut batch = Batch::new(columns, names(poses.set), None)?;
+    let mut batch = Batch::new(
+        columns,
+        TimeColumn::of([poses.time_offset]),
+        names(poses.set),
+        None,
+    )?;
     let mut sink = begin(Head {
         schema: Arc::clone(&batch.schema),
         notes: Vec::new(),
@@ -142,7 +154,7 @@ pub(crate) fn write_poses<S: RowSink>(
     {
         let (frame, track) = (index / tracks, index % tracks);
         let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
-        batch.row(frame, time + poses.time_offset as f64, track);
+        batch.row(frame, (poses.time_offset, time), track);
         let origin = poses.origin(track);
         for (i, (column, &number)) in batch.numbers.iter_mut().zip(pose).enumerate() {
             let moved = if i < 3 { origin[i] } else { 0.0 };
@@ -198,7 +210,12 @@ pub(crate) fn write_motion<S: RowSink>(
         let is_wide = has_origins && translation.contains(&name);
         (name.to_owned(), ComponentColumn::of_positions(is_wide))
     });
-    let mut batch = Batch::new(columns, track_names, named.then_some((0, clip_names)))?;
+    let mut batch = Batch::new(
+        columns,
+        TimeColumn::of(clips.iter().map(|clip| clip.clip.time_offset)),
+        track_names,
+        named.then_some((0, clip_names)),
+    )?;
     let mut sink = begin(Head {
         schema: Arc::clone(&batch.schema),
         notes: notes(clips),
@@ -210,7 +227,11 @@ pub(crate) fn write_motion<S: RowSink>(
         write_clip(
             sampled,
             codes,
-            [is_w_first, moved, scaled],
+            ClipColumns {
+                is_w_first,
+                has_translations: moved,
+                has_scales: scaled,
+            },
             &mut batch,
             &mut sink,
         )?;
@@ -260,35 +281,105 @@ fn notes(clips: &[SampledClip<'_>]) -> Vec<(String, String)> {
     notes
 }
 
-fn write_clip(
-    sampled: &SampledClip<'_>,
-    codes: &[usize],
-    [is_w_first, moved, scaled]: [bool; 3],
-    batch: &mut Batch,
-    sink: &mut impl RowSink,
-) -> io::Result<()> {
-    let tracks = sampled.clip.set.track_count();
-    sampled.checked_len()?;
-    for (index, q) in sampled.rotations.iter().enumerate() {
-        let (frame, track) = (index / tracks, index % tracks);
-        let time = sampled.times[frame] + sampled.clip.time_offset as f64;
-        batch.row(frame, time, codes[track]);
-        let mut numbers = q.to_array().map(f64::from).to_vec();
-        if is_w_first {
+/// The columns that a table of clips has.
+#[derive(Clone, Copy)]
+struct ClipColumns {
+    is_w_first: bool,
+    has_translations: bool,
+    has_scales: bool,
+}
+
+/// The numbers of one row.
+struct RowNumbers {
+    rotation: Quat,
+    translation: DVec3,
+    scale: Vec3,
+}
+
+impl ClipColumns {
+    fn push(self, row: &RowNumbers, batch: &mut Batch) {
+        let mut numbers = row.rotation.to_array().map(f64::from).to_vec();
+        if self.is_w_first {
             numbers.rotate_right(1);
         }
-        if moved {
-            let relative = sampled.translations.get(index).copied().unwrap_or_default();
-            numbers.extend((sampled.clip.origin(track) + relative.as_dvec3()).to_array());
+        if self.has_translations {
+            numbers.extend(row.translation.to_array());
         }
-        if scaled {
-            let scale = sampled.scales.get(index);
-            let scale = scale.copied().unwrap_or(glam::Vec3::ONE);
-            numbers.extend(scale.to_array().map(f64::from));
+        if self.has_scales {
+            numbers.extend(row.scale.to_array().map(f64::from));
         }
         for (column, number) in batch.numbers.iter_mut().zip(numbers) {
             column.push_number(number);
         }
+    }
+}
+
+/// Writes the samples of a clip, or its keys if it has them at separate times for each track.
+fn write_clip(
+    sampled: &SampledClip<'_>,
+    codes: &[usize],
+    columns: ClipColumns,
+    batch: &mut Batch,
+    sink: &mut impl RowSink,
+) -> io::Result<()> {
+    let clip = sampled.clip;
+    let tracks = clip.set.track_count();
+    let lists = (0..tracks).map(|track| track_times(clip, track));
+    if sampled.is_at_keys
+        && let Some(lists) = lists.collect::<Option<Vec<&[f64]>>>()
+    {
+        for (track, times) in lists.into_iter().enumerate() {
+            write_track(clip, track, times, codes[track], columns, batch, sink)?;
+        }
+        return Ok(());
+    }
+    sampled.checked_len()?;
+    for (index, &rotation) in sampled.rotations.iter().enumerate() {
+        let (frame, track) = (index / tracks, index % tracks);
+        batch.row(
+            frame,
+            (clip.time_offset, sampled.times[frame]),
+            codes[track],
+        );
+        let relative = sampled.translations.get(index).copied().unwrap_or_default();
+        let row = RowNumbers {
+            rotation,
+            translation: clip.origin(track) + relative.as_dvec3(),
+            scale: sampled.scales.get(index).copied().unwrap_or(Vec3::ONE),
+        };
+        columns.push(&row, batch);
+        if batch.is_full() {
+            batch.flush(sink)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the keys of one track, all of whose channels have these times.
+fn write_track(
+    clip: &Motion,
+    track: usize,
+    times: &[f64],
+    code: usize,
+    columns: ClipColumns,
+    batch: &mut Batch,
+    sink: &mut impl RowSink,
+) -> io::Result<()> {
+    let mut rotations = clip.set.track(track).keys.to_vec();
+    continue_signs(&mut rotations, 1);
+    let vector = |channel, key: usize| {
+        let keys = clip.set.vector_keys(channel, track);
+        keys.and_then(|keys| at(keys.keys, key))
+            .unwrap_or_else(|| clip.rest(channel, track))
+    };
+    for (key, &time) in times.iter().enumerate() {
+        batch.row(key, (clip.time_offset, time), code);
+        let row = RowNumbers {
+            rotation: at(&rotations, key).unwrap_or(Quat::IDENTITY),
+            translation: clip.origin(track) + vector(Channel::Translation, key).as_dvec3(),
+            scale: vector(Channel::Scale, key),
+        };
+        columns.push(&row, batch);
         if batch.is_full() {
             batch.flush(sink)?;
         }

@@ -24,9 +24,9 @@ const COUNTED: [&str; 3] = ["frame", "frame_index", "index"];
 #[derive(Debug)]
 pub(crate) struct TablePlan {
     pub(crate) columns: Vec<RequestedColumn>,
-    /// The column of times, or of frames if `is_frames`.
+    /// The column of times or frames; where rows are frames, any column.
     pub(crate) time: usize,
-    pub(crate) is_frames: bool,
+    pub(crate) time_source: TimeSource,
     /// The column of clips, and the prefix of its values in the names of clips.
     pub(crate) clip: Option<(usize, &'static str)>,
     pub(crate) rows: RowLayout,
@@ -35,6 +35,17 @@ pub(crate) struct TablePlan {
     /// The metadata of the file.
     #[cfg(feature = "parquet")]
     pub(crate) notes: Vec<(String, String)>,
+}
+
+/// What says the time of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TimeSource {
+    /// A column of times.
+    Times,
+    /// A column with the number of the frame.
+    Frames,
+    /// The position of the row among those of its track.
+    Rows,
 }
 
 /// The meaning of a row.
@@ -126,10 +137,27 @@ impl ColumnNames<'_> {
             [] => Ok(None),
             [index] => Ok(Some(*index)),
             _ => {
-                let message = format!("two columns are called `{name}`; rename one of them");
+                let message = format!(
+                    "two columns are called `{name}`; rename one of them, or tell them apart by --map, in which the \
+                     second is `{name}.1`"
+                );
                 Err(self.refuse(Code::ColumnTwice, message))
             }
         }
+    }
+
+    /// The index of the column that `--map` names. Of several columns of one name, the second is called `x.1`, the
+    /// third `x.2`, as pandas names them.
+    fn position(&self, source: &str) -> Option<usize> {
+        let nth = |name: &str, nth: usize| {
+            let all = self.file_columns.iter().enumerate();
+            let mut same = all.filter(|(_, column)| *column == name);
+            same.nth(nth).map(|(index, _)| index)
+        };
+        nth(source, 0).or_else(|| {
+            let (name, number) = source.rsplit_once('.')?;
+            nth(name, number.parse().ok()?)
+        })
     }
 
     fn request(&mut self, index: usize, need: ColumnNeed) -> usize {
@@ -201,26 +229,70 @@ impl ColumnNames<'_> {
             true => ["qx", "qy", "qz", "qw"],
             false => ["x", "y", "z", "w"],
         };
+        if !is_pose {
+            self.check_position(prefix)?;
+        }
         let missing = "a rotation has the columns x, y, z and w, or qx, qy, qz and qw".to_owned();
         let rotation = self.group(prefix, names)?;
         let rotation = rotation.ok_or_else(|| self.refuse(Code::NoRotations, missing))?;
-        let local = match self.group(prefix, ["tx", "ty", "tz"])? {
-            None if is_pose && self.find(&format!("{prefix}x"))?.is_some() => {
-                self.group(prefix, ["x", "y", "z"])?
-            }
-            local => local,
+        let mut vectors = self.vectors(prefix)?;
+        if is_pose && vectors.translation.is_none() && self.find(&format!("{prefix}x"))?.is_some() {
+            vectors.translation = self.group(prefix, ["x", "y", "z"])?;
+        }
+        let parts = Parts {
+            rotation: RotationCells::Quaternion(rotation),
+            translation: vectors.translation,
+            scale: vectors.scale,
         };
+        Ok((parts, vectors.is_world))
+    }
+
+    /// The columns of the translations and scales of one track.
+    fn vectors(&mut self, prefix: &str) -> Result<VectorCells, Diagnostic> {
+        let local = self.group(prefix, ["tx", "ty", "tz"])?;
         let world = match local {
             Some(_) => None,
             None => self.group(prefix, ["px", "py", "pz"])?,
         };
-        let parts = Parts {
-            rotation: RotationCells::Quaternion(rotation),
+        Ok(VectorCells {
+            is_world: world.is_some(),
             translation: local.or(world),
             scale: self.group(prefix, ["sx", "sy", "sz"])?,
-        };
-        Ok((parts, world.is_some()))
+        })
     }
+
+    /// Refuses columns x y z beside which another three may be those of the quaternion. Where the fields of a pose
+    /// are flattened, the position has the names, and the quaternion a number after them.
+    fn check_position(&self, prefix: &str) -> Result<(), Diagnostic> {
+        const OTHERS: [[&str; 3]; 6] = [
+            ["x_1", "y_1", "z_1"],
+            ["x.1", "y.1", "z.1"],
+            ["x1", "y1", "z1"],
+            ["x_2", "y_2", "z_2"],
+            ["x2", "y2", "z2"],
+            ["qx", "qy", "qz"],
+        ];
+        let has = |name: &str| self.find(&format!("{prefix}{name}"));
+        for [x, y, z] in OTHERS {
+            if has("x")?.is_some() && has(x)?.is_some() && has(y)?.is_some() && has(z)?.is_some() {
+                let message = format!(
+                    "the quaternion may be `{prefix}x` … `{prefix}w` or `{prefix}{x}`, `{prefix}{y}`, `{prefix}{z}` \
+                     and `{prefix}w` after a position; if it is the latter, give --map \
+                     '{prefix}tx={prefix}x,{prefix}ty={prefix}y,{prefix}tz={prefix}z,{prefix}x={prefix}{x},\
+                     {prefix}y={prefix}{y},{prefix}z={prefix}{z}'"
+                );
+                return Err(self.refuse(Code::ColumnsAmbiguous, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The columns of the translations and scales of one track.
+struct VectorCells {
+    translation: Option<[CellSource; 3]>,
+    scale: Option<[CellSource; 3]>,
+    is_world: bool,
 }
 
 impl TablePlan {
@@ -285,19 +357,19 @@ impl TablePlan {
             requested: Vec::new(),
             requested_indices: HashMap::new(),
         };
-        let lists = match &options.map {
+        let mapped = match &options.map {
             Some(map) => rename(&mut names, map)?,
-            None => Vec::new(),
+            None => MappedColumns::default(),
         };
-        let (time, is_frames) = time_column(&mut names, options)?;
+        let time = time_column(&mut names, options)?;
         let clip = match names.first_of(&CLIP)? {
             Some(clip) => Some((clip, "")),
             None => names
                 .take("episode_index", ColumnNeed::Whole)?
                 .map(|at| (at, "episode_")),
         };
-        let rows = if !lists.is_empty() {
-            list_rows(&mut names, &lists)?
+        let rows = if !mapped.tracks.is_empty() {
+            mapped_rows(&mut names, &mapped.tracks)?
         } else if names.find("w")?.is_some() || names.find("qw")?.is_some() {
             let (parts, is_world) = names.parts("")?;
             RowLayout::Keys {
@@ -308,22 +380,18 @@ impl TablePlan {
         } else {
             wide_rows(&mut names)?
         };
-        let is_read = |index: usize| {
-            names
-                .requested
-                .iter()
-                .any(|requested| requested.index == index)
-        };
-        // Beside times, frames say nothing more.
-        let is_known = |name: &str| COUNTED.contains(&name);
+        let is_read: HashSet<usize> = names.requested.iter().map(|it| it.index).collect();
+        mapped.check_used(&names, &is_read)?;
+        // Beside times, frames say nothing more, and a comma at the end of a line makes a column without a name.
+        let is_known = |name: &str| name.is_empty() || COUNTED.contains(&name);
         let left_out = (file_columns.iter().enumerate())
-            .filter(|(index, name)| !is_read(*index) && !is_known(name))
+            .filter(|(index, name)| !is_read.contains(index) && !is_known(name))
             .map(|(_, name)| name.clone());
         Ok(Self {
             left_out: left_out.collect(),
             columns: names.requested,
-            time,
-            is_frames,
+            time: time.map_or(0, |(column, _)| column),
+            time_source: time.map_or(TimeSource::Rows, |(_, source)| source),
             clip,
             rows,
             #[cfg(feature = "parquet")]
@@ -332,21 +400,45 @@ impl TablePlan {
     }
 }
 
-/// Renames columns as `--map` specifies; returns the entries that are parts of lists.
-fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
+/// What `--map` says of columns.
+#[derive(Default)]
+struct MappedColumns {
+    /// The entries that are rotations, and translations and scales of their tracks.
+    tracks: Vec<Entry>,
+    /// The columns that got other names, and the entries of these.
+    renamed: Vec<(usize, Entry)>,
+}
+
+impl MappedColumns {
+    /// Refuses a column that `--map` names if nothing reads it.
+    fn check_used(
+        &self,
+        names: &ColumnNames<'_>,
+        is_read: &HashSet<usize>,
+    ) -> Result<(), Diagnostic> {
+        let mut unused = self.renamed.iter().filter(|(at, _)| !is_read.contains(at));
+        let Some((_, Entry { name, source, .. })) = unused.next() else {
+            return Ok(());
+        };
+        let message = format!(
+            "nothing reads `{name}={source}` of --map: no track takes it; say of which track it is, such as \
+             `knee.{name}={source}`, or leave it out"
+        );
+        Err(names.refuse(Code::Map, message))
+    }
+}
+
+/// Renames columns as `--map` specifies.
+fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<MappedColumns, Diagnostic> {
     let parsed: Result<Map, _> = map.parse();
     let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
-    let mut lists = Vec::new();
+    let mut mapped = MappedColumns::default();
     for entry in map.entries {
         if column_range(names, &entry.source).is_some() {
-            lists.push(entry);
+            mapped.tracks.push(entry);
             continue;
         }
-        let found = names
-            .file_columns
-            .iter()
-            .position(|name| *name == entry.source);
-        let Some(index) = found else {
+        let Some(index) = names.position(&entry.source) else {
             let message = format!(
                 "there is no column `{}`; there are {}",
                 entry.source,
@@ -356,15 +448,16 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<Vec<Entry>, Diagnost
         };
         let is_rotation = entry.order.is_some() || entry.form.is_some();
         if entry.columns.is_some() || is_rotation || !is_column(&entry.name) {
-            lists.push(entry);
+            mapped.tracks.push(entry);
             continue;
         }
-        if let Some(indices) = names.seen.get_mut(&entry.source) {
+        if let Some(indices) = names.seen.get_mut(&names.file_columns[index]) {
             indices.retain(|&at| at != index);
         }
-        names.seen.insert(entry.name, vec![index]);
+        names.seen.insert(entry.name.clone(), vec![index]);
+        mapped.renamed.push((index, entry));
     }
-    Ok(lists)
+    Ok(mapped)
 }
 
 /// Whether a column may have this name; other names are tracks.
@@ -379,21 +472,27 @@ fn is_column(target: &str) -> bool {
     WHOLE.contains(&target) || tells_apart || target == "episode_index" || NUMBERS.contains(&last)
 }
 
+/// The column of the times of rows; `None` if the rows are frames.
 fn time_column(
     names: &mut ColumnNames<'_>,
     options: &ReadOptions,
-) -> Result<(usize, bool), Diagnostic> {
+) -> Result<Option<(usize, TimeSource)>, Diagnostic> {
     for name in ["time", "timestamp", "t"] {
         if let Some(time) = names.take(name, ColumnNeed::Time)? {
-            return Ok((time, false));
+            return Ok(Some((time, TimeSource::Times)));
         }
     }
     let frames = match names.find("frame_index")? {
         Some(frames) => Some(frames),
         None => names.find("frame")?,
     };
+    let hint = heading_hint(names.file_columns);
     let message = match (frames, options.source_rate) {
-        (Some(frames), Some(_)) => return Ok((names.request(frames, ColumnNeed::Whole), true)),
+        (Some(frames), Some(_)) => {
+            let column = names.request(frames, ColumnNeed::Whole);
+            return Ok(Some((column, TimeSource::Frames)));
+        }
+        (None, Some(_)) if hint.is_none() => return Ok(None),
         (Some(frames), None) => format!(
             "times are frames, in the column `{}`; give their rate with --source-fps",
             names.file_columns[frames]
@@ -401,7 +500,9 @@ fn time_column(
         (None, _) => format!(
             "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; {}",
             names.list(),
-            heading_hint(names.file_columns).unwrap_or("--map time=NAME")
+            hint.unwrap_or(
+                "--map time=NAME, or --source-fps FPS if the rows are the frames of a rate"
+            )
         ),
     };
     Err(names.refuse(Code::NoTimes, message))
@@ -417,14 +518,55 @@ fn heading_hint(columns: &[String]) -> Option<&'static str> {
             "columns are separated by commas, and numbers have decimal points: convert the file",
         );
     }
-    let is_number = |name: &String| name.trim().parse::<f64>().is_ok();
+    // A comma at the end of a line makes an empty cell.
+    let is_number = |name: &String| name.trim().is_empty() || name.trim().parse::<f64>().is_ok();
     let is_comment = columns.len() == 1 && first.starts_with('#');
-    let has_names = !is_comment && !columns.iter().all(is_number);
-    (!has_names).then_some("begin the file with the names of the columns, such as time,x,y,z,w")
+    if !is_comment && !columns.iter().all(is_number) {
+        return None;
+    }
+    let is_nanoseconds = |text: &str| text.len() > 17 && text.bytes().all(|it| it.is_ascii_digit());
+    Some(match columns.len() >= 8 && is_nanoseconds(first.trim()) {
+        true => {
+            "begin the file with the names of the columns; if they are timestamp,x,y,z,qw,qx,qy,qz, as EuRoC and \
+             VINS-Mono write them, give --from euroc"
+        }
+        false => {
+            "begin the file with the names of the columns, such as time,x,y,z,w, or x,y,z,qx,qy,qz,qw for rows of \
+             frames (--source-fps)"
+        }
+    })
 }
 
 /// Tracks in columns: `knee.x`, `knee.y`, `knee.z`, `knee.w`.
 fn wide_rows(names: &mut ColumnNames<'_>) -> Result<RowLayout, Diagnostic> {
+    let tracks = wide_names(names);
+    if tracks.is_empty() {
+        let message = format!(
+            "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
+             {}",
+            names.list(),
+            angles_hint(names).unwrap_or_else(|| {
+                "--map hand=LIST[3:7] selects a part of a list, hand=rx..rz:rotvec a range of columns"
+                    .to_owned()
+            })
+        );
+        return Err(names.refuse(Code::NoRotations, message));
+    }
+    let mut layout = Vec::with_capacity(tracks.len());
+    let mut is_world = false;
+    for track in tracks {
+        let (parts, world) = names.parts(&format!("{track}."))?;
+        is_world |= world;
+        layout.push((track, parts));
+    }
+    Ok(RowLayout::Times {
+        tracks: layout,
+        is_world,
+    })
+}
+
+/// The tracks that have columns of quaternions with their name, in the order of their columns.
+fn wide_names(names: &ColumnNames<'_>) -> Vec<String> {
     let mut prefixes: Vec<(String, usize)> = names
         .seen
         .iter()
@@ -436,33 +578,39 @@ fn wide_rows(names: &mut ColumnNames<'_>) -> Result<RowLayout, Diagnostic> {
     prefixes.sort_by_key(|&(_, index)| index);
     let mut known = HashSet::new();
     prefixes.retain(|(track, _)| known.insert(track.clone()));
-    if prefixes.is_empty() {
-        let message = format!(
-            "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
-             --map hand=LIST[3:7] selects a part of a list, hand=rx..rz:rotvec a range of columns",
-            names.list()
-        );
-        return Err(names.refuse(Code::NoRotations, message));
-    }
-    let mut tracks = Vec::with_capacity(prefixes.len());
-    let mut is_world = false;
-    for (track, _) in prefixes {
-        let (parts, world) = names.parts(&format!("{track}."))?;
-        is_world |= world;
-        tracks.push((track, parts));
-    }
-    Ok(RowLayout::Times { tracks, is_world })
+    prefixes.into_iter().map(|(track, _)| track).collect()
 }
 
-/// Tracks in parts of lists; `hand.translation` and `hand.scale` belong to the track `hand`.
-fn list_rows(names: &mut ColumnNames<'_>, lists: &[Entry]) -> Result<RowLayout, Diagnostic> {
+/// The `--map` for columns that are called roll, pitch and yaw.
+fn angles_hint(names: &ColumnNames<'_>) -> Option<String> {
+    const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
+    let columns = names.file_columns.windows(3).find(|columns| {
+        let mut pairs = columns.iter().zip(ANGLES);
+        pairs.all(|(column, angle)| column.to_lowercase().contains(angle))
+    })?;
+    let position = ["x", "y", "z"].map(|name| names.position(name).map(|_| name));
+    let moved = match position {
+        [Some(_), Some(_), Some(_)] => "tx=x,ty=y,tz=z,",
+        _ => "",
+    };
+    Some(format!(
+        "give --map '{moved}body={}..{}:xyz:deg' if they are in degrees, without `:deg` if in radians",
+        columns[0], columns[2]
+    ))
+}
+
+/// Tracks of which `--map` says the rotations, and those of columns with their names. `hand.translation` and
+/// `hand.scale` belong to the track `hand`, and so do columns `hand.tx`; `tx` alone belongs to the only track.
+fn mapped_rows(names: &mut ColumnNames<'_>, entries: &[Entry]) -> Result<RowLayout, Diagnostic> {
     const VECTORS: [&str; 2] = [".translation", ".scale"];
     let vector_of = |target: &str| {
         let ending = VECTORS.iter().position(|ending| target.ends_with(ending));
         ending.map(|at| (target[..target.len() - VECTORS[at].len()].to_owned(), at))
     };
     let mut tracks: Vec<(String, Parts)> = Vec::new();
-    for entry in lists
+    let mut track_of: HashMap<&str, usize> = HashMap::new();
+    let mut is_world = false;
+    for entry in entries
         .iter()
         .filter(|entry| vector_of(&entry.name).is_none())
     {
@@ -475,45 +623,69 @@ fn list_rows(names: &mut ColumnNames<'_>, lists: &[Entry]) -> Result<RowLayout, 
             }
             _ => RotationCells::Other(form, cells),
         };
+        let vectors = names.vectors(&format!("{}.", entry.name))?;
+        is_world |= vectors.is_world;
         let parts = Parts {
             rotation,
-            translation: None,
-            scale: None,
+            translation: vectors.translation,
+            scale: vectors.scale,
         };
+        track_of.insert(&entry.name, tracks.len());
         tracks.push((entry.name.clone(), parts));
     }
-    for entry in lists {
+    for entry in entries {
         let Some((track, vector)) = vector_of(&entry.name) else {
             continue;
         };
         let cells = cells(names, entry, 3)?;
         let cells = [cells[0], cells[1], cells[2]];
-        let Some((_, parts)) = tracks.iter_mut().find(|(name, _)| *name == track) else {
+        let Some(&index) = track_of.get(&*track) else {
             let message = format!(
                 "`{}` has no rotations; --map {track}=LIST[3:7] gives the track `{track}` some",
                 entry.name
             );
             return Err(names.refuse(Code::NoRotations, message));
         };
+        let parts = &mut tracks[index].1;
         match vector {
             0 => parts.translation = Some(cells),
             _ => parts.scale = Some(cells),
         }
     }
-    Ok(RowLayout::Times {
-        tracks,
-        is_world: false,
-    })
+    if let [(_, only)] = &mut *tracks {
+        let vectors = names.vectors("")?;
+        is_world |= vectors.is_world && only.translation.is_none();
+        only.translation = only.translation.or(vectors.translation);
+        only.scale = only.scale.or(vectors.scale);
+    }
+    let is_range = |entry: &Entry| column_range(names, &entry.source).is_some();
+    if let [_] = &*tracks
+        && entries.iter().all(is_range)
+        && let Some(track) = names.first_of(&TRACK)?
+        && let Some((_, parts)) = tracks.pop()
+    {
+        return Ok(RowLayout::Keys {
+            track: Some(track),
+            parts: Box::new(parts),
+            is_world,
+        });
+    }
+    for track in wide_names(names) {
+        if track_of.contains_key(&*track) {
+            let message =
+                format!("--map and the columns `{track}.w` both say the rotations of `{track}`");
+            return Err(names.refuse(Code::ColumnTwice, message));
+        }
+        let (parts, world) = names.parts(&format!("{track}."))?;
+        is_world |= world;
+        tracks.push((track, parts));
+    }
+    Ok(RowLayout::Times { tracks, is_world })
 }
 
 /// The columns from one name to another, `first..last`, unless a column has this name.
 fn column_range(names: &ColumnNames<'_>, source: &str) -> Option<Range<usize>> {
-    let index = |column: &str| {
-        names
-            .file_columns
-            .iter()
-            .position(|name| name == column.trim())
-    };
+    let index = |column: &str| names.position(column.trim());
     if index(source).is_some() {
         return None;
     }
@@ -556,10 +728,7 @@ fn cells(
         );
         return Err(names.refuse(Code::ListLength, message));
     }
-    let index = names
-        .file_columns
-        .iter()
-        .position(|name| *name == entry.source);
+    let index = names.position(&entry.source);
     let column = names.request(index.unwrap_or_default(), ColumnNeed::List);
     let cell = |item| CellSource {
         column,

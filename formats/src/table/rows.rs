@@ -8,12 +8,13 @@ use std::sync::Arc;
 use arrow_array::types::Int32Type;
 use arrow_array::{
     ArrayRef, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array, Int32Array,
-    Int64Array, RecordBatch, StringArray,
+    Int64Array, RecordBatch, StringArray, TimestampNanosecondArray,
 };
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use half::f16;
 use tumble::{ComponentType, Encoding, TrackSet};
 
+use crate::decimal::is_clock;
 use crate::names::distinct_names;
 
 /// Number of rows of a batch: 2 MB of rotations.
@@ -40,13 +41,65 @@ pub(crate) trait RowSink {
 pub(crate) struct Batch {
     pub(crate) schema: SchemaRef,
     frames: Vec<i64>,
-    times: Vec<f64>,
+    times: TimeColumn,
     tracks: Vec<i32>,
     pub(crate) numbers: Vec<ComponentColumn>,
     /// The names of all tracks, the same for every batch.
     track_names: ArrayRef,
     /// The clip of the following rows, and the names of all clips.
     pub(crate) clip: Option<(i32, ArrayRef)>,
+}
+
+/// The times of all rows.
+pub(crate) enum TimeColumn {
+    /// Seconds.
+    Seconds(Vec<f64>),
+    /// Nanoseconds since 1970, for clips that count from a whole second: f64 would round them to 0.24 µs.
+    Stamps(Vec<i64>),
+}
+
+impl TimeColumn {
+    /// For clips that count from these whole seconds.
+    pub(crate) fn of(offsets: impl IntoIterator<Item = i64>) -> Self {
+        /// Beyond this an i64 has no nanoseconds: 285 years.
+        const MAX_OFFSET: u64 = 9_000_000_000;
+        let mut counts = false;
+        for offset in offsets {
+            if offset.unsigned_abs() > MAX_OFFSET {
+                return Self::Seconds(Vec::new());
+            }
+            counts |= is_clock(offset);
+        }
+        match counts {
+            true => Self::Stamps(Vec::new()),
+            false => Self::Seconds(Vec::new()),
+        }
+    }
+
+    fn data_type(&self) -> DataType {
+        match self {
+            Self::Seconds(_) => DataType::Float64,
+            Self::Stamps(_) => DataType::Timestamp(TimeUnit::Nanosecond, None),
+        }
+    }
+
+    /// Appends seconds after a whole second.
+    fn push(&mut self, whole: i64, time: f64) {
+        match self {
+            Self::Seconds(list) => list.push(whole as f64 + time),
+            Self::Stamps(list) => {
+                let whole = whole.saturating_mul(1_000_000_000);
+                list.push(whole.saturating_add((time * 1e9).round() as i64));
+            }
+        }
+    }
+
+    fn take(&mut self) -> ArrayRef {
+        match self {
+            Self::Seconds(list) => Arc::new(Float64Array::from(std::mem::take(list))),
+            Self::Stamps(list) => Arc::new(TimestampNanosecondArray::from(std::mem::take(list))),
+        }
+    }
 }
 
 /// The numbers of one component of all rows.
@@ -134,6 +187,7 @@ impl Batch {
     /// For a table with components of these names.
     pub(crate) fn new(
         components: impl IntoIterator<Item = (String, ComponentColumn)>,
+        times: TimeColumn,
         track_names: ArrayRef,
         clip: Option<(i32, ArrayRef)>,
     ) -> io::Result<Self> {
@@ -145,7 +199,7 @@ impl Batch {
         }
         let mut fields = vec![
             Field::new("frame", DataType::Int64, false),
-            Field::new("time", DataType::Float64, false),
+            Field::new("time", times.data_type(), false),
             Field::new("track", names_type(), false),
         ];
         if clip.is_some() {
@@ -159,7 +213,7 @@ impl Batch {
         Ok(Self {
             schema: Arc::new(Schema::new(fields)),
             frames: Vec::new(),
-            times: Vec::new(),
+            times,
             tracks: Vec::new(),
             numbers,
             track_names,
@@ -167,9 +221,10 @@ impl Batch {
         })
     }
 
-    pub(crate) fn row(&mut self, frame: usize, time: f64, track: usize) {
+    /// Begins a row; its time is in seconds after a whole second.
+    pub(crate) fn row(&mut self, frame: usize, (whole, time): (i64, f64), track: usize) {
         self.frames.push(frame as i64);
-        self.times.push(time);
+        self.times.push(whole, time);
         self.tracks.push(track as i32);
     }
 
@@ -185,7 +240,7 @@ impl Batch {
         let rows = self.frames.len();
         let mut columns: Vec<ArrayRef> = vec![
             Arc::new(Int64Array::from(std::mem::take(&mut self.frames))),
-            Arc::new(Float64Array::from(std::mem::take(&mut self.times))),
+            self.times.take(),
             dictionary(std::mem::take(&mut self.tracks), &self.track_names)?,
         ];
         if let Some((clip, names)) = &self.clip {

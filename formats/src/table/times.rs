@@ -1,11 +1,14 @@
 //! Converts a column of times to seconds.
 
+use std::collections::HashMap;
+
 use crate::decimal::{OFFSET_LIMIT, offset_of};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{ReadOptions, TimeUnit};
+use crate::format::{LARGEST_SECONDS, ReadOptions, TimeUnit};
 use crate::rate::Precision;
 use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
-use crate::table::plan::TablePlan;
+use crate::table::plan::{TablePlan, TimeSource};
+use crate::warnings::Warnings;
 
 /// Times of all rows.
 pub(crate) struct RowTimes {
@@ -16,8 +19,25 @@ pub(crate) struct RowTimes {
     pub(crate) offset: i64,
 }
 
-/// Integers above this are not seconds: it is the year 5138 as a Unix time.
-const MAX_SECONDS: u64 = 100_000_000_000;
+/// The clip and the track of each row, if columns say them.
+pub(crate) struct RowGroups<'a> {
+    pub(crate) clips: Option<&'a [u32]>,
+    pub(crate) tracks: Option<&'a [u32]>,
+}
+
+impl RowGroups<'_> {
+    /// The number of each row among those of its clip and track, from 0.
+    fn numbers(&self, rows: usize) -> Vec<u64> {
+        let mut next: HashMap<[u32; 2], u64> = HashMap::new();
+        let number = |row: usize| {
+            let group = [self.clips, self.tracks].map(|codes| codes.map_or(0, |codes| codes[row]));
+            let next = next.entry(group).or_default();
+            *next += 1;
+            *next - 1
+        };
+        (0..rows).map(number).collect()
+    }
+}
 
 /// The times of a table's rows.
 ///
@@ -26,7 +46,9 @@ const MAX_SECONDS: u64 = 100_000_000_000;
 pub(crate) fn times(
     table: &Table,
     plan: &TablePlan,
+    groups: &RowGroups<'_>,
     options: &ReadOptions,
+    warnings: &mut Warnings,
 ) -> Result<RowTimes, Diagnostic> {
     let column = &table.columns[plan.time];
     let exact = |seconds, precision| {
@@ -36,7 +58,12 @@ pub(crate) fn times(
             offset: 0,
         })
     };
-    if let (Some(rate), false) = (options.source_rate, plan.is_frames) {
+    if let (Some(rate), TimeSource::Rows) = (options.source_rate, plan.time_source) {
+        let frames = groups.numbers(table.rows);
+        let seconds = frames.into_iter().map(|frame| rate.time_of(frame));
+        return exact(seconds.collect(), None);
+    }
+    if let (Some(rate), TimeSource::Times) = (options.source_rate, plan.time_source) {
         let message = format!(
             "`{}` has the time of every row; --source-fps {rate} would be another, leave it out",
             column.name
@@ -44,11 +71,22 @@ pub(crate) fn times(
         return Err(table.refuse_at(plan.time, 0, Code::RateBesideTimes, message));
     }
     // A unit that is given holds for numbers of every kind; stamps have their own.
-    let per_second = options
-        .time_unit
-        .map_or(1.0, |unit| unit.per_second() as f64);
+    let unit = options.time_unit.or_else(|| {
+        let ColumnValues::Numbers(numbers) = &column.values else {
+            return None;
+        };
+        let first =
+            (plan.time_source == TimeSource::Times && numbers.len() > 0).then(|| numbers.at(0))?;
+        let unit = TimeUnit::of_large(first)?;
+        let location = Some(table.location(plan.time, 0));
+        warnings.warn(Code::TimeUnit, || (location, unit.assumed(first)));
+        Some(unit)
+    });
+    let per_second = unit.map_or(1.0, |unit| unit.per_second() as f64);
     match (&column.values, options.source_rate) {
-        (ColumnValues::Numbers(ColumnNumbers::Whole(frames)), Some(rate)) if plan.is_frames => {
+        (ColumnValues::Numbers(ColumnNumbers::Whole(frames)), Some(rate))
+            if plan.time_source == TimeSource::Frames =>
+        {
             if let Some(row) = frames.iter().position(|&frame| frame < 0) {
                 let message = format!("frame {} comes before the first, 0", frames[row]);
                 return Err(table.refuse_at(plan.time, row, Code::Time, message));
@@ -76,9 +114,11 @@ pub(crate) fn times(
         }
         (ColumnValues::Numbers(ColumnNumbers::Whole(times)), _) => {
             // Text does not tell 2 from 2.0: small whole numbers are seconds there.
-            let small = times.iter().all(|time| time.unsigned_abs() < MAX_SECONDS);
+            let small = times
+                .iter()
+                .all(|time| (time.unsigned_abs() as f64) < LARGEST_SECONDS);
             let guessed = (small && table.text.is_some()).then_some(TimeUnit::Seconds);
-            let Some(unit) = options.time_unit.or(guessed) else {
+            let Some(unit) = unit.or(guessed) else {
                 let first = times.first().copied().unwrap_or_default();
                 let message = format!(
                     "`{}` has whole numbers, {first} first; give their unit with --time-unit s, ms, us or ns",
@@ -104,7 +144,7 @@ fn doubles(mut seconds: Vec<f64>) -> RowTimes {
         .copied()
         .fold(f64::INFINITY, f64::min)
         .floor();
-    let needs_offset = first.abs() >= OFFSET_LIMIT as f64 && first.abs() <= MAX_SECONDS as f64;
+    let needs_offset = first.abs() >= OFFSET_LIMIT as f64 && first.abs() <= LARGEST_SECONDS;
     if !needs_offset {
         return RowTimes {
             seconds,

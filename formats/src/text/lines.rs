@@ -119,6 +119,11 @@ impl<R: BufRead> Lines<R> {
         Ok((lines, start))
     }
 
+    /// The input's name in messages.
+    pub(crate) fn file(&self) -> &str {
+        &self.file
+    }
+
     /// The next line without its end; `None` at the end of the input. Return the line by [`Lines::reuse`]; the next
     /// one then needs no new memory.
     pub(crate) fn next(&mut self) -> Result<Option<String>, Diagnostic> {

@@ -19,6 +19,12 @@ pub(crate) struct Number {
 /// Why a token is not a number: code and message.
 pub(crate) type Refusal = (Code, String);
 
+/// Whether a token is NaN, as languages print it: `nan`, `NaN`, `-nan`.
+pub(crate) fn is_nan(token: &str) -> bool {
+    let digits = token.strip_prefix(['-', '+']).unwrap_or(token);
+    digits.eq_ignore_ascii_case("nan")
+}
+
 /// Parses one token.
 pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
     if token.len() > MAX_LENGTH {

@@ -1064,6 +1064,7 @@ def load(
     source_times: _Path | None = None,
     map: str | None = None,
     time_unit: _TimeUnit | None = None,
+    source_order: _Order | None = None,
     duplicates: Literal["first", "last", "both"] | None = None,
     raw_times: bool = False,
     bridge_gaps: bool = False,
