@@ -44,8 +44,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let raw: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match Arguments::try_parse_from(&raw) {
         Ok(arguments) => arguments,
-        Err(error) => {
-            words::usage(&error, &raw);
+        Err(mut error) => {
+            words::usage(&mut error, &raw);
             return error.exit_code() as u8;
         }
     };
