@@ -705,7 +705,7 @@ fn files_are_written_only_where_the_options_say() {
     if vulkan_devices().is_empty() {
         return;
     }
-    let (user, given) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (user, named) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let files_after = |cache: &str| {
         let program = std::env::current_exe().unwrap();
         let output = std::process::Command::new(program)
@@ -715,7 +715,7 @@ fn files_are_written_only_where_the_options_say() {
             .output()
             .unwrap();
         assert!(output.status.success(), "{output:?}");
-        [&user, &given].map(|folder| {
+        [&user, &named].map(|folder| {
             let kind = |entry: std::io::Result<std::fs::DirEntry>| {
                 let name = entry.unwrap().file_name().into_string().unwrap();
                 name.split('-').next().unwrap().to_owned()
@@ -725,15 +725,15 @@ fn files_are_written_only_where_the_options_say() {
         })
     };
     let none: [&str; 0] = [];
-    let [of_user, of_given] = files_after("off");
-    assert!(of_user.is_empty() && of_given.is_empty(), "{of_user:?}");
-    let with_pipelines = format!("pipelines {}", given.path().display());
-    let [of_user, of_given] = files_after(&with_pipelines);
-    assert_eq!((of_user.len(), of_given), (0, ["kernel".to_owned()].into()));
-    let [of_user, of_given] = files_after(&given.path().display().to_string());
+    let [of_user, of_named] = files_after("off");
+    assert!(of_user.is_empty() && of_named.is_empty(), "{of_user:?}");
+    let with_pipelines = format!("pipelines {}", named.path().display());
+    let [of_user, of_named] = files_after(&with_pipelines);
+    assert_eq!((of_user.len(), of_named), (0, ["kernel".to_owned()].into()));
+    let [of_user, of_named] = files_after(&named.path().display().to_string());
     let both = ["kernel".to_owned(), "pipelines".to_owned()];
     assert_eq!(of_user.iter().collect::<Vec<_>>(), none);
-    assert_eq!(of_given, both.clone().into());
+    assert_eq!(of_named, both.clone().into());
     assert_eq!(files_after("user")[0], both.into());
 }
 

@@ -215,8 +215,8 @@ impl LogicalDevice {
 
     /// Locks all queues of a device that the engine opened.
     fn all_queues(&self) -> (MutexGuard<'_, ()>, Option<MutexGuard<'_, ()>>) {
-        let kernels = self.queue.hold();
-        (kernels, self.copy_queue.as_ref().map(DeviceQueue::hold))
+        let kernels = self.queue.lock();
+        (kernels, self.copy_queue.as_ref().map(DeviceQueue::lock))
     }
 
     /// Gives an object the name that validation and debuggers show.

@@ -42,7 +42,7 @@ impl DeviceQueue {
     /// Calls `work` while nothing else uses the queue; `None` if the application's lock did not call its argument.
     pub(crate) fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
         // Always in this order. The application's lock may be one for several queues, so it is the last.
-        let _engines = self.hold();
+        let _engines = self.lock();
         match &self.of_application {
             Some(shared) => shared.run(|| work(self.raw)),
             None => Some(work(self.raw)),
@@ -50,7 +50,7 @@ impl DeviceQueue {
     }
 
     /// Keeps all other engines from the queue.
-    pub(crate) fn hold(&self) -> MutexGuard<'_, ()> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, ()> {
         lock(&self.of_engines)
     }
 }
@@ -79,7 +79,7 @@ mod tests {
         let (one, again, other) = (queue(1), queue(1), queue(2));
         assert!(Arc::ptr_eq(&one.of_engines, &again.of_engines));
         assert!(!Arc::ptr_eq(&one.of_engines, &other.of_engines));
-        let held = one.hold();
+        let held = one.lock();
         assert!(again.of_engines.try_lock().is_err() && other.of_engines.try_lock().is_ok());
         drop(held);
         let is_listed = |handle: u64| lock(&LOCKS).contains_key(&(u64::MAX - handle));

@@ -140,7 +140,7 @@ impl Failure {
     }
 
     /// A result of an input does not fit into the memory that is free. Another input's may.
-    pub(crate) fn memory(input: &str, what: &str, bytes: f64) -> Self {
+    pub(crate) fn memory(input: &str, result: &str, bytes: f64) -> Self {
         let free = tumble::available_memory();
         let limit = free.map_or_else(
             || "memory".to_owned(),
@@ -148,15 +148,15 @@ impl Failure {
         );
         Self {
             code: ALL_INPUTS,
-            ..Self::room(input, what, bytes, &limit)
+            ..Self::room(input, result, bytes, &limit)
         }
     }
 
     /// A result of an input does not fit on the disk. Another input's may.
-    pub(crate) fn room(input: &str, what: &str, bytes: f64, limit: &str) -> Self {
+    pub(crate) fn room(input: &str, result: &str, bytes: f64, limit: &str) -> Self {
         let amount = words::bytes(bytes);
         let message = format!(
-            "{input}: {what} need {amount} ({bytes} bytes), more than the {limit} that are free; ask for fewer \
+            "{input}: {result} need {amount} ({bytes} bytes), more than the {limit} that are free; ask for fewer \
              frames (--fps, --start, --end)"
         );
         Self {
