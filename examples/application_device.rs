@@ -128,6 +128,7 @@ impl Renderer {
             queue_family: self.compute.1,
             copy_queue: None,
             queue_lock: None,
+            pipeline_cache: None,
         };
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }

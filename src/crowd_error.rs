@@ -166,7 +166,7 @@ pub enum CrowdError {
         speed: f32,
     },
     /// Crowds do not have this wrap mode.
-    #[error("instances of a crowd hold, loop or mirror their clips, not {wrap:?}")]
+    #[error("instances of a crowd hold, loop or mirror their clips, not {wrap}")]
     Wrap {
         /// The wrap mode.
         wrap: WrapMode,

@@ -121,7 +121,7 @@ pub use crate::engine::Engine;
 pub use crate::engine::clip::Clip;
 pub use crate::engine::clip::request::Request;
 pub use crate::error::Error;
-pub use crate::gpu::options::EngineOptions;
+pub use crate::gpu::options::{CacheFiles, EngineOptions};
 pub use crate::memory::{OutOfMemoryError, available_memory};
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::VectorMethod;

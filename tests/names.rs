@@ -53,6 +53,30 @@ fn values_of_options_are_found_by_their_names() {
     }
 }
 
+/// What other programs call a value, but only where an option has it.
+#[test]
+fn names_of_other_programs_are_understood_in_hints() {
+    for (name, meant) in [
+        ("linear", "slerp"),
+        ("LERP", "slerp"),
+        ("cubic", "bessel-overhauser"),
+        ("CUBICSPLINE", "gltf-cubic"),
+        ("cubic_spline", "gltf-cubic"),
+        ("constant", "step"),
+        ("tcb", "kochanek-bartels"),
+    ] {
+        let message = name.parse::<Method>().unwrap_err().to_string();
+        let hint = format!("; did you mean `{meant}`?");
+        assert!(message.ends_with(&hint), "{message}");
+    }
+    let message = "slerp".parse::<VectorMethod>().unwrap_err().to_string();
+    assert!(message.ends_with("did you mean `linear`?"), "{message}");
+    let message = "ping pong".parse::<WrapMode>().unwrap_err().to_string();
+    assert!(message.ends_with("did you mean `mirror`?"), "{message}");
+    let message = "tcb".parse::<WrapMode>().unwrap_err().to_string();
+    assert!(!message.contains("did you mean"), "{message}");
+}
+
 #[test]
 fn a_set_is_asked_for_what_its_clip_is_asked_for() {
     let mut set = TrackSet::new();

@@ -4,7 +4,7 @@
 
 use std::process::Command;
 
-use crate::layer::Layer;
+use crate::layer::{Layer, messages_in};
 
 /// Tests of the engine that use Vulkan, once more; with `VALIDATE_ALL=1` all of them. Evaluations have a
 /// test with a layer of its own (`vulkan::the_validation_layer_has_nothing_to_say`).
@@ -14,6 +14,7 @@ fn no_layer_has_anything_to_say_of_the_library() {
         "crowd::application_device::",
         "poses::",
         "every_way_of_copying",
+        "engines_on_one_queue_take_turns",
     ];
     #[cfg(target_os = "linux")]
     tests.push("exported_memory_lives");
@@ -32,5 +33,31 @@ fn no_layer_has_anything_to_say_of_the_library() {
         command.args(&tests).args(["--nocapture", "--skip"]);
         let messages = layer.messages(command.arg("the_validation_layer_has_nothing_to_say"));
         assert_eq!(messages, Vec::<String>::new(), "{}", layer.name);
+    }
+}
+
+/// A race needs two invocations. An older layer reports some of one, and nothing else of it is left out.
+#[test]
+fn only_a_race_of_an_invocation_with_itself_is_left_out_of_an_older_layer() {
+    let race = |one, other| {
+        format!(
+            "(ERROR / SPEC): msgNum: 1 - Validation Error: [ SharedMemoryDataRace-RaceOnStore ]\n\
+             vkCmdDispatch(): A data race was detected on the shared memory variable \"sums\" in local invocation \
+             index {one} while performing a store operation. (Likely against local invocation index {other})\n"
+        )
+    };
+    let (old, new) = (Some([1, 4, 350]), Some([1, 4, 354]));
+    let other = "VUID-VkBufferCreateInfo-size-00912: size is 0\n";
+    assert_eq!(messages_in(&race(64, 64), old), Vec::<String>::new());
+    for (text, version, count) in [
+        (race(64, 64), new, 1),
+        (race(64, 64), None, 1),
+        (race(64, 6), old, 1),
+        (race(6, 64), old, 1),
+        (other.to_owned() + &race(3, 3), old, 1),
+        (race(3, 3) + other, old, 1),
+        (race(3, 3) + &race(3, 4), old, 1),
+    ] {
+        assert_eq!(messages_in(&text, version).len(), count, "{text}");
     }
 }

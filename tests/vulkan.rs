@@ -533,6 +533,244 @@ fn an_application_and_an_engine_share_a_queue_by_its_lock() {
     });
 }
 
+/// Engines of one application's device use the same queue, without a lock of the application. The validation layers
+/// report two threads that submit at the same time.
+#[test]
+#[allow(unsafe_code)] // the device is the application's
+fn engines_on_one_queue_take_turns() {
+    use crate::application::Application;
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let engine = || {
+        let mut handles = application.handles();
+        handles.queue_lock = None;
+        // SAFETY: the handles belong together and outlive the engine.
+        unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap()
+    };
+    let engines: Vec<Engine> = (0..4).map(|_| engine()).collect();
+    let set = hostile_set(2, 8);
+    let frames = SampleTimes::fps(30).between(0.0, 1.0);
+    let evaluate = |engine: &Engine| engine.evaluate(&set, method::SLERP, &frames).unwrap();
+    let expected = evaluate(&Engine::new(Device::Cpu).unwrap());
+    std::thread::scope(|scope| {
+        for engine in &engines {
+            scope.spawn(|| {
+                for _ in 0..300 {
+                    let found = evaluate(engine);
+                    assert_eq!(
+                        first_difference(expected.as_quats(), found.as_quats()),
+                        None
+                    );
+                }
+            });
+        }
+    });
+}
+
+/// Handles that are null, and versions that no instance of this loader can have.
+#[test]
+fn handles_that_cannot_be_are_refused() {
+    use crate::application::Application;
+    use ash::vk;
+    use tumble::vulkan::VulkanQueue;
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let refused =
+        |change: &dyn Fn(&mut tumble::vulkan::VulkanHandles)| match application.refused(change) {
+            tumble::Error::Vulkan(error) => error,
+            error => panic!("{error}"),
+        };
+    let null = |name| VulkanError::NullHandle { name };
+    let queue = vk::Queue::null();
+    assert_eq!(refused(&|handles| handles.queue = queue), null("queue"));
+    let copies = Some(VulkanQueue { queue, family: 0 });
+    let found = refused(&|handles| handles.copy_queue = copies);
+    assert_eq!(found, null("copy_queue"));
+    let found = refused(&|handles| handles.physical_device = vk::PhysicalDevice::null());
+    assert_eq!(found, null("physical_device"));
+    let cache = Some(vk::PipelineCache::null());
+    let found = refused(&|handles| handles.pipeline_cache = cache);
+    assert_eq!(found, null("pipeline_cache"));
+    // SAFETY: no requirements beyond a loaded entry.
+    #[allow(unsafe_code)]
+    let loader = unsafe { application.entry.try_enumerate_instance_version() };
+    let loader = loader.unwrap().unwrap();
+    let minor = vk::api_version_minor(loader);
+    for stated in [
+        0,
+        vk::API_VERSION_1_0,
+        vk::make_api_version(0, 1, minor + 1, 0),
+        vk::make_api_version(1, 1, 1, 0),
+        u32::MAX,
+    ] {
+        let found = refused(&|handles| handles.api_version = stated);
+        assert_eq!(found, VulkanError::ApiVersion { stated, loader });
+    }
+    let newest_patch = vk::make_api_version(0, 1, minor, 4095);
+    let mut handles = application.handles();
+    handles.api_version = newest_patch;
+    // SAFETY: the handles belong together and outlive the engine.
+    #[allow(unsafe_code)]
+    unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap();
+}
+
+/// Null buffers and ranges that end beyond their buffer, some behind 2^64, at once and recorded.
+#[test]
+#[allow(unsafe_code)] // the buffer is the application's
+fn ranges_beyond_their_buffer_are_refused() {
+    use crate::application::{Application, ApplicationBuffer};
+    use ash::vk;
+    use tumble::Error;
+    use tumble::vulkan::PosePass;
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let mut set = TrackSet::new();
+    set.push("one", &[0.0, 1.0], &[Quat::IDENTITY; 2]).unwrap();
+    let clip = engine.upload(&set, method::SLERP).unwrap();
+    let frames = SampleTimes::fps(30);
+    let buffer = ApplicationBuffer::of(&application, &[0; 4096]);
+    let request = clip.request(&frames);
+    let null = VulkanBuffer {
+        buffer: vk::Buffer::null(),
+        offset: 0,
+        size: 4096,
+    };
+    // 31 rotations take 496 bytes.
+    let at_end = u64::MAX / 256 * 256;
+    let mut wrong = vec![null];
+    for (offset, size) in [
+        (1 << 20, 512),
+        (256, 1 << 20),
+        (at_end, 512),
+        (256, u64::MAX),
+        (0, u64::MAX),
+    ] {
+        wrong.push(buffer.range(offset, size));
+    }
+    for range in wrong {
+        let expected = |error: Error| match error {
+            Error::Vulkan(VulkanError::NullHandle { name: "buffer" }) => {
+                range.buffer == null.buffer
+            }
+            Error::Vulkan(VulkanError::BufferEnd {
+                offset,
+                size,
+                memory,
+            }) => (offset, size) == (range.offset, range.size) && memory >= 4096,
+            error => panic!("{range:?}: {error}"),
+        };
+        let pass = |from, result| {
+            let weight = 0.5;
+            let to = buffer.range(2048, 1024);
+            let mix = PosePass::Mix { from, to, weight };
+            // SAFETY: a wrong range is refused, the others are as they must be.
+            unsafe {
+                engine
+                    .pass(mix, 1, 31, Layout::TrackMajor)
+                    .to_buffer(result)
+            }
+        };
+        let good = buffer.range(512, 512);
+        // SAFETY: a wrong range is refused before it is used.
+        let errors = unsafe {
+            [
+                request.to_buffer(range).unwrap_err(),
+                request.target(range).map(|_| ()).unwrap_err(),
+                pass(range, good).unwrap_err(),
+                pass(good, range).unwrap_err(),
+            ]
+        };
+        for error in errors {
+            assert!(expected(error), "{range:?}");
+        }
+    }
+    // An engine that opened its device cannot be given another device's buffer.
+    let other = Engine::new(vulkan_devices().swap_remove(0)).unwrap();
+    let clip = other.upload(&set, method::SLERP).unwrap();
+    // SAFETY: as above.
+    let error = unsafe { clip.request(&frames).to_buffer(buffer.range(0, 512)) };
+    assert!(matches!(error, Err(Error::BufferOfOther)), "{error:?}");
+}
+
+/// An engine reads and writes files only where its options say.
+#[test]
+fn files_are_written_only_where_the_options_say() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let (user, named) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let files_after = |cache: &str| {
+        let program = std::env::current_exe().unwrap();
+        let output = std::process::Command::new(program)
+            .args(["--exact", "vulkan::engines_with_files", "--ignored"])
+            .env("TUMBLE_CACHE_DIR", user.path())
+            .env("ENGINE_CACHE", cache)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        [&user, &named].map(|folder| {
+            let kind = |entry: std::io::Result<std::fs::DirEntry>| {
+                let name = entry.unwrap().file_name().into_string().unwrap();
+                name.split('-').next().unwrap().to_owned()
+            };
+            let all = std::fs::read_dir(folder.path()).unwrap().map(kind);
+            all.collect::<std::collections::BTreeSet<_>>()
+        })
+    };
+    let none: [&str; 0] = [];
+    let [of_user, of_named] = files_after("off");
+    assert!(of_user.is_empty() && of_named.is_empty(), "{of_user:?}");
+    let with_pipelines = format!("pipelines {}", named.path().display());
+    let [of_user, of_named] = files_after(&with_pipelines);
+    assert_eq!((of_user.len(), of_named), (0, ["kernel".to_owned()].into()));
+    let [of_user, of_named] = files_after(&named.path().display().to_string());
+    let both = ["kernel".to_owned(), "pipelines".to_owned()];
+    assert_eq!(of_user.iter().collect::<Vec<_>>(), none);
+    assert_eq!(of_named, both.clone().into());
+    assert_eq!(files_after("user")[0], both.into());
+}
+
+/// Run by the test above it, in processes of their own.
+#[test]
+#[ignore = "run by files_are_written_only_where_the_options_say"]
+#[allow(unsafe_code)] // the device is the application's
+fn engines_with_files() {
+    use crate::application::Application;
+    use tumble::CacheFiles;
+    let cache = std::env::var("ENGINE_CACHE").unwrap();
+    let (brings_cache, folder) = match cache.strip_prefix("pipelines ") {
+        Some(folder) => (true, folder),
+        None => (false, &*cache),
+    };
+    let mut options = EngineOptions::default();
+    options.cache_files = match folder {
+        "user" => CacheFiles::OfUser,
+        "off" => CacheFiles::Off,
+        folder => CacheFiles::Within(folder.into()),
+    };
+    let application = Application::new();
+    let mut handles = application.handles();
+    let info = ash::vk::PipelineCacheCreateInfo::default();
+    // SAFETY: plain creation; destroyed below.
+    let pipelines = unsafe { application.device.create_pipeline_cache(&info, None) }.unwrap();
+    handles.pipeline_cache = brings_cache.then_some(pipelines);
+    // SAFETY: the handles belong together and outlive the engine.
+    let engine = unsafe { Engine::from_vulkan(handles, &options) }.unwrap();
+    engine.warm(method::SLERP, Encoding::F32).unwrap();
+    drop(engine);
+    // SAFETY: the engine is gone, and has left the cache alive.
+    unsafe { application.device.get_pipeline_cache_data(pipelines) }.unwrap();
+    // SAFETY: as above.
+    unsafe { application.device.destroy_pipeline_cache(pipelines, None) };
+}
+
 /// What is compiled beforehand is what evaluating uses, and it is kept for the next process.
 #[test]
 fn kernels_are_compiled_beforehand() {

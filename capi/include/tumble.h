@@ -510,6 +510,13 @@ typedef struct TumbleEngineOptions {
    refused.
    */
   uint32_t allow_inexact;
+  /*
+   The directory in which the library keeps what the driver compiled, which kernels are exact, and how fast a
+   device is; it is created when something is written. The library reads and writes no other files on its own.
+   Null: the directory that the environment variable `TUMBLE_CACHE_DIR` names, or `tumble` in the user's cache
+   directory. An empty text: no file is read or written.
+   */
+  const char *cache_directory;
 } TumbleEngineOptions;
 
 /*
@@ -800,7 +807,8 @@ typedef struct TumbleVulkan {
    A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
    `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
    must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
-   `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
+   `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to it.
+   Several engines on one queue need no lock among themselves.
    */
   void (*lock_queue)(void *user);
   /*
@@ -812,6 +820,13 @@ typedef struct TumbleVulkan {
    freed.
    */
   void *queue_user;
+  /*
+   The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
+   not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
+   freed. The library neither reads it from a file nor writes it to one. 0: the library makes a cache and keeps it
+   in a file (`TumbleEngineOptions.cache_directory`).
+   */
+  uint64_t pipeline_cache;
 } TumbleVulkan;
 
 /*
@@ -1555,13 +1570,14 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
  `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
  `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_evaluate`,
  `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
- Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
- queue that only the library uses, if the device has several.
+ All others do not. Without `lock_queue`, the application must not use the queue while one of them runs. The simplest
+ solution is a queue that only the library uses, if the device has several. Any number of engines may be created on
+ one queue: they take turns.
 
  # Errors
  `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
- version is below 1.1, or the physical device or a queue family does not fit; `TUMBLE_RESULT_DEVICE` if the device
- fails the self-test.
+ version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
+ `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 
  # Safety
  `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;

@@ -3,7 +3,7 @@
 use std::ffi::{CString, c_char};
 
 use tumble::vulkan::VulkanError;
-use tumble::{Device, Engine, EngineOptions, Error};
+use tumble::{CacheFiles, Device, Engine, EngineOptions, Error};
 
 use crate::arguments::{Out, flag, sized, text};
 use crate::handle::{self, Object};
@@ -49,6 +49,11 @@ pub struct TumbleEngineOptions {
     /// 1: a Vulkan device is used although it fails the self-test; its bits may differ from the CPU's. 0: it is
     /// refused.
     pub allow_inexact: u32,
+    /// The directory in which the library keeps what the driver compiled, which kernels are exact, and how fast a
+    /// device is; it is created when something is written. The library reads and writes no other files on its own.
+    /// Null: the directory that the environment variable `TUMBLE_CACHE_DIR` names, or `tumble` in the user's cache
+    /// directory. An empty text: no file is read or written.
+    pub cache_directory: *const c_char,
 }
 
 /// Opens a device and creates an engine on it.
@@ -95,14 +100,26 @@ impl TumbleEngineOptions {
     /// The options of a structure; for null the defaults.
     ///
     /// # Safety
-    /// The pointer must be null or point to such a structure.
+    /// The pointer must be null or point to such a structure, whose `cache_directory` is null or a text that ends with
+    /// a zero byte.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
         // SAFETY: as the caller promises.
         let options = unsafe {
             let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
             sized(pointer, size, "options")?
         };
-        options.map_or_else(|| Ok(EngineOptions::default()), engine_options)
+        let Some(structure) = options else {
+            return Ok(EngineOptions::default());
+        };
+        // SAFETY: null or a text, as the caller promises.
+        let directory = unsafe { text(structure.cache_directory, "options->cache_directory")? };
+        let mut options = engine_options(structure)?;
+        options.cache_files = match directory {
+            None => CacheFiles::OfUser,
+            Some("") => CacheFiles::Off,
+            Some(directory) => CacheFiles::Within(directory.into()),
+        };
+        Ok(options)
     }
 }
 
@@ -116,27 +133,10 @@ fn engine_options(structure: TumbleEngineOptions) -> Result<EngineOptions, Failu
 
 fn open(name: &str, options: &EngineOptions) -> Result<Engine, Failure> {
     match name.to_lowercase().as_str() {
-        "auto" => auto(options),
+        "auto" => Ok(Engine::auto_with(usize::MAX, options)?),
         "cpu" => Ok(Engine::with_options(Device::Cpu, options)?),
         "vulkan" => first_exact(options),
         _ => Ok(Engine::with_options(named(name)?, options)?),
-    }
-}
-
-/// An engine on the fastest device, with the options.
-fn auto(options: &EngineOptions) -> Result<Engine, Failure> {
-    let found = Engine::auto()?;
-    let name = found.device_info().map(|info| info.name.clone());
-    let Some(name) = name else {
-        return Ok(Engine::with_options(Device::Cpu, options)?);
-    };
-    if options.memory.is_none() {
-        return Ok(found);
-    }
-    let mut all = Device::list()?.into_iter();
-    match all.find(|device| device.name() == name) {
-        Some(device) => Ok(Engine::with_options(device, options)?),
-        None => Ok(found),
     }
 }
 

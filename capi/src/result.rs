@@ -65,11 +65,8 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
-            Error::Vulkan(VulkanError::BufferRange { .. }) => TumbleResult::WrongSize,
-            Error::Vulkan(VulkanError::QueueFamily { .. } | VulkanError::SameQueue) => {
-                TumbleResult::InvalidArgument
-            }
-            Error::Vulkan(_) | Error::Threads(_) => TumbleResult::Device,
+            Error::Vulkan(error) => vulkan_code(error),
+            Error::Threads(_) => TumbleResult::Device,
             Error::OutputLength { .. }
             | Error::OutputBytes { .. }
             | Error::ComparedLength { .. } => TumbleResult::WrongSize,
@@ -101,7 +98,19 @@ impl From<Error> for Failure {
 
 impl From<VulkanError> for Failure {
     fn from(error: VulkanError) -> Self {
-        Self::new(TumbleResult::Device, error.to_string())
+        Self::new(vulkan_code(&error), error.to_string())
+    }
+}
+
+fn vulkan_code(error: &VulkanError) -> TumbleResult {
+    match error {
+        VulkanError::BufferRange { .. } | VulkanError::BufferEnd { .. } => TumbleResult::WrongSize,
+        VulkanError::NullHandle { .. } => TumbleResult::InvalidPointer,
+        VulkanError::QueueFamily { .. }
+        | VulkanError::SameQueue
+        | VulkanError::ApiVersion { .. }
+        | VulkanError::OtherPhysicalDevice { .. } => TumbleResult::InvalidArgument,
+        _ => TumbleResult::Device,
     }
 }
 
@@ -132,7 +141,8 @@ impl From<CrowdError> for Failure {
             error => error,
         };
         let code = match reason {
-            CrowdError::Vulkan(_) | CrowdError::Threads(_) => TumbleResult::Device,
+            CrowdError::Vulkan(error) => vulkan_code(error),
+            CrowdError::Threads(_) => TumbleResult::Device,
             CrowdError::OutOfMemory(_) => TumbleResult::OutOfMemory,
             CrowdError::Missing { .. } => TumbleResult::OutOfRange,
             CrowdError::OutputLength { .. } | CrowdError::Buffer { .. } => TumbleResult::WrongSize,

@@ -416,6 +416,7 @@ fn devices_files_and_methods_are_found_or_named() {
         memory: 0,
         threads: 100_000,
         allow_inexact: 0,
+        cache_directory: null(),
     };
     // SAFETY: as above, with a structure.
     let opened =

@@ -49,13 +49,19 @@ pub struct TumbleVulkan {
     /// A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
     /// `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
     /// must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
-    /// `unlock_queue` must be null too, and nothing else may use `queue` during a call that submits to it.
+    /// `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to it.
+    /// Several engines on one queue need no lock among themselves.
     pub lock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// The function that unlocks `queue`; the library calls it on the thread that called `lock_queue`.
     pub unlock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// The argument of both functions. It must stay valid until the engine and all objects that were made with it are
     /// freed.
     pub queue_user: *mut c_void,
+    /// The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
+    /// not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
+    /// freed. The library neither reads it from a file nor writes it to one. 0: the library makes a cache and keeps it
+    /// in a file (`TumbleEngineOptions.cache_directory`).
+    pub pipeline_cache: u64,
 }
 
 /// The argument of the application's functions that lock and unlock the queue.
@@ -121,16 +127,6 @@ impl TumbleVulkan {
         let shader_float_controls =
             flag(self.shader_float_controls, "vulkan->shader_float_controls")?;
         let shader_int64 = flag(self.shader_int64, "vulkan->shader_int64")?;
-        if self.api_version < vk::API_VERSION_1_1 {
-            let version = self.api_version;
-            let (major, minor) = (
-                vk::api_version_major(version),
-                vk::api_version_minor(version),
-            );
-            return Err(refused(format!(
-                "`vulkan->api_version` is {version}, Vulkan {major}.{minor}; the instance must be made for 1.1 or newer"
-            )));
-        }
         // SAFETY: pointers to functions have one size; the caller promises which function it is.
         let entry = unsafe {
             let get_instance_proc_addr =
@@ -157,7 +153,6 @@ impl TumbleVulkan {
         }
         // SAFETY: as above.
         let instance = unsafe { ash::Instance::load(entry.static_fn(), instance) };
-        self.check_device(&instance, physical_device)?;
         // SAFETY: the device is valid, as the caller promises.
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), device) };
         Ok(VulkanHandles {
@@ -172,50 +167,9 @@ impl TumbleVulkan {
             queue_family: self.queue_family,
             copy_queue,
             queue_lock: self.queue_lock()?,
+            pipeline_cache: (self.pipeline_cache != 0)
+                .then(|| vk::PipelineCache::from_raw(self.pipeline_cache)),
         })
-    }
-
-    /// Checks with the instance that it has the physical device, and that the queue families exist and `queue` can
-    /// compute.
-    fn check_device(
-        &self,
-        instance: &ash::Instance,
-        device: vk::PhysicalDevice,
-    ) -> Result<(), Failure> {
-        // SAFETY: the instance is valid.
-        let known = unsafe { instance.enumerate_physical_devices() };
-        let known = known.map_err(|error| {
-            let message = format!("vkEnumeratePhysicalDevices: {error}");
-            Failure::new(TumbleResult::Device, message)
-        })?;
-        if !known.contains(&device) {
-            return Err(refused(format!(
-                "`vulkan->physical_device` is none of the {} of `vulkan->instance`",
-                known.len()
-            )));
-        }
-        // SAFETY: the physical device is the instance's.
-        let families = unsafe { instance.get_physical_device_queue_family_properties(device) };
-        let family = self.queue_family;
-        match families.get(family as usize) {
-            None => Err(refused(format!(
-                "`vulkan->queue_family` is {family}; the device has {} families",
-                families.len()
-            ))),
-            Some(properties) if !properties.queue_flags.contains(vk::QueueFlags::COMPUTE) => {
-                Err(refused(format!(
-                    "`vulkan->queue_family` is {family}, whose queues cannot compute"
-                )))
-            }
-            Some(_) => match families.get(self.copy_queue_family as usize) {
-                None if !self.copy_queue.is_null() => Err(refused(format!(
-                    "`vulkan->copy_queue_family` is {}; the device has {} families",
-                    self.copy_queue_family,
-                    families.len()
-                ))),
-                _ => Ok(()),
-            },
-        }
     }
 }
 
@@ -254,13 +208,14 @@ pub(crate) fn buffer_range(
 /// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
 /// `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_evaluate`,
 /// `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
-/// Without `lock_queue`, the application must not use the queue while one of them runs. The simplest solution is a
-/// queue that only the library uses, if the device has several.
+/// All others do not. Without `lock_queue`, the application must not use the queue while one of them runs. The simplest
+/// solution is a queue that only the library uses, if the device has several. Any number of engines may be created on
+/// one queue: they take turns.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
-/// version is below 1.1, or the physical device or a queue family does not fit; `TUMBLE_RESULT_DEVICE` if the device
-/// fails the self-test.
+/// version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
+/// `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 ///
 /// # Safety
 /// `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;

@@ -65,6 +65,7 @@ pub(crate) fn handles(application: &Application) -> TumbleVulkan {
         lock_queue: None,
         unlock_queue: None,
         queue_user: null_mut(),
+        pipeline_cache: 0,
     }
 }
 
@@ -744,14 +745,26 @@ fn handles_that_do_not_belong_together_are_refused() {
         (
             family,
             argument,
-            "`vulkan->queue_family` is 99; the device has",
+            "the queue is of family 99, which cannot compute; the device has",
         ),
-        (copies, argument, "`vulkan->copy_queue_family` is 98"),
+        (
+            copies,
+            argument,
+            "the queue is of family 98, which cannot copy",
+        ),
         (device, argument, "is none of the"),
         (
             version,
             argument,
-            "Vulkan 1.0; the instance must be made for 1.1",
+            "`api_version` is 4194304, Vulkan 1.0; give the version for which the instance was made",
+        ),
+        (
+            TumbleVulkan {
+                api_version: vk::make_api_version(0, 1, 1000, 0),
+                ..good
+            },
+            argument,
+            "Vulkan 1.1000; give the version",
         ),
         (
             functions,

@@ -1,6 +1,7 @@
 //! The Vulkan drivers of this machine. A driver may end the process that loads it, so a child process
 //! loads them first.
 
+use std::cell::Cell;
 use std::ffi::OsString;
 use std::io::Read;
 use std::process::{Command, ExitStatus, Stdio};
@@ -35,9 +36,33 @@ fn patience() -> u64 {
         .unwrap_or(PATIENCE)
 }
 
+/// Ends the process when a driver ends it by `exit`: what then runs at the ordinary end waits for the loader's lock,
+/// which the driver's caller holds, and the parent would wait for all of its time limit. Destructors of thread-local
+/// values run before.
+struct EndAtOnce {
+    is_loading: Cell<bool>,
+}
+
+impl Drop for EndAtOnce {
+    fn drop(&mut self) {
+        #[cfg(unix)]
+        if self.is_loading.get() {
+            signal_hook::low_level::exit(0);
+        }
+    }
+}
+
+thread_local! {
+    static END_AT_ONCE: EndAtOnce = const {
+        EndAtOnce { is_loading: Cell::new(false) }
+    };
+}
+
 /// Loads the drivers in this process, and says on standard output that it came through.
 pub(crate) fn load() {
+    END_AT_ONCE.with(|end| end.is_loading.set(true));
     let _ = Device::list(); // errors occur again where they are reported
+    END_AT_ONCE.with(|end| end.is_loading.set(false));
     let _ = listing::text(&format!("{LOADED}\n")); // the parent may have ended
 }
 

@@ -44,8 +44,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let raw: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match Arguments::try_parse_from(&raw) {
         Ok(arguments) => arguments,
-        Err(error) => {
-            words::usage(&error, &raw);
+        Err(mut error) => {
+            words::usage(&mut error, &raw);
             return error.exit_code() as u8;
         }
     };
@@ -94,16 +94,16 @@ pub fn open(name: &str, options: &EngineOptions) -> Result<Engine, Refused> {
     Ok(opened.engine)
 }
 
-/// Opens the device that is the fastest for calls with this number of rotations. `None` if loading the drivers ends
-/// the process that loads them.
+/// Opens the device that is the fastest for calls with this number of rotations, with options. `None` if loading the
+/// drivers ends the process that loads them.
 ///
 /// # Errors
 /// When no device, not even the CPU, can be opened.
-pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
+pub fn auto(rotations: usize, options: &EngineOptions) -> Result<Option<Engine>, Refused> {
     if drivers::drivers().is_err() {
         return Ok(None);
     }
-    let engine = Engine::auto_for(rotations).map_err(|error| Refused {
+    let engine = Engine::auto_with(rotations, options).map_err(|error| Refused {
         message: error.to_string(),
         is_usage: false,
         code: exit::DEVICE,

@@ -21,6 +21,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::commands::Command;
+use crate::messages::exit::BUG;
 
 const ABOUT: &str = "Interpolate tracks of rotation keys in bulk, on Vulkan or the CPU, \
                      with the same bits";
@@ -58,10 +59,22 @@ pub struct Arguments {
     command: Command,
 }
 
+/// The stack of the program, bytes: as much as most systems give a program, also where a limit of the shell is lower.
+const STACK: usize = 8 << 20;
+
 /// Runs the program with the arguments of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    ExitCode::from(host::run(std::env::args_os()))
+    let run = || host::run(std::env::args_os());
+    let thread = std::thread::Builder::new()
+        .name("main".to_owned())
+        .stack_size(STACK);
+    // Where no thread can be started, this one does.
+    let code = match thread.spawn(run) {
+        Ok(thread) => thread.join().unwrap_or(BUG),
+        Err(_) => run(),
+    };
+    ExitCode::from(code)
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ const ARGUMENTS: &str = "
 3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
 4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
 2 | eval - --times - -o o.npy                    | standard input cannot be both
-2 | verify a.dat --fps 5e11                      | of memory that are free
+4 | verify a.dat --fps 5e11                      | of memory that are free
 2 | verify a.dat -m none                         | catmull-rom
 4 | verify none.dat                              | none.dat
 3 | info a.dat none.dat                          | none.dat

@@ -117,6 +117,20 @@ fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
     assert_eq!(names(folder.path()), before);
 }
 
+/// A limit of the shell that is too low for the program's own calls.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_small_stack_is_enough() {
+    let folder = sample_folder();
+    let program = env!("CARGO_BIN_EXE_tumble");
+    let line = format!("ulimit -s 64; exec '{program}' eval a.dat -o small.npy --device cpu");
+    let mut shell = Command::new("sh");
+    shell.current_dir(folder.path()).args(["-c", &line]);
+    let run = finish(shell.output().unwrap());
+    assert_eq!(run.code, 0, "{}", run.words);
+    assert!(folder.path().join("small.npy").exists());
+}
+
 #[cfg(unix)]
 fn names(folder: &std::path::Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();

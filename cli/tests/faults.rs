@@ -301,6 +301,7 @@ fn absence_is_told_within_a_second() {
         ("no compute", set("FAULT_DEVICES", Path::new("no-compute"))),
         ("a driver that crashes", set("VK_DRIVER_FILES", &crashing)),
         ("a driver that ends", set("VK_DRIVER_FILES", &crashing)),
+        ("a driver that exits", set("VK_DRIVER_FILES", &crashing)),
     ];
     for (case, (variable, value)) in cases {
         for device in ["first", "vulkan"] {
@@ -310,6 +311,9 @@ fn absence_is_told_within_a_second() {
             }
             if case == "a driver that ends" {
                 command.env("CRASH_STATUS", "0");
+            }
+            if case == "a driver that exits" {
+                command.env("CRASH_STATUS", "exit");
             }
             let started = Instant::now();
             let run = finish(command.env(variable, &value).output().unwrap());

@@ -320,7 +320,7 @@ fn bad_inputs_and_lines() {
         "out.csv",
     ];
     for (code, words, message) in [
-        (4, vec!["route", "flat.obj"], "face 0 (from 0) has no area"),
+        (4, vec!["route", "flat.obj"], "no faces with an area"),
         (4, vec!["route", "empty.ply"], "no faces"),
         (4, vec!["route", "none.obj"], "cannot be read"),
         (2, vec!["route", "hill.txt"], ".obj, .ply"),

@@ -99,8 +99,7 @@ struct DatHeader {
 
 fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<DatHeader, Diagnostic> {
     let Some(line) = lines.next()? else {
-        let message = "the file is empty; it starts with `# <boxes> <box length>`".to_owned();
-        return Err(lines.refuse(1, Code::Empty, message));
+        return Err(lines.refuse_whole(Code::Empty, "the file is empty".to_owned()));
     };
     let Some(body) = line.trim_start().strip_prefix('#') else {
         let message = "no header; the first line is `# <boxes> <box length>`".to_owned();

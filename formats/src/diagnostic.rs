@@ -93,6 +93,11 @@ impl Diagnostic {
         }
     }
 
+    /// The error of an input without bytes.
+    pub(crate) fn empty(file: impl Into<String>) -> Self {
+        Self::new(file, Code::Empty, "the file is empty")
+    }
+
     /// The same diagnostic with a location in a file without lines: a JSON pointer, a member, a column.
     #[must_use]
     pub fn inside(mut self, pointer: impl Into<String>) -> Self {
@@ -147,12 +152,12 @@ codes! {
     Open = "E001" elsewhere, "the input cannot be read", "The system refused to open or read it; its reason is given.";
     NotAFile = "E002" elsewhere, "not a file", "Directories, sockets and devices cannot be read as files. A named pipe is read only with `--pipes`; `-` reads standard input.";
     Changed = "E003" elsewhere, "the file changed while it was read", "Its length or its modification time changed during reading. Try again when the other program has finished writing.";
-    OtherFormat = "E004", "another format", "The file begins like a file of another format, not like a `.dat` file.";
+    OtherFormat = "E004", "another format", "The first bytes or the name are those of another kind of file, which is not read as it is; the message says what it is and how to convert it.";
     Encoding = "E005", "not plain text", "A `.dat` file is ASCII or UTF-8 text; UTF-16, NUL bytes and invalid UTF-8 are refused.";
     Character = "E006", "a character that does not belong", "Only printable ASCII, blanks and tabs make up numbers; no-break spaces, form feeds and bare carriage returns are refused because editors hide them.";
     LineTooLong = "E007" elsewhere, "a line is too long", "Lines of keyframe data are never this long; the file is probably something else.";
     FileTooLong = "E008" elsewhere, "the file is too long", "The limit protects against endless inputs; raise it by `--max-size` if the file is correct.";
-    Empty = "E010", "an empty file", "A `.dat` file has at least a header and one line of keys.";
+    Empty = "E010", "an empty file", "The file has no bytes, or no line: the program that wrote it may have been stopped, or its disk was full.";
     NoHeader = "E011", "no header", "The first line is `# <boxes> <box length>`, such as `# 4 3.0`.";
     HeaderShort = "E012", "the header lacks a number", "The header has the number of boxes and the length of a box.";
     Boxes = "E013", "not a number of boxes", "The number of boxes is a whole number from 1 to 65536, in plain digits.";
@@ -261,7 +266,7 @@ codes! {
     Walkers = "E613" elsewhere, "not a walker", "A walker needs a name without folders, radius, speed, x, y, z, to_x, to_y and to_z. A moving obstacle needs name, radius and track, a file with rows t, x, y, z at increasing times.";
     Offsets = "E614" elsewhere, "offsets that do not fit", "Offsets are three numbers for each joint, its position relative to its parent, in the order of the joints.";
     // E7xx and W7xx: FBX.
-    FbxDamaged = "E701", "an FBX file that cannot be read", "It is truncated, damaged, or not an FBX file. The message is that of the library that reads FBX, which gives no location.";
+    FbxDamaged = "E701", "an FBX file that cannot be read", "It is truncated, damaged, or not an FBX file, or has decimal commas. The message is that of the library that reads FBX, which gives no location.";
     FbxVersion = "E702", "an unknown version of FBX", "Versions 3.0 to 7.7 are supported, as text and as binary.";
     FbxDepth = "E703" elsewhere, "a hierarchy that is too deep", "No skeleton is a thousand joints deep.";
     FbxWork = "E704" elsewhere, "curves that take too much work", "The number of evaluations of curves is limited in proportion to the length of the file. A file that needs more is damaged or malicious.";
@@ -321,7 +326,7 @@ codes! {
     FbxOutside = "W703", "keys outside the take", "An animation stack has a start and an end. Some curves have keys outside, which a player does not show.";
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
-    FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, so nothing moves.";
+    FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, or is a pose: each curve has one key. Nothing moves.";
     FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
     FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";

@@ -5,6 +5,7 @@ pub mod registry;
 mod write_clips;
 
 use std::fmt;
+use std::fs::{self, Metadata};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -488,6 +489,11 @@ impl Format {
     /// # Errors
     /// When the file cannot be opened or is invalid; the first error is returned.
     pub fn open(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        // A pipe's first bytes are its reader's.
+        let is_empty = |metadata: Metadata| metadata.is_file() && metadata.len() == 0;
+        if fs::metadata(path).is_ok_and(is_empty) {
+            return Err(Diagnostic::empty(path.display().to_string()));
+        }
         (self.read)(path, options)
     }
 }

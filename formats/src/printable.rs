@@ -9,12 +9,19 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Whether a character has an effect instead of a shape: controls (C0, DEL, C1), line ends, and marks that change the
-/// direction of writing or are invisible. Joiners, which words of many languages need, are not among them.
+/// direction of writing or are invisible; or is none. Joiners, which words of many languages need, are not among them.
 fn is_active(character: char) -> bool {
     character.is_control()
         || matches!(character,
             '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}'
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+        || is_no_character(character)
+}
+
+/// Whether Unicode reserves the number for programs themselves. XML refuses U+FFFE and U+FFFF, and so do readers of
+/// SVG.
+fn is_no_character(character: char) -> bool {
+    matches!(character, '\u{fdd0}'..='\u{fdef}') || u32::from(character) & 0xfffe == 0xfffe
 }
 
 /// The text with such characters escaped: `\n`, `\t`, `\u{1b}`. Most texts are returned unchanged.
@@ -76,6 +83,11 @@ mod tests {
             ("\u{9b}2J", "\\u{9b}2J"),
             ("\u{202e}gpj.exe", "\\u{202e}gpj.exe"),
             ("a\r\tb\u{7f}", "a\\r\\tb\\u{7f}"),
+            (
+                "a\u{fffe}b\u{ffff}\u{1ffff}",
+                "a\\u{fffe}b\\u{ffff}\\u{1ffff}",
+            ),
+            ("\u{fdd0}\u{fffd}", "\\u{fdd0}\u{fffd}"),
         ] {
             assert_eq!(printable(text), shown);
         }

@@ -10,7 +10,8 @@ use crate::sample::Samples;
 pub struct WorldPose {
     /// Where its origin is.
     pub position: DVec3,
-    /// How it is turned: the product of its ancestors' rotations and its own, without their scales.
+    /// How it is turned: the product of its ancestors' rotations and its own, without their scales, also where a
+    /// negative scale mirrors its axes, which no rotation equals.
     pub rotation: Quat,
 }
 
@@ -180,6 +181,27 @@ mod tests {
         assert!(found[0].position.distance(DVec3::new(0.0, 2.0, 1.0)) < 1e-6);
         assert!(found[0].rotation.dot(quarter).abs() > 1.0 - 1e-6);
         assert_eq!(found[1].position, DVec3::Z);
+    }
+
+    /// As docs/formats.md says: rotations are multiplied, and positions and matrices are mirrored.
+    #[test]
+    fn under_a_mirrored_parent_rotations_are_those_without_the_mirror() {
+        let clip = clip(&[None, Some(0), Some(1), Some(1)]);
+        let quarter = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let samples = Samples {
+            times: vec![0.0],
+            rotations: vec![Quat::IDENTITY, quarter, Quat::IDENTITY, Quat::IDENTITY],
+            translations: vec![Vec3::ZERO, Vec3::ZERO, Vec3::X, Vec3::Y],
+            scales: vec![Vec3::new(-1.0, 1.0, 1.0), Vec3::ONE, Vec3::ONE, Vec3::ONE],
+        };
+        let found = world(&clip, &samples).unwrap();
+        for joint in 1..4 {
+            assert!(found[joint].rotation.dot(quarter) > 1.0 - 1e-6, "{joint}");
+        }
+        assert!(found[2].position.distance(DVec3::Y) < 1e-6);
+        assert!(found[3].position.distance(DVec3::X) < 1e-6);
+        let matrices = world_matrices(&clip, &samples).unwrap();
+        assert!((matrices[1].matrix3.determinant() + 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `tumble.Engine`: one device, kept open.
 
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
@@ -7,8 +8,8 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::{
-    Axes, Device, Encoding, EncodingOptions, EngineOptions, EulerSequence, Interpolation, Layout,
-    MatrixOrder, Quantity, UnknownNameError,
+    Axes, CacheFiles, Device, Encoding, EncodingOptions, EngineOptions, EulerSequence,
+    Interpolation, Layout, MatrixOrder, Quantity, UnknownNameError,
 };
 use tumble_cli::host;
 
@@ -30,13 +31,15 @@ pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 
 /// Evaluates clips on one device, which stays open.
 ///
-/// `Engine(device="auto", *, memory=None, threads=None, allow_inexact=False)`
+/// `Engine(device="auto", *, memory=None, threads=None, allow_inexact=False, cache=None)`
 ///
 /// `device`: "auto", the CPU, and for calls of a million rotations or more the device that is
 /// measured to be the fastest; "cpu"; "first", the first Vulkan device that is exact, else the CPU;
 /// "vulkan"; or a device's index or part of its name (`tumble.devices()`). All give the same bits.
 /// `memory`: bytes of a Vulkan device that segments may take; `threads`: of the CPU;
-/// `allow_inexact`: use a device that fails its self-test.
+/// `allow_inexact`: use a device that fails its self-test. `cache`: the directory in which a Vulkan
+/// device's compiled kernels, checks and speed are kept; "off" keeps no files, "user", the default,
+/// is `TUMBLE_CACHE_DIR` or the user's cache directory.
 ///
 /// An engine may be used by several threads at once. The interpreter's lock is released while it
 /// works, and Ctrl-C ends a long evaluation.
@@ -61,13 +64,30 @@ struct EngineArguments {
     memory: Option<u64>,
     threads: Option<usize>,
     allow_inexact: bool,
+    /// `None` and "user" are the user's directory, "off" is none, any other is a directory.
+    cache: Option<PathBuf>,
+}
+
+impl EngineArguments {
+    fn options(&self) -> EngineOptions {
+        let mut options = EngineOptions::default();
+        options.memory = self.memory;
+        options.allow_inexact = self.allow_inexact;
+        options.thread_count = self.threads;
+        options.cache_files = match &self.cache {
+            Some(path) if path.as_os_str() == "off" => CacheFiles::Off,
+            Some(path) if path.as_os_str() != "user" => CacheFiles::Within(path.clone()),
+            _ => CacheFiles::OfUser,
+        };
+        options
+    }
 }
 
 /// The engine that functions and methods without one share.
 pub(crate) fn default_engine(py: Python<'_>) -> PyResult<&Bound<'_, Engine>> {
     static ENGINE: PyOnceLock<Py<Engine>> = PyOnceLock::new();
     let engine = ENGINE.get_or_try_init(py, || {
-        Py::new(py, Engine::new(py, None, None, None, false)?)
+        Py::new(py, Engine::new(py, None, None, None, false, None)?)
     })?;
     Ok(engine.bind(py))
 }
@@ -97,23 +117,28 @@ pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
 #[pymethods]
 impl Engine {
     #[new]
-    #[pyo3(signature = (device=None, *, memory=None, threads=None, allow_inexact=false))]
+    #[pyo3(signature = (device=None, *, memory=None, threads=None, allow_inexact=false, cache=None))]
     pub(crate) fn new(
         py: Python<'_>,
         device: Option<&Bound<'_, PyAny>>,
         memory: Option<u64>,
         threads: Option<usize>,
         allow_inexact: bool,
+        cache: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let mut options = EngineOptions::default();
-        options.memory = memory;
-        options.allow_inexact = allow_inexact;
-        options.thread_count = threads;
         let name = match device {
             Some(name) => name.str()?.to_str()?.to_owned(),
             None => "auto".to_owned(),
         };
         let is_auto = name.eq_ignore_ascii_case("auto");
+        let arguments = EngineArguments {
+            device: name.clone(),
+            memory,
+            threads,
+            allow_inexact,
+            cache,
+        };
+        let options = arguments.options();
         py.detach(|| {
             guarded(|| {
                 let engine = match is_auto {
@@ -122,12 +147,6 @@ impl Engine {
                     false => host::open(&name, &options).map_err(|failure| of_host(&failure))?,
                 };
                 let by_cost = is_auto.then(OnceLock::new);
-                let arguments = EngineArguments {
-                    device: name.clone(),
-                    memory,
-                    threads,
-                    allow_inexact,
-                };
                 Ok(Self {
                     engine,
                     by_cost,
@@ -152,6 +171,10 @@ impl Engine {
         options.set_item("memory", arguments.memory)?;
         options.set_item("threads", arguments.threads)?;
         options.set_item("allow_inexact", arguments.allow_inexact)?;
+        options.set_item(
+            "cache",
+            arguments.cache.as_ref().map(|path| path.as_os_str()),
+        )?;
         let class = py.get_type::<Self>();
         let again = py.import("functools")?.getattr("partial")?;
         let again = again.call((class, &arguments.device), Some(&options))?;
@@ -849,7 +872,8 @@ impl Engine {
         Python::attach(|py| {
             py.detach(|| {
                 guarded(|| {
-                    let chosen = host::auto(rotations).map_err(|failure| of_host(&failure))?;
+                    let chosen = host::auto(rotations, &self.arguments.options())
+                        .map_err(|failure| of_host(&failure))?;
                     // Two threads may have chosen at once: both have the same bits.
                     let chosen = chosen.unwrap_or_else(|| self.engine.clone());
                     let chosen = large.get_or_init(|| (std::process::id(), chosen));

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import warnings
 from pathlib import Path
 
@@ -311,3 +312,16 @@ def test_keys_without_a_smooth_curve_are_told_once():
         clip.evaluate(fps=20, method="slerp")
     with pytest.warns(tumble.InputWarning, match="W014"):
         clip.evaluate(fps=10, method="c2", ends="natural")
+
+
+def test_an_engine_keeps_files_where_it_is_told(tmp_path, monkeypatch):
+    user, given = tmp_path / "user", tmp_path / "given"
+    monkeypatch.setenv("TUMBLE_CACHE_DIR", str(user))
+    for engine in (tumble.Engine("cpu", cache="off"), pickle.loads(pickle.dumps(tumble.Engine("cpu", cache=given)))):
+        assert engine.device == "CPU"
+    if not tumble.devices():
+        return
+    tumble.Engine(0, cache="off").warm(method="slerp")
+    assert not user.exists() and not given.exists()
+    tumble.Engine(0, cache=given).warm(method="slerp")
+    assert not user.exists() and any(given.iterdir())

@@ -8,7 +8,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum MeshError {
     /// There is no face with an area.
-    #[error("the mesh has no faces; give one with triangles or polygons")]
+    #[error("the mesh has no faces with an area; give one with triangles or polygons")]
     Empty,
     /// A coordinate is NaN or infinite, or its magnitude exceeds 1e75, where areas overflow.
     #[error("vertex {vertex} (from 0) is at {position}; coordinates must be numbers below 1e75")]
@@ -35,17 +35,6 @@ pub enum MeshError {
         face: usize,
         /// Number of its corners.
         corners: usize,
-    },
-    /// The three different corners of a triangle lie on a line.
-    #[error(
-        "face {face} (from 0) has no area: its corners {corners:?} lie on a line; remove it, or \
-         collapse its shortest edge"
-    )]
-    Flat {
-        /// Index of the face, from 0.
-        face: usize,
-        /// Positions of its corners.
-        corners: [DVec3; 3],
     },
     /// The sides of a polygon cross each other.
     #[error("the sides of face {face} (from 0) cross each other; cut it into triangles")]
@@ -93,6 +82,17 @@ pub enum MeshWarning {
         /// Number of such triangles.
         count: usize,
         /// Index of the face of the first one, from 0.
+        face: usize,
+    },
+    /// Faces whose corners lie on a line, as where three triangles meet at a T-joint, are left out. Their neighbours
+    /// are connected as far as their corners lie on each other's sides.
+    #[error(
+        "{count} faces have no area, since their corners lie on a line; they are left out; the first is face {face} (from 0)"
+    )]
+    NoArea {
+        /// Number of such faces.
+        count: usize,
+        /// Index of the first one, from 0.
         face: usize,
     },
     /// Polygons whose corners do not lie in one plane are cut in their mean plane.

@@ -47,12 +47,29 @@ fn what_is_no_mesh_is_refused() {
         );
     }
     let line = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::X, DVec3::Y];
-    let error = refused(&line, &[&[0, 1, 3], &[0, 1, 2]]);
-    assert!(matches!(error, MeshError::Flat { face: 1, .. }), "{error}");
-    assert!(
-        error.to_string().contains("face 1 (from 0) has no area"),
-        "{error}"
-    );
+    assert_eq!(refused(&line, &[&[0, 1, 2]]), MeshError::Empty);
+}
+
+/// A sliver at a T-joint, as CAD programs write them, and one between two triangles of a square.
+#[test]
+fn faces_of_no_area_are_left_out() {
+    let no_area = MeshWarning::NoArea { count: 1, face: 1 };
+    let shortest =
+        |mesh: &Mesh, from: DVec3, to: DVec3| mesh.route(from, to, By::Exact).unwrap().length;
+    let below = dvec3(1.0, -1.0, 0.0);
+    let joint = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::X, CORNERS[2], below];
+    let mesh = of(&joint, &[&[0, 2, 3], &[0, 1, 2], &[0, 4, 1], &[1, 4, 2]]);
+    let divided = MeshWarning::SidesCut { count: 1 };
+    assert_eq!(mesh.warnings(), [no_area.clone(), divided]);
+    assert_eq!(mesh.pieces(), [4]);
+    assert_eq!(shortest(&mesh, CORNERS[2], below), 2.0);
+    let middle = dvec3(0.5, 0.5, 0.0);
+    let square = [&CORNERS[..], &[middle]].concat();
+    let mesh = of(&square, &[&[0, 1, 2], &[0, 2, 4], &[0, 2, 3], &[1, 1, 2]]);
+    let equal = MeshWarning::Dropped { count: 1, face: 3 };
+    assert_eq!(mesh.warnings(), [equal, no_area]);
+    let length = shortest(&mesh, DVec3::X, DVec3::Y);
+    assert!((length - 2.0_f64.sqrt()).abs() < 1e-15, "{length}");
 }
 
 #[test]

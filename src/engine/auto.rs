@@ -9,6 +9,7 @@ use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::cache::{self, Cache};
+use crate::gpu::options::EngineOptions;
 use crate::method::slerp::SLERP;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::Layout;
@@ -79,18 +80,30 @@ impl Engine {
     /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) are never chosen: they compute on the
     ///   CPU too, and are slower.
     /// * Otherwise every exact device and the CPU evaluate a probe of 2^19 rotations, and the shortest of three times
-    ///   counts. The time of a card's model with its driver is stored in the user's cache directory, so that later
-    ///   processes open only the fastest device. `TUMBLE_CACHE_DIR` names another directory; if it is empty, nothing
-    ///   is stored.
+    ///   counts. The time of a card's model with its driver is stored ([`CacheFiles`](crate::CacheFiles)), so that
+    ///   later processes open only the fastest device.
     ///
     /// # Errors
     /// When the system refuses the resources of the CPU engine.
     pub fn auto_for(rotations: usize) -> Result<Self, Error> {
-        let cpu = Self::new(Device::Cpu)?;
+        Self::auto_with(rotations, &EngineOptions::default())
+    }
+
+    /// As [`Engine::auto_for`], and opens the chosen device with options. Devices are compared without them, except
+    /// for [`EngineOptions::cache_files`]; one that fails the self-test is not chosen.
+    ///
+    /// # Errors
+    /// When an option is out of range, or the system refuses the resources of the CPU engine.
+    pub fn auto_with(rotations: usize, options: &EngineOptions) -> Result<Self, Error> {
+        let cpu = Self::with_options(Device::Cpu, options)?;
+        let compared = EngineOptions {
+            cache_files: options.cache_files.clone(),
+            ..EngineOptions::default()
+        };
         if rotations < MIN_ROTATIONS_FOR_DEVICE {
             return Ok(cpu);
         }
-        let cache = Cache::of_user();
+        let cache = Cache::new(&options.cache_files);
         let (mut models, mut timed) = (HashSet::new(), Vec::new());
         for device in Device::list().unwrap_or_default() {
             // Of several cards of one model the first serves as well as any.
@@ -102,11 +115,11 @@ impl Engine {
             }
             if let Some(time) = remembered(&cache, &model) {
                 timed.push((time, device, None));
-            } else if let Ok(engine) = Self::new(device.clone())
+            } else if let Ok(engine) = Self::with_options(device.clone(), &compared)
                 && let Ok(time) = engine.probe_time()
             {
                 cache.write(&model, &(time.as_nanos() as u64).to_le_bytes());
-                timed.push((time, device, Some(engine)));
+                timed.push((time, device, Some(engine).filter(|_| compared == *options)));
             } else {
                 continue; // one that fails is not chosen
             }
@@ -120,9 +133,9 @@ impl Engine {
         timed.sort_by_key(|(time, ..)| *time);
         let mut engines = timed
             .into_iter()
-            .filter_map(|(_, device, open)| match open {
+            .filter_map(|(_, device, opened)| match opened {
                 Some(engine) => Some(engine),
-                None => Self::new(device).ok(),
+                None => Self::with_options(device, options).ok(),
             });
         Ok(engines.next().unwrap_or(cpu))
     }

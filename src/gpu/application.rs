@@ -168,6 +168,7 @@ impl Application {
             queue_family: self.physical.queue_family,
             copy_queue: self.copy_queue,
             queue_lock: None,
+            pipeline_cache: None,
         }
     }
 

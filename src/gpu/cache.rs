@@ -6,11 +6,11 @@ use std::env;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
-#[cfg(test)]
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::gpu::options::CacheFiles;
 
 /// The environment variable with the directory; an empty value disables the cache.
 pub(crate) const VARIABLE: &str = "TUMBLE_CACHE_DIR";
@@ -22,29 +22,31 @@ const MARK: &[u8] = b"tumble cache 1\n";
 ///
 /// It is `TUMBLE_CACHE_DIR`, else `tumble` in `XDG_CACHE_HOME`, in `~/.cache` (macOS:
 /// `~/Library/Caches`), or in `LOCALAPPDATA` on Windows.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Cache {
     /// `None` if the cache is disabled.
     folder: Option<PathBuf>,
 }
 
 impl Cache {
-    /// The cache that the environment variables define.
-    pub(crate) fn of_user() -> Self {
-        let folder = folder(|name| env::var_os(name));
+    pub(crate) fn new(files: &CacheFiles) -> Self {
+        let folder = match files {
+            CacheFiles::OfUser => folder(|name| env::var_os(name)),
+            CacheFiles::Within(folder) => Some(folder.clone()),
+            CacheFiles::Off => None,
+        };
         Self { folder }
     }
 
     /// A cache in a directory, which is made when something is written.
     #[cfg(test)]
     pub(crate) fn within(folder: &Path) -> Self {
-        let folder = Some(folder.to_owned());
-        Self { folder }
+        Self::new(&CacheFiles::Within(folder.to_owned()))
     }
 
     /// The contents that were last written under a name, which is a file's name without a folder. `None` if there is
-    /// no such file, it is longer than `max_bytes`, or it is damaged. The contents may come from another version,
-    /// another machine or an attacker; the caller must check them.
+    /// no such file, it is longer than `max_bytes`, it is damaged, or another user could have written it. The contents
+    /// may come from another version or another machine; the caller must check them.
     pub(crate) fn read(&self, name: &str, max_bytes: usize) -> Option<Vec<u8>> {
         let path = self.path(name)?;
         // What is no file might never end.
@@ -55,6 +57,9 @@ impl Cache {
         let limit = head.checked_add(max_bytes)?.checked_add(1)?;
         let mut bytes = Vec::new();
         let file = File::open(path).ok()?;
+        if !is_trusted(&file.metadata().ok()?) {
+            return None;
+        }
         file.take(limit as u64).read_to_end(&mut bytes).ok()?;
         if bytes.len() == limit {
             return None;
@@ -73,8 +78,8 @@ impl Cache {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let temporary = path.with_file_name(format!("{name}.{}.{number}.part", process::id()));
         let write = || {
-            fs::create_dir_all(path.parent()?).ok()?;
-            let mut file = File::create_new(&temporary).ok()?;
+            private_folder(path.parent()?).ok()?;
+            let mut file = private_file(&temporary).ok()?;
             let written = [MARK, &sum(name, contents).to_le_bytes(), contents]
                 .iter()
                 .try_for_each(|part| file.write_all(part));
@@ -94,6 +99,40 @@ impl Cache {
         debug_assert!(is_plain, "{name}");
         Some(self.folder.as_ref()?.join(name)).filter(|_| is_plain)
     }
+}
+
+/// Whether nobody but this process's user and the system's administrator could have written a file: a driver gets the
+/// compiled kernels in it, and a checksum can be made by anybody. Where the system does not say whose the process is,
+/// only the permissions count.
+#[cfg(unix)]
+fn is_trusted(metadata: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let user = fs::metadata("/proc/self").map(|process| process.uid());
+    let is_of_user = user.is_ok_and(|user| metadata.uid() == user) || metadata.uid() == 0;
+    (is_of_user || !cfg!(target_os = "linux")) && metadata.mode() & 0o022 == 0
+}
+
+#[cfg(not(unix))]
+fn is_trusted(_: &fs::Metadata) -> bool {
+    true
+}
+
+/// A new file that others cannot write, whatever the mask of the process.
+fn private_file(path: &Path) -> std::io::Result<File> {
+    let mut options = File::options();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path)
+}
+
+/// Makes a folder, and those above it, that others cannot write.
+fn private_folder(path: &Path) -> std::io::Result<()> {
+    let mut folder = fs::DirBuilder::new();
+    folder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut folder, 0o700);
+    folder.create(path)
 }
 
 /// The directory that environment variables define.
@@ -167,6 +206,29 @@ mod tests {
         let path = cache.path("kernels").unwrap();
         let names = fs::read_dir(path.parent().unwrap()).unwrap();
         assert_eq!(names.count(), 2);
+    }
+
+    /// Files that others may write, or have written.
+    #[cfg(unix)]
+    #[test]
+    fn what_another_user_could_have_written_is_not_there() {
+        use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::within(&folder.path().join("made"));
+        assert!(cache.write("one", b"contents"));
+        let path = cache.path("one").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().mode() & 0o777;
+        assert_eq!((mode(&path), mode(path.parent().unwrap())), (0o600, 0o700));
+        for (mode, is_read) in [(0o644, true), (0o664, false), (0o602, false), (0o600, true)] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            assert_eq!(cache.read("one", 100).is_some(), is_read, "{mode:o}");
+        }
+        // Only the administrator may give a file away.
+        if cfg!(target_os = "linux") && chown(&path, Some(54_321), None).is_ok() {
+            assert_eq!(cache.read("one", 100), None);
+            assert!(cache.write("one", b"again"), "it is replaced");
+            assert_eq!(cache.read("one", 100).unwrap(), b"again");
+        }
     }
 
     /// A file that was cut, changed, put under another name, or is none.

@@ -2,13 +2,16 @@
 
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
+use crate::gpu::cache::Cache;
+use crate::gpu::device_queue::DeviceQueue;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::handles::{QueueLock, VulkanQueue};
+use crate::gpu::kernel_check::passes::Passes;
 use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
 use crate::gpu::physical::queues::{Copies, QueueIndex};
@@ -16,7 +19,6 @@ use crate::gpu::physical::upload_memory::{Placing, direct};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::shared_memory::SharedMemory;
-use crate::threads::lock;
 
 /// The purpose of a submission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,25 +31,6 @@ pub(crate) enum QueueLane {
 
 /// The number of times that a fence is polled, each for up to 10 ms: a minute in total.
 const PATIENCE: usize = 6000;
-
-/// A queue, which Vulkan allows one user at a time.
-struct DeviceQueue {
-    raw: Mutex<vk::Queue>,
-    family: u32,
-    /// The lock that the application uses for the same queue.
-    shared: Option<QueueLock>,
-}
-
-impl DeviceQueue {
-    /// Calls `work` while nothing else uses the queue.
-    fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
-        let queue = lock(&self.raw);
-        match &self.shared {
-            Some(shared) => shared.run(|| work(*queue)),
-            None => Some(work(*queue)),
-        }
-    }
-}
 
 /// An opened device. It is destroyed with its last user, unless it belongs to the application.
 pub(crate) struct LogicalDevice {
@@ -78,6 +61,8 @@ pub(crate) struct LogicalDevice {
     process: u32,
     /// The driver's compiled kernels, which are kept from process to process.
     pub(crate) pipelines: PipelineCache,
+    /// The kernels that are known to be exact.
+    pub(crate) passes: Arc<Passes>,
 }
 
 impl LogicalDevice {
@@ -147,11 +132,13 @@ impl LogicalDevice {
             family,
         });
         let first = queue(family, 0);
+        let pipelines = PipelineCache::new(&raw, &physical, &options.cache_files);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
         let exports = exports.then(|| khr::external_memory_fd::Device::new(instance, &raw));
         let exports_timelines =
             exports_timelines.then(|| khr::external_semaphore_fd::Device::new(instance, &raw));
-        let mut device = Self::borrowed(physical, raw, first, copy_queue, None, options);
+        let mut device =
+            Self::with_queues(physical, raw, (first, None), copy_queue, pipelines, options);
         (device.owned, device.borrows) = (true, borrows);
         (device.exports, device.exports_timelines) = (exports, exports_timelines);
         device.copies_apart = copies_apart;
@@ -159,26 +146,17 @@ impl LogicalDevice {
     }
 
     /// A device of an application, which must destroy it. Staged results are copied by `copy_queue`, if there is one.
-    pub(crate) fn borrowed(
+    pub(crate) fn with_queues(
         physical: PhysicalDevice,
         raw: ash::Device,
-        queue: vk::Queue,
+        (queue, queue_lock): (vk::Queue, Option<QueueLock>),
         copy_queue: Option<VulkanQueue>,
-        queue_lock: Option<QueueLock>,
+        pipelines: PipelineCache,
         options: &EngineOptions,
     ) -> Self {
         let in_place = physical.in_place(options.transfer);
         let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
-        let queue_of_family = |(raw, family), shared| {
-            let raw = Mutex::new(raw);
-            DeviceQueue {
-                raw,
-                family,
-                shared,
-            }
-        };
-        let pipelines = PipelineCache::new(&raw, &physical);
         let instance = &physical.instance;
         let names = instance
             .debug_utils
@@ -191,8 +169,8 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: queue_of_family((queue, physical.queue_family), queue_lock),
-            copy_queue: named.map(|named| queue_of_family((named.queue, named.family), None)),
+            queue: DeviceQueue::new(queue, physical.queue_family, queue_lock),
+            copy_queue: named.map(|named| DeviceQueue::new(named.queue, named.family, None)),
             copies_apart: named.is_some(),
             physical,
             names,
@@ -204,6 +182,7 @@ impl LogicalDevice {
             hung: AtomicBool::new(false),
             process: std::process::id(),
             pipelines,
+            passes: Passes::kept_in(&Cache::new(&options.cache_files)),
         }
     }
 
@@ -235,12 +214,9 @@ impl LogicalDevice {
     }
 
     /// Locks all queues of a device that the engine opened.
-    fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
-        let kernels = lock(&self.queue.raw);
-        (
-            kernels,
-            self.copy_queue.as_ref().map(|other| lock(&other.raw)),
-        )
+    fn all_queues(&self) -> (MutexGuard<'_, ()>, Option<MutexGuard<'_, ()>>) {
+        let kernels = self.queue.lock();
+        (kernels, self.copy_queue.as_ref().map(DeviceQueue::lock))
     }
 
     /// Gives an object the name that validation and debuggers show.

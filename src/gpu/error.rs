@@ -70,6 +70,40 @@ pub enum VulkanError {
         /// The number of the device's families.
         families: usize,
     },
+    /// A handle of the application is null.
+    #[error("`{name}` is null (VK_NULL_HANDLE)")]
+    NullHandle {
+        /// The handle's name: the field of `VulkanHandles` or `VulkanBuffer`.
+        name: &'static str,
+    },
+    /// The version that an application states of its instance is below 1.1, or above the loader's.
+    #[error(
+        "`api_version` is {stated}, Vulkan {}; give the version for which the instance was made (VkApplicationInfo::apiVersion), 1.1 to the loader's {}", version(*.stated), version(*.loader)
+    )]
+    ApiVersion {
+        /// The stated version.
+        stated: u32,
+        /// The loader's version.
+        loader: u32,
+    },
+    /// A physical device that the application's instance does not have.
+    #[error("`physical_device` is none of the {count} of `instance`")]
+    OtherPhysicalDevice {
+        /// The number of the instance's physical devices.
+        count: usize,
+    },
+    /// The range of a buffer ends beyond the buffer.
+    #[error(
+        "the range of {size} bytes at {offset} ends beyond the buffer, which has {memory} bytes of memory"
+    )]
+    BufferEnd {
+        /// The start of the range, bytes.
+        offset: u64,
+        /// The length of the range, bytes.
+        size: u64,
+        /// The length of the buffer's memory, bytes: the buffer's length, rounded up.
+        memory: u64,
+    },
     /// The application's queue lock did not call the function that was passed to it.
     #[error(
         "the application's lock of the queue (VulkanHandles::queue_lock) did not call the function that it was given"
@@ -205,6 +239,11 @@ impl VulkanError {
         }
         false
     }
+}
+
+/// A version of Vulkan in digits: `1.3`.
+fn version(packed: u32) -> String {
+    format!("{}.{}", packed >> 22 & 0x7f, packed >> 12 & 0x3ff)
 }
 
 #[cfg(feature = "vulkan")]

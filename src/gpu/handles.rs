@@ -3,8 +3,10 @@
 use std::fmt;
 use std::sync::{Arc, Mutex};
 
-use ash::vk;
+use ash::vk::{self, Handle as _};
 
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::error::{Named as _, VulkanError};
 use crate::threads::lock;
 
 /// An application's instance, device and queue, for an engine
@@ -39,9 +41,56 @@ pub struct VulkanHandles {
     ///
     /// The application must lock it whenever it uses `queue`; the engine locks it for each of its submissions. The
     /// application must not call the engine while it has the lock, because the engine would wait for it forever.
-    /// Without a lock, nothing else may use the queue while the engine uses it. The copy queue is for the engine
+    /// Without a lock, the application must not use the queue during a call that submits. These calls submit:
+    /// [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) and [`Engine::warm`](crate::engine::Engine::warm),
+    /// uploads, all evaluations and streams, the functions called `to_buffer` and `target`,
+    /// [`Crowd::new`](crate::crowd::player::Crowd::new), and a crowd's `submit`. Functions called `record` and those
+    /// that change a crowd's library or layers do not, and neither does dropping an object.
+    ///
+    /// Engines need no lock among themselves: all engines of a process that use one queue take turns. If several
+    /// engines use a queue together with the application, give the same lock to each. The copy queue is for engines
     /// alone.
     pub queue_lock: Option<QueueLock>,
+    /// The application's pipeline cache, in which the engine makes its pipelines. It must outlive the engine, must not
+    /// be synchronized externally, and is neither read from nor written to a file by the engine. `None`: the engine
+    /// makes a cache, and keeps it in a file ([`EngineOptions::cache_files`](crate::gpu::options::EngineOptions)).
+    pub pipeline_cache: Option<vk::PipelineCache>,
+}
+
+impl VulkanHandles {
+    /// Refuses handles that are null, and a version that the instance cannot have.
+    pub(crate) fn check(&self) -> Result<(), VulkanError> {
+        let handles = [
+            ("instance", self.instance.handle().as_raw()),
+            ("physical_device", self.physical_device.as_raw()),
+            ("device", self.device.handle().as_raw()),
+            ("queue", self.queue.as_raw()),
+            (
+                "copy_queue",
+                self.copy_queue.map_or(1, |copies| copies.queue.as_raw()),
+            ),
+            (
+                "pipeline_cache",
+                self.pipeline_cache.map_or(1, vk::Handle::as_raw),
+            ),
+        ];
+        if let Some((name, _)) = handles.iter().find(|(_, handle)| *handle == 0) {
+            return Err(VulkanError::NullHandle { name });
+        }
+        // Vulkan does not tell for which version an instance was made; no instance has a newer one than its loader.
+        // SAFETY: no requirements beyond a loaded entry.
+        let loader = unsafe { self.entry.try_enumerate_instance_version() }
+            .named("vkEnumerateInstanceVersion")?
+            .unwrap_or(vk::API_VERSION_1_0);
+        let without_patch = |version: u32| version >> 12;
+        match without_patch(vk::API_VERSION_1_1)..=without_patch(loader) {
+            known if known.contains(&without_patch(self.api_version)) => Ok(()),
+            _ => Err(VulkanError::ApiVersion {
+                stated: self.api_version,
+                loader,
+            }),
+        }
+    }
 }
 
 /// A lock for a queue that an application and an engine share. The application implements it with a lock of any kind.
@@ -114,4 +163,24 @@ pub struct VulkanBuffer {
     pub offset: u64,
     /// The length of the range, bytes: at least the size of the result.
     pub size: u64,
+}
+
+impl VulkanBuffer {
+    /// Refuses a null buffer, and a range that ends beyond the buffer. Vulkan tells neither a buffer's length nor its
+    /// usages; its memory is at least as long as the buffer.
+    pub(crate) fn check(&self, device: &LogicalDevice) -> Result<(), VulkanError> {
+        if self.buffer == vk::Buffer::null() {
+            return Err(VulkanError::NullHandle { name: "buffer" });
+        }
+        // SAFETY: the buffer belongs to the device, as whoever makes requests of it promises.
+        let memory = unsafe { device.raw.get_buffer_memory_requirements(self.buffer) }.size;
+        match self.offset.checked_add(self.size) {
+            Some(end) if end <= memory => Ok(()),
+            _ => Err(VulkanError::BufferEnd {
+                offset: self.offset,
+                size: self.size,
+                memory,
+            }),
+        }
+    }
 }

@@ -58,6 +58,7 @@ pub(crate) mod cache;
 pub(crate) mod clip_target;
 pub(crate) mod crowd;
 pub(crate) mod device;
+pub(crate) mod device_queue;
 pub(crate) mod engine;
 pub(crate) mod error;
 pub(crate) mod exported;

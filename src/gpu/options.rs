@@ -1,6 +1,7 @@
 //! Options of an engine, and the times of its evaluations.
 
 use std::ops::AddAssign;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::simd::dispatch::VectorWidth;
@@ -89,6 +90,22 @@ pub enum PrepareArcs {
     OnDevice,
 }
 
+/// Where an engine keeps, from process to process, what takes time to find out: the driver's compiled kernels
+/// (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed of each model of card
+/// (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no other files.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum CacheFiles {
+    /// In the directory that the environment variable `TUMBLE_CACHE_DIR` names; if it is empty, nowhere. Without the
+    /// variable, in `tumble` in the user's cache directory: `XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches` on
+    /// macOS, `LOCALAPPDATA` on Windows.
+    #[default]
+    OfUser,
+    /// In this directory, which is created when something is written.
+    Within(PathBuf),
+    /// Nowhere: no file is read or written. Each process compiles and checks the kernels that it uses.
+    Off,
+}
+
 /// Options of an [`Engine`](crate::engine::Engine). None of them changes any bit of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -119,6 +136,8 @@ pub struct EngineOptions {
     pub prepare_arcs: PrepareArcs,
     /// Whether a device is used although it fails the self-test; its bits may differ from the CPU's.
     pub allow_inexact: bool,
+    /// Which files an engine on a Vulkan device reads and writes.
+    pub cache_files: CacheFiles,
 }
 
 /// The times of a Vulkan device's evaluations ([`Engine::take_timings`](crate::engine::Engine::take_timings)).

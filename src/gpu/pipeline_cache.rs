@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ash::vk;
 
 use crate::gpu::cache::{Cache, sum};
+use crate::gpu::options::CacheFiles;
 use crate::gpu::physical::PhysicalDevice;
 use crate::threads::lock;
 
@@ -15,6 +16,8 @@ const MAX_BYTES: usize = 64 << 20;
 /// A pipeline cache of Vulkan; null if it could not be made, which only costs time.
 pub(crate) struct PipelineCache {
     pub(crate) raw: vk::PipelineCache,
+    /// Whether it is an application's, which keeps it as it likes.
+    is_of_application: bool,
     files: Cache,
     name: String,
     /// The expected header of the driver.
@@ -27,23 +30,37 @@ pub(crate) struct PipelineCache {
 
 impl PipelineCache {
     /// Makes a cache with the stored data of the device's driver, if there are any.
-    pub(crate) fn new(device: &ash::Device, physical: &PhysicalDevice) -> Self {
+    pub(crate) fn new(device: &ash::Device, physical: &PhysicalDevice, files: &CacheFiles) -> Self {
+        let mut cache = Self::unread(physical, Cache::new(files));
+        let kept = cache.kept();
+        cache.known = Mutex::new(sum(&cache.name, &kept));
+        cache.raw = Self::with(device, &kept);
+        cache
+    }
+
+    /// An application's cache, of which nothing is stored.
+    pub(crate) fn of_application(raw: vk::PipelineCache, physical: &PhysicalDevice) -> Self {
+        Self {
+            raw,
+            is_of_application: true,
+            ..Self::unread(physical, Cache::new(&CacheFiles::Off))
+        }
+    }
+
+    /// A cache without a Vulkan object.
+    fn unread(physical: &PhysicalDevice, files: Cache) -> Self {
         let (vendor, model, uuid) = physical.pipeline_cache;
         let digits: String = uuid.iter().map(|byte| format!("{byte:02x}")).collect();
         let name = format!("pipelines-{vendor:x}-{model:x}-{digits}");
-        let files = Cache::of_user();
-        let mut cache = Self {
+        Self {
             raw: vk::PipelineCache::null(),
+            is_of_application: false,
             files,
             name,
             driver: physical.pipeline_cache,
             known: Mutex::new(0),
             has_grown: AtomicBool::new(false),
-        };
-        let kept = cache.kept();
-        cache.known = Mutex::new(sum(&cache.name, &kept));
-        cache.raw = Self::with(device, &kept);
-        cache
+        }
     }
 
     /// The stored data of the driver; empty if there are only other drivers' data.
@@ -70,7 +87,10 @@ impl PipelineCache {
     /// stored.
     pub(crate) fn keep(&self, device: &ash::Device) {
         let null = vk::PipelineCache::null();
-        if self.raw == null || !self.has_grown.swap(false, Ordering::Relaxed) {
+        if self.is_of_application
+            || self.raw == null
+            || !self.has_grown.swap(false, Ordering::Relaxed)
+        {
             return;
         }
         let mut known = lock(&self.known);
@@ -101,6 +121,9 @@ impl PipelineCache {
     /// # Safety
     /// Nothing may use the cache any more, and the device must be alive.
     pub(crate) unsafe fn destroy(&self, device: &ash::Device) {
+        if self.is_of_application {
+            return;
+        }
         self.keep(device);
         // SAFETY: promised by the caller; null is allowed.
         unsafe { device.destroy_pipeline_cache(self.raw, None) };

@@ -2,7 +2,7 @@
 
 /// No value of an option has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no {option} `{name}`; there are {}", known.join(", "))]
+#[error("there is no {option} `{name}`; there are {}{}", known.join(", "), hint(name, known))]
 #[non_exhaustive]
 pub struct UnknownNameError {
     /// The option: `layout`, `method`.
@@ -11,6 +11,58 @@ pub struct UnknownNameError {
     pub name: String,
     /// The names of the option's values.
     pub known: Vec<&'static str>,
+}
+
+/// What other programs and libraries call the values of options: each value with these names. A name counts only for
+/// options that have the value, so one may stand in several rows.
+const OTHER_NAMES: [(&str, &[&str]); 22] = [
+    ("slerp", &["linear", "lerp", "line", "lines"]),
+    ("linear", &["lerp", "slerp", "line", "lines"]),
+    (
+        "step",
+        &[
+            "constant", "stepped", "hold", "discrete", "nearest", "previous",
+        ],
+    ),
+    ("nlerp", &["normalized-lerp", "normalised-lerp"]),
+    ("gltf-cubic", &["cubicspline", "cubic-spline"]),
+    (
+        "bessel-overhauser",
+        &["cubic", "smooth", "spline", "auto", "bezier", "overhauser"],
+    ),
+    ("c2", &["natural", "natural-cubic", "cubic-c2"]),
+    ("catmull-rom", &["catmull", "cardinal"]),
+    ("kochanek-bartels", &["tcb", "kb"]),
+    ("b-spline", &["bspline", "basis-spline"]),
+    ("hold", &["clamp", "clamped", "constant", "once"]),
+    ("loop", &["repeat", "cycle", "cyclic", "wrap", "periodic"]),
+    ("mirror", &["pingpong", "ping-pong", "bounce", "oscillate"]),
+    ("extrapolate", &["linear", "continue"]),
+    ("row", &["c", "row-major"]),
+    ("column", &["f", "fortran", "column-major"]),
+    ("f16", &["half", "float16"]),
+    ("f32", &["float", "single", "float32"]),
+    ("snorm16", &["int16", "i16"]),
+    ("body", &["local"]),
+    ("parent", &["global"]),
+    ("track", &["joint", "track-major", "bone"]),
+];
+
+/// The known name of a value that others call `name`. Case does not matter, and spaces and `_` are `-`.
+#[doc(hidden)]
+pub fn by_meaning<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.trim().to_lowercase().replace(['_', ' '], "-");
+    let is_called = |value: &str| {
+        let mut rows = OTHER_NAMES.iter();
+        rows.any(|(known, others)| *known == value && others.contains(&&*name))
+    };
+    known.into_iter().find(|value| is_called(value))
+}
+
+/// What is added to a message about an unknown name.
+fn hint(name: &str, known: &[&'static str]) -> String {
+    let meant = by_meaning(name, known.iter().copied());
+    meant.map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"))
 }
 
 /// The value of an option with this name.

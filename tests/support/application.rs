@@ -126,7 +126,7 @@ impl Application {
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap_err()
     }
 
-    fn handles(&self) -> VulkanHandles {
+    pub(crate) fn handles(&self) -> VulkanHandles {
         VulkanHandles {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
@@ -139,6 +139,7 @@ impl Application {
             queue_family: 0,
             copy_queue: self.copy_queue,
             queue_lock: Some(QueueLock::from(Arc::clone(&self.queue_lock))),
+            pipeline_cache: None,
         }
     }
 

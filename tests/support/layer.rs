@@ -123,17 +123,73 @@ impl Layer {
         let text = String::from_utf8_lossy(&output.stdout);
         let words = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{}: {text}\n{words}", self.name);
-        let is_message = |line: &&str| {
-            [
-                "Validation Error",
-                "Validation Warning",
-                "Validation Performance",
-                "VUID-",
-                "UNASSIGNED-",
-            ]
-            .iter()
-            .any(|sign| line.contains(sign))
-        };
-        text.lines().filter(is_message).map(str::to_owned).collect()
+        let needs_version = self.has_manifest && text.contains(RACE);
+        let version = needs_version.then(|| version_in(&fs::read(CHROMIUM).unwrap()));
+        messages_in(&text, version.flatten())
     }
+}
+
+/// The name of a message that older layers print wrongly.
+const RACE: &str = "SharedMemoryDataRace-RaceOnStore";
+
+/// The version of Vulkan for which a layer was built, from the properties in its library: a name in 256 bytes, this
+/// version, and the version of the implementation, which is 1.
+fn version_in(library: &[u8]) -> Option<[u32; 3]> {
+    let mut name = b"VK_LAYER_KHRONOS_validation".to_vec();
+    name.resize(256, 0);
+    let mut start = 0;
+    while let Some(found) = (library[start..].windows(256)).position(|bytes| bytes == name) {
+        start += found + 256;
+        let mut numbers = library[start..].chunks_exact(4);
+        let mut number = || Some(u32::from_le_bytes(numbers.next()?.try_into().unwrap()));
+        if let (Some(packed), Some(1)) = (number(), number()) {
+            let [major, minor, patch] = [packed >> 22, packed >> 12 & 0x3ff, packed & 0xfff];
+            return Some([major, minor, patch]);
+        }
+    }
+    None
+}
+
+/// The messages of a layer of this version, without those that are known to be wrong.
+pub(crate) fn messages_in(text: &str, version: Option<[u32; 3]>) -> Vec<String> {
+    let is_message = |line: &str| {
+        [
+            "Validation Error",
+            "Validation Warning",
+            "Validation Performance",
+            "VUID-",
+            "UNASSIGNED-",
+        ]
+        .iter()
+        .any(|sign| line.contains(sign))
+    };
+    let lines: Vec<&str> = text.lines().collect();
+    let mut messages = Vec::new();
+    for (index, &line) in lines.iter().enumerate() {
+        let more = lines[index + 1..]
+            .iter()
+            .take_while(|line| !is_message(line));
+        let whole: Vec<&str> = std::iter::once(&line).chain(more).copied().collect();
+        if is_message(line) && !is_race_with_itself(&whole.join("\n"), version) {
+            messages.push(line.to_owned());
+        }
+    }
+    messages
+}
+
+/// Layers before 1.4.354 take a load and a store of one word by one invocation for a race
+/// (KhronosGroup/Vulkan-ValidationLayers#12415).
+fn is_race_with_itself(message: &str, version: Option<[u32; 3]>) -> bool {
+    let number_after = |words: &str| {
+        let (_, rest) = message.split_once(words)?;
+        let digits = rest
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(rest.len());
+        rest[..digits].parse::<u32>().ok()
+    };
+    let invocation = number_after("in local invocation index ");
+    version.is_some_and(|version| version < [1, 4, 354])
+        && message.contains(RACE)
+        && invocation.is_some()
+        && invocation == number_after("(Likely against local invocation index ")
 }

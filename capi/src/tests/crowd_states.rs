@@ -328,6 +328,7 @@ fn handles_of_vulkan_are_looked_at() {
         lock_queue: None,
         unlock_queue: None,
         queue_user: null_mut(),
+        pipeline_cache: 0,
     };
     let mut engine = null_mut();
     // SAFETY: a structure and room for the handle; what is null or wrong is refused.

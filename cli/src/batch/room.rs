@@ -22,16 +22,22 @@ pub(crate) fn in_memory(
         .resolve(tracks, set.time_span())
         .map_err(|error| Failure::evaluating(name, &error.into()))?;
     let needed = (tracks * timeline.len() * size_of::<Quat>()) as f64 * copies as f64;
-    match tumble::available_memory().map(|bytes| bytes as f64) {
-        Some(free) if needed > free => Err(too_large(
-            name,
-            tracks,
-            timeline.len(),
-            needed,
-            &format!("{} of memory", words::bytes(free)),
-        )),
+    match tumble::available_memory() {
+        Some(free) if needed > free as f64 => {
+            let samples = of_samples(tracks, timeline.len());
+            Err(Failure::memory(name, &samples, needed))
+        }
         _ => Ok(timeline),
     }
+}
+
+/// `4 tracks × 501 frames`.
+fn of_samples(tracks: usize, samples: usize) -> String {
+    let (tracks, samples) = (
+        words::count(tracks, "track"),
+        words::count(samples, "frame"),
+    );
+    format!("{tracks} × {samples}")
 }
 
 /// Refuses more samples than anybody waits for, or sees in a picture.
@@ -60,23 +66,11 @@ pub(crate) fn on_disk(
     match available_disk(folder) {
         Some(free) if bytes > free => {
             let limit = format!("{} on the disk of {}", words::bytes(free), folder.display());
-            Err(too_large(name, tracks, samples, bytes, &limit))
+            let samples = of_samples(tracks, samples);
+            Err(Failure::room(name, &samples, bytes, &limit))
         }
         _ => Ok(()),
     }
-}
-
-fn too_large(name: &str, tracks: usize, samples: usize, bytes: f64, limit: &str) -> Failure {
-    Failure::new(
-        USAGE,
-        format!(
-            "{name}: {} × {} are {} ({bytes} bytes), more than the {limit} that are free; ask for \
-             fewer frames (--fps, --start, --end)",
-            words::count(tracks, "track"),
-            words::count(samples, "frame"),
-            words::bytes(bytes),
-        ),
-    )
 }
 
 #[cfg(unix)]

@@ -125,7 +125,10 @@ impl Failure {
     /// An evaluation failed: the request, the input or the device is to blame.
     pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
         let code = match error {
-            Error::SampleTimes(_) | Error::OutOfMemory(_) => USAGE,
+            Error::OutOfMemory(error) => {
+                return Self::memory(input, error.purpose, error.bytes as f64);
+            }
+            Error::SampleTimes(_) => USAGE,
             Error::Vulkan(
                 VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::NoNvidiaDriver,
             ) => NO_VULKAN,
@@ -134,6 +137,32 @@ impl Failure {
             _ => BUG,
         };
         Self::new(code, format!("{input}: {error}"))
+    }
+
+    /// A result of an input does not fit into the memory that is free. Another input's may.
+    pub(crate) fn memory(input: &str, result: &str, bytes: f64) -> Self {
+        let free = tumble::available_memory();
+        let limit = free.map_or_else(
+            || "memory".to_owned(),
+            |free| format!("{} of memory", words::bytes(free as f64)),
+        );
+        Self {
+            code: ALL_INPUTS,
+            ..Self::room(input, result, bytes, &limit)
+        }
+    }
+
+    /// A result of an input does not fit on the disk. Another input's may.
+    pub(crate) fn room(input: &str, result: &str, bytes: f64, limit: &str) -> Self {
+        let amount = words::bytes(bytes);
+        let message = format!(
+            "{input}: {result} need {amount} ({bytes} bytes), more than the {limit} that are free; ask for fewer \
+             frames (--fps, --start, --end)"
+        );
+        Self {
+            is_of_one: true,
+            ..Self::new(OUTPUT, message)
+        }
     }
 
     /// The request needs Vulkan, and there is none.

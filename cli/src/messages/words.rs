@@ -9,6 +9,8 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::time::Duration;
 
+use clap::error::{ContextKind, ContextValue};
+use tumble::names::by_meaning;
 use tumble_formats::guarded::is_guarded;
 use tumble_formats::printable::printable;
 
@@ -29,7 +31,8 @@ pub(crate) fn note(message: &str) {
 
 /// Prints an error of the command line, or help. clap prints arguments unescaped, and a shell's pattern
 /// may put names of files among them.
-pub(crate) fn usage(error: &clap::Error, arguments: &[OsString]) {
+pub(crate) fn usage(error: &mut clap::Error, arguments: &[OsString]) {
+    suggest_by_meaning(error);
     let mut text = error.render().ansi().to_string();
     for word in arguments {
         let word = word.to_string_lossy();
@@ -47,6 +50,20 @@ pub(crate) fn usage(error: &clap::Error, arguments: &[OsString]) {
         true => write!(anstream::stderr(), "{text}"),
         false => write!(anstream::stdout(), "{text}"),
     };
+}
+
+/// Suggests the value that another program's name stands for, instead of those that are spelt alike.
+fn suggest_by_meaning(error: &mut clap::Error) {
+    let (Some(ContextValue::String(value)), Some(ContextValue::Strings(known))) = (
+        error.get(ContextKind::InvalidValue),
+        error.get(ContextKind::ValidValue),
+    ) else {
+        return;
+    };
+    if let Some(meant) = by_meaning(value, known.iter().map(String::as_str)) {
+        let meant = ContextValue::String(meant.to_owned());
+        error.insert(ContextKind::SuggestedValue, meant);
+    }
 }
 
 /// The message of a panic, which is text unless a crate panics with another type.
@@ -149,11 +166,16 @@ pub(crate) fn duration(duration: Duration) -> String {
     }
 }
 
-/// The known name nearest to a misspelt one, if any is near.
+/// The known name that another program's name stands for, or that is nearest to a misspelt one, if any is near.
 pub(crate) fn nearest<'a>(
     misspelt: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
+    let known: Vec<&str> = known.into_iter().collect();
+    let meant = by_meaning(misspelt, known.iter().copied());
+    if meant.is_some() {
+        return meant;
+    }
     let lowercase = misspelt.to_lowercase();
     // A part of a name is a name too: `llvmpipe` of `llvmpipe (LLVM 15.0.6)`.
     let score = |name: &str| {

@@ -258,7 +258,8 @@ impl<'a> Messages<'a> {
         if let Some(compression) = compression {
             let codec = compression.codec();
             if codec != CompressionType::ZSTD && codec != CompressionType::LZ4_FRAME {
-                let message = format!("it is compressed by {codec:?}; write it with zstd or LZ4");
+                let codec = codec.variant_name().unwrap_or("an unknown method");
+                let message = format!("it is compressed by {codec}; write it with zstd or LZ4");
                 return Err(Diagnostic::new(self.name, Code::Compression, message));
             }
         }

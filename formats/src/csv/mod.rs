@@ -199,8 +199,9 @@ impl<'a, W: Write> CsvWriter<'a, W> {
 
 /// Converts an error and keeps its kind, for example that of a broken pipe; the crate's conversion loses it.
 pub(crate) fn io_error(error: ::csv::Error) -> io::Error {
+    let message = error.to_string();
     match error.into_kind() {
         ::csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
+        _ => io::Error::other(message),
     }
 }

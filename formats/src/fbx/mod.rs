@@ -5,6 +5,7 @@
 //! radians for rotations, otherwise relative to the largest number). With [`ReadOptions::keyframes`] they are only
 //! those at the key times of the file, and those that large rotations need.
 
+mod decimal_commas;
 mod direct;
 mod follow;
 mod layers;
@@ -114,6 +115,7 @@ pub fn open_fbx(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
 /// # Errors
 /// As [`open_fbx`].
 pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    decimal_commas::refuse(name, bytes)?;
     let budget = Budget::of(bytes.len(), options.limits);
     let scene = load(name, bytes, &budget)?;
     let over = |error: OverBudget| Diagnostic::new(name, Code::Memory, error.to_string());
@@ -535,6 +537,13 @@ impl FbxReader<'_> {
         if takes.nodes.values().all(NodeTimes::is_empty) {
             warnings.warn(Code::FbxRests, || {
                 (inside(), "the stack moves no node; nothing moves")
+            });
+        } else if takes.nodes.values().all(NodeTimes::is_pose) {
+            warnings.warn(Code::FbxRests, || {
+                (
+                    inside(),
+                    "the stack is a pose: each of its curves has one key; nothing moves",
+                )
             });
         }
     }

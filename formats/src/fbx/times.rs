@@ -44,6 +44,12 @@ impl NodeTimes {
         let channels = [&self.translation, &self.rotation, &self.scale];
         channels.iter().all(|times| times.list.is_empty())
     }
+
+    /// Whether no curve has more than one key.
+    pub(super) fn is_pose(&self) -> bool {
+        let channels = [&self.translation, &self.rotation, &self.scale];
+        channels.iter().all(|times| times.list.len() <= 1)
+    }
 }
 
 /// The properties of the first layer that determine a node's transform.

@@ -80,6 +80,9 @@ impl Format {
         bytes: Vec<u8>,
         options: &ReadOptions,
     ) -> Result<Loaded, Diagnostic> {
+        if bytes.is_empty() {
+            return Err(Diagnostic::empty(name));
+        }
         let start = &bytes[..bytes.len().min(START)];
         (Self::detect(Path::new(name), start).read_bytes)(name, bytes, options)
     }

@@ -134,9 +134,8 @@ pub(super) fn keys(
                 let before = &mut before[track - first_track];
                 *before.insert(rotation_vector::log(rotation, *before))
             }
-            KeyKind::Form(form) => {
-                // Archives that a map explains are not written again in their layout.
-                let message = format!("rotations are not written as {form:?}");
+            KeyKind::Form(_) => {
+                let message = "archives that --map explains are not written again in their layout";
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
             }
             KeyKind::Translation => {

@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 
 /// A text as a cell. Spreadsheets interpret cells that begin with `=`, `+`, `-` or `@` as formulas, which may run
-/// programs. Such cells, and texts that look like escaped cells, get a leading quote, which spreadsheets do not
-/// display. NUL, which no reader of text takes, becomes `_`. This is not for numbers.
+/// programs; some also behind a blank that is not displayed, or in the full-width form of East Asian keyboards. Such
+/// cells, and texts that look like escaped cells, get a leading quote, which spreadsheets do not display. NUL, which no
+/// reader of text takes, becomes `_`. This is not for numbers.
 pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
     let text = without_nul(text);
     match is_formula(text.trim_start_matches(QUOTE)) {
@@ -32,7 +33,8 @@ pub(crate) fn cell_text(cell: &str) -> &str {
 const QUOTE: char = '\'';
 
 fn is_formula(text: &str) -> bool {
-    text.starts_with(['=', '+', '-', '@', '\t', '\r'])
+    let signs = ['=', '+', '-', '@', '＝', '＋', '－', '＠'];
+    text.starts_with(signs) || text.starts_with(['\t', '\r', '\n'])
 }
 
 #[cfg(test)]
@@ -48,6 +50,9 @@ mod tests {
             ("@SUM(A1).y", "'@SUM(A1).y"),
             ("+1", "'+1"),
             ("\t=1", "'\t=1"),
+            ("\n=1", "'\n=1"),
+            ("＝1+1", "'＝1+1"),
+            ("＠SUM(A1)", "'＠SUM(A1)"),
             ("'=1", "''=1"),
             ("''-", "'''-"),
             ("'tis", "'tis"),

@@ -3,7 +3,8 @@
 use std::io::{BufRead, Read};
 
 use crate::diagnostic::{Code, Diagnostic, Location};
-use crate::source::{MAX_BYTES, ZSTD};
+use crate::foreign;
+use crate::source::MAX_BYTES;
 
 /// The lines of one input, with their numbers; warnings about them are collected in `warnings`.
 pub(crate) struct Lines<R> {
@@ -46,20 +47,6 @@ impl Default for Limits {
     }
 }
 
-/// The first bytes of other formats in files named `.dat`.
-const SIGNATURES: [(&[u8], &str); 7] = [
-    (b"\x1f\x8b", "gzip; unpack it first"),
-    (
-        &ZSTD,
-        "a file that zstd compressed; decompress it first (zstd -d)",
-    ),
-    (b"\x93NUMPY", "NPY; export the keys as text"),
-    (b"HIERARCHY", "BVH motion capture; convert its rotations"),
-    (b"glTF", "binary glTF; convert its rotation tracks"),
-    (b"{", "JSON, perhaps glTF; convert its rotation tracks"),
-    (b"PK\x03\x04", "a ZIP archive; unpack it first"),
-];
-
 /// The byte-order mark of UTF-8.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -67,11 +54,8 @@ impl<R: BufRead> Lines<R> {
     /// For text of numbers. Checks the first bytes and skips a byte-order mark.
     pub(crate) fn new(file: &str, reader: R, limits: Limits) -> Result<Self, Diagnostic> {
         let (mut lines, start) = Self::start(file, reader, limits)?;
-        if let Some((_, name)) = SIGNATURES
-            .iter()
-            .find(|(bytes, _)| start.starts_with(bytes))
-        {
-            let message = format!("this looks like {name}");
+        if let Some(description) = foreign::description(file, &start) {
+            let message = format!("this looks like {description}");
             return Err(lines.refuse_whole(Code::OtherFormat, message));
         }
         if start.starts_with(MARK) {

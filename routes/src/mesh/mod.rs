@@ -23,8 +23,9 @@ pub const MAX_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
 /// A surface of triangles, on which routes are found.
 ///
 /// Vertices at equal positions are merged, and so are faces with the same corners: a sheet that is modelled from both
-/// sides is one sheet. An open side is divided where a corner of another face lies on it. Within each piece, faces
-/// are wound alike, in the direction that the majority of them had.
+/// sides is one sheet. Faces of no area are left out. An open side is divided where a corner of another face lies on
+/// it, so that faces at a T-joint are connected with or without a sliver between them. Within each piece, faces are
+/// wound alike, in the direction that the majority of them had.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     pub(crate) surface: Surface,
@@ -43,8 +44,8 @@ impl Mesh {
     /// Makes a mesh of positions and triangles, each of three indices of positions.
     ///
     /// # Errors
-    /// When there are no triangles or too many, when an index is out of range, when a coordinate is not finite or
-    /// exceeds 1e75, or when a triangle has no area.
+    /// When there are no triangles with an area or too many, when an index is out of range, or when a coordinate is not
+    /// finite or exceeds 1e75.
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
         Self::of_polygons(positions, triangles.iter().map(<[u32; 3]>::as_slice))
     }
@@ -63,8 +64,7 @@ impl Mesh {
     }
 
     /// Makes a mesh as [`Mesh::of_polygons`] does, and merges positions within `distance` of each other into the
-    /// first of them, for seams whose two sides differ by rounding. Triangles that lose their area by this are
-    /// dropped.
+    /// first of them, for seams whose two sides differ by rounding.
     ///
     /// # Errors
     /// As [`Mesh::of_polygons`], and when the distance is negative or not finite.

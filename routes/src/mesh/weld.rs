@@ -57,7 +57,7 @@ pub(super) fn weld<'a>(
         return Err(MeshError::Weld { tolerance });
     }
     let mut welding = Welding::new(input, tolerance);
-    let (mut dropped, mut uneven, mut doubled) = <(Count, Count, Count)>::default();
+    let [mut dropped, mut flat, mut uneven, mut doubled] = <[Count; 4]>::default();
     for (face, polygon) in polygons.into_iter().enumerate() {
         if polygon.len() < 3 {
             let corners = polygon.len();
@@ -97,13 +97,9 @@ pub(super) fn weld<'a>(
             .collect();
         let made = match cut(&points) {
             Ok(made) => made,
-            Err(Uncut::Flat) if tolerance > 0.0 => {
-                dropped.add(corners.len() - 2, face);
-                continue;
-            }
             Err(Uncut::Flat) => {
-                let corners = [points[0], points[1], points[2]];
-                return Err(MeshError::Flat { face, corners });
+                flat.add(1, face);
+                continue;
             }
             Err(Uncut::Crosses) => return Err(MeshError::Crosses { face }),
             Err(Uncut::TooMany) => {
@@ -153,6 +149,13 @@ pub(super) fn weld<'a>(
     } = dropped
     {
         warnings.push(MeshWarning::Dropped { count, face });
+    }
+    if let Count {
+        count: count @ 1..,
+        face,
+    } = flat
+    {
+        warnings.push(MeshWarning::NoArea { count, face });
     }
     if let Count {
         count: count @ 1..,

@@ -23,8 +23,9 @@ impl Crowd {
     /// more, more instances may be visible later.
     ///
     /// # Errors
-    /// When the engine was not made by `from_vulkan`, the range does not start at a multiple of 256 bytes or is too
-    /// short, skinning matrices are requested but the library has no inverse bind matrices, or the device fails.
+    /// When the engine was not made by `from_vulkan`, the buffer is null, the range does not start at a multiple of 256
+    /// bytes, is too short or ends beyond the buffer, skinning matrices are requested but the library has no inverse
+    /// bind matrices, or the device fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, be bound to memory, have the usage `STORAGE_BUFFER`, contain
@@ -41,6 +42,7 @@ impl Crowd {
         let device = device.filter(|device| !device.engine.device.owned);
         let device = device.ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
+        buffer.check(&device.engine.device)?;
         let (offset, size) = (buffer.offset, buffer.size);
         let each = device.bytes(output);
         let needed = self.visible_count().max(1) as u64 * each;

@@ -19,17 +19,18 @@ use glam::Quat;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::engine::from_keys::KeyUploads;
-use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::error::{EvaluateError, Named as _, VulkanError};
 use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
 use crate::gpu::job::{ClipBuffers, Job};
-use crate::gpu::kernel_check::passes::{KernelPass, Passes};
+use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::run_once::run_once;
 use crate::gpu::submission::{Access, Submission};
 use crate::gpu::upload::writable;
@@ -132,7 +133,15 @@ impl VulkanEngine {
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
         use vk::QueueFlags as Flags;
+        handles.check()?;
         let instance = Instance::borrowed(handles.entry, handles.instance);
+        // SAFETY: the instance is valid, as the caller promises.
+        let known = unsafe { instance.raw.enumerate_physical_devices() };
+        let known = known.named("vkEnumeratePhysicalDevices")?;
+        if !known.contains(&handles.physical_device) {
+            let count = known.len();
+            return Err(VulkanError::OtherPhysicalDevice { count });
+        }
         let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
             .ok_or(VulkanError::NoDevice)?;
         physical.queue_family = handles.queue_family;
@@ -150,12 +159,16 @@ impl VulkanEngine {
             physical.float_controls = FloatControls::default();
         }
         physical.has_int64 &= handles.shader_int64;
-        let device = LogicalDevice::borrowed(
+        let pipelines = match handles.pipeline_cache {
+            Some(cache) => PipelineCache::of_application(cache, &physical),
+            None => PipelineCache::new(&handles.device, &physical, &options.cache_files),
+        };
+        let device = LogicalDevice::with_queues(
             physical,
             handles.device,
-            handles.queue,
+            (handles.queue, handles.queue_lock),
             handles.copy_queue,
-            handles.queue_lock,
+            pipelines,
             options,
         );
         Ok(Self::new(Arc::new(device), options))
@@ -190,7 +203,7 @@ impl VulkanEngine {
 
     /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
     fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
-        let passes = Passes::of_user();
+        let passes = &self.device.passes;
         let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
         if passes.has(&pass) {
             return Ok(());
@@ -216,7 +229,7 @@ impl VulkanEngine {
         only_unknown: bool,
         each: &mut dyn FnMut(KernelCheck) -> bool,
     ) -> Result<(), VulkanError> {
-        let (passes, physical) = (Passes::of_user(), &self.device.physical);
+        let (passes, physical) = (&self.device.passes, &self.device.physical);
         let mut passed = Vec::new();
         let mut check = |code: &KernelCode| {
             let pass = KernelPass::new(physical, Pipeline::code_hash(&self.device, code.kernel));
@@ -276,7 +289,10 @@ impl VulkanEngine {
             name,
             total: 0,
             differing: 0,
-            remembered: Passes::of_user().has(&KernelPass::new(&self.device.physical, hash)),
+            remembered: self
+                .device
+                .passes
+                .has(&KernelPass::new(&self.device.physical, hash)),
         }
     }
 

@@ -1,9 +1,9 @@
 //! The kernels that were found to be exact on devices, kept from process to process in the user's cache directory, if
 //! there is one. Only passed checks are stored, so a lost file costs only another check.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::env;
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 use crate::gpu::cache::Cache;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
@@ -132,9 +132,14 @@ pub(crate) struct Passes {
 }
 
 impl Passes {
-    pub(crate) fn of_user() -> &'static Self {
-        static ALL: OnceLock<Passes> = OnceLock::new();
-        ALL.get_or_init(|| Self::of(Cache::of_user()))
+    /// Those that a cache keeps. All engines of a process that use the same cache share them, also without files.
+    pub(crate) fn kept_in(cache: &Cache) -> Arc<Self> {
+        static ALL: Mutex<BTreeMap<Cache, Arc<Passes>>> = Mutex::new(BTreeMap::new());
+        let mut all = lock(&ALL);
+        let passes = all
+            .entry(cache.clone())
+            .or_insert_with(|| Arc::new(Self::of(cache.clone())));
+        Arc::clone(passes)
     }
 
     fn of(cache: Cache) -> Self {

@@ -16,7 +16,8 @@ impl PassRequest<'_> {
     /// # Errors
     /// When the engine is the CPU or opened its device itself, there is no layer, a weight is out of range, the
     /// number of references or joints differs from the number of tracks, the layout for a skeleton is track by track,
-    /// a range is not aligned or is too short or longer than the device can bind, the result overlaps an input, or
+    /// a buffer is null, a range is not aligned, is too short, ends beyond its buffer or is longer than the device can
+    /// bind, the result overlaps an input, or
     /// the device fails.
     ///
     /// # Safety

@@ -62,5 +62,5 @@ pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Sec
 }
 
 fn no_memory(error: impl std::fmt::Display) -> Failure {
-    Failure::new(exit::USAGE, error.to_string())
+    Failure::new(exit::ALL_INPUTS, error.to_string())
 }

@@ -22,8 +22,9 @@ impl Request<'_> {
     /// request of a clip is repeated, its work lists are already on the device.
     ///
     /// # Errors
-    /// As [`Request::size`]; also when the engine is the CPU, the range does not start at a multiple of a value's
-    /// size or is too short, or the device fails.
+    /// As [`Request::size`]; also when the engine is the CPU or opened its device itself, the buffer is null, the
+    /// range does not start at a multiple of a value's size, is too short or ends beyond the buffer, or the device
+    /// fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, be bound to memory, have the usages `STORAGE_BUFFER` and
@@ -42,9 +43,8 @@ impl Request<'_> {
     /// compiled, and the work lists are made and uploaded here, once.
     ///
     /// # Errors
-    /// As [`Request::to_buffer`]; also when the range is longer than the device can bind, the clip's segments take
-    /// more than [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory), or the engine opened its
-    /// device itself.
+    /// As [`Request::to_buffer`]; also when the range is longer than the device can bind, or the clip's segments take
+    /// more than [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory).
     ///
     /// # Safety
     /// As [`Request::to_buffer`]; the buffer must live as long as the target, and the target must be dropped after
@@ -52,9 +52,6 @@ impl Request<'_> {
     pub unsafe fn target(&self, buffer: VulkanBuffer) -> Result<ClipTarget, Error> {
         let (opened, timeline, window) = self.for_buffer(buffer)?;
         let engine = opened.engine();
-        if engine.device.owned {
-            return Err(Error::BufferOfOther);
-        }
         (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
             let target =
                 |_: &VulkanEngine, job: Job<'_>| ClipTarget::new(&engine, job, window, buffer);
@@ -67,6 +64,11 @@ impl Request<'_> {
         let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::BufferOnCpu);
         };
+        let engine = opened.engine();
+        if engine.device.owned {
+            return Err(Error::BufferOfOther);
+        }
+        buffer.check(&engine.device)?;
         let (timeline, window) = self.window()?;
         let rotation = self.encoding.bytes() as u64;
         let needed = (window.len() as u64).saturating_mul(rotation);
