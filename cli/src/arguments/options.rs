@@ -12,7 +12,7 @@ use tumble::{Encoding, Layout};
 use tumble_formats::format::{Format, FormatOption};
 
 use crate::arguments::output::OutputArguments;
-use crate::batch::digest::InputFile;
+use crate::batch::digest::{self, InputFile};
 
 /// A rule about an option of this name; the name is that of its field, with `_`.
 pub(crate) struct OptionRule {
@@ -112,6 +112,9 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     // Inputs.
     silent("paths"),
     silent("files_from"),
+    silent("null"),
+    silent("base"),
+    silent("exclude"),
     silent("pipes"),
     silent("max_size"),
     silent("max_memory"),
@@ -138,6 +141,9 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     silent("out"),
     silent("overwrite"),
     silent("resume"),
+    silent("prune"),
+    silent("names"),
+    silent("verbose"),
     silent("format"),
     silent("times_out"),
     silent("shard"),
@@ -346,10 +352,11 @@ impl CommandLine {
     }
 }
 
-/// The hash of a file; empty where it cannot be read again, as standard input. The name of a folder.
+/// The hash of a file; empty where it cannot be read again, as standard input. That of the models in a folder of
+/// body models.
 fn content(file: &str) -> String {
     if Path::new(file).is_dir() {
-        return file.to_owned();
+        return digest::of_folder(Path::new(file), "npz");
     }
     let file = InputFile::new(Path::new(file));
     file.sha256().unwrap_or_default().to_owned()
