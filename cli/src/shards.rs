@@ -11,17 +11,18 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use serde::Serialize;
-use tumble_formats::Format;
+use tumble_formats::{Format, Limits};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
-use crate::batch::entry::{ManifestEntry, ManifestLines};
+use crate::batch::digest::InputFile;
+use crate::batch::entry::{InputEntry, InputState, ManifestEntry, ManifestLines};
+use crate::batch::result_names::ResultNaming;
 use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::batch::shards::run::Shard;
 use crate::batch::{entry, output_plan, result_names};
 use crate::commands::eval::Arguments;
-use crate::commands::eval::job::EvaluationReport;
 use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
 use crate::host::Refused;
 use crate::messages::exit::{ALL_INPUTS, Failure, USAGE};
@@ -52,6 +53,31 @@ fn parse(line: &[OsString]) -> Result<Arguments, Refused> {
 /// When the command line is invalid.
 pub fn inputs(line: &[OsString]) -> Result<Vec<PathBuf>, Refused> {
     Ok(parse(line)?.inputs.named_paths().to_vec())
+}
+
+/// The files that an input refers to (the buffers of a glTF), relative to its folder.
+#[must_use]
+pub fn referred_files(path: &Path) -> Vec<PathBuf> {
+    tumble_formats::referred::referred_files(path, Limits::default())
+}
+
+/// The hash of an input with the files that it refers to, as manifests contain it; `None` if it cannot be read.
+#[must_use]
+pub fn input_sha256(path: &Path) -> Option<String> {
+    InputFile::new(path).sha256().map(str::to_owned)
+}
+
+/// What is unfinished in the text of a manifest: a line for each input that failed or has no result yet.
+#[must_use]
+pub fn manifest_unfinished(text: &str) -> Vec<String> {
+    let lines = ManifestLines::parse(text.as_bytes());
+    let inputs = lines.inputs.values();
+    let unfinished = inputs.filter(|entry| entry.state != InputState::Skipped);
+    let line = |entry: &InputEntry| match &entry.message {
+        Some(message) => message.clone(),
+        None => format!("{}: has no result yet", entry.input),
+    };
+    unfinished.map(line).collect()
 }
 
 /// The SHA-256 hash of all kernels. Machines with the same hash and the same version write the same bytes.
@@ -88,32 +114,36 @@ impl LibraryPlan {
         if into != "files" {
             request.options += &format!(" into={into}");
         }
-        let (inputs, sizes): (Vec<FoundInput>, Vec<u64>) = match listed {
+        let (inputs, sizes): (GatheredInputs, Vec<u64>) = match listed {
             Some(listed) => {
                 let of_formats = listed
                     .into_iter()
-                    .filter(|(name, _)| Format::of(Path::new(name)).is_some());
+                    .filter(|(name, _)| Format::of(Path::new(name)).is_some())
+                    .filter(|(name, _)| !arguments.inputs.excludes(Path::new(name)));
                 let found = of_formats.map(|(name, size)| {
                     let path = PathBuf::from(format!("{}/{name}", library.display()));
                     let below = PathBuf::from(name);
                     (FoundInput::named(path, below), size)
                 });
-                found.unzip()
+                let (files, sizes) = found.unzip();
+                (GatheredInputs::of(files), sizes)
             }
             None => {
-                let found = GatheredInputs::new(&[library.to_owned()], None)?.files;
-                let found = output_plan::without_results(found, folder)?;
-                let sizes = found.iter().map(size).collect();
+                let found = arguments.inputs.gather_library(library)?;
+                let mut found = arguments.results.based(found)?;
+                found.files = output_plan::without_results(found.files, folder)?;
+                let sizes = found.files.iter().map(size).collect();
                 (found, sizes)
             }
         };
-        if inputs.is_empty() {
+        if inputs.files.is_empty() {
             let library = library.display();
             let message = format!("{library}: has no file of a format that can be read");
             return Err(Failure::usage(message).into());
         }
         let shard_plan = request.plan(&arguments, inputs, &sizes, folder, shard_bytes)?;
-        result_names::refuse_shared_names(&shard_plan.inputs, shard_plan.format)?;
+        let naming = arguments.results.naming();
+        result_names::refuse_shared_names(&shard_plan.inputs, shard_plan.format, naming)?;
         Ok(Self {
             shard_plan,
             arguments,
@@ -253,6 +283,16 @@ impl Worker {
         &self.evaluator.request.options
     }
 
+    /// The name by which the results of an input are known, from its path below the library: that of its result,
+    /// without the extension of the result's format.
+    #[must_use]
+    pub fn key_of(&self, below: &Path) -> String {
+        match self.arguments.results.naming() {
+            ResultNaming::Stem => below.with_extension("").display().to_string(),
+            ResultNaming::Full => below.display().to_string(),
+        }
+    }
+
     /// Evaluates the inputs of a task, and writes the results to `folder`. The plan of this directory must have been
     /// recorded by [`LibraryPlan::claim`], unless only the caller uses the directory.
     ///
@@ -264,7 +304,8 @@ impl Worker {
             .map(|(path, below)| FoundInput::named(path.clone(), below.clone()))
             .collect();
         let format = result_names::format(folder, self.arguments.results.format())?;
-        let names = result_names::name_results(&found, folder, format);
+        let naming = self.arguments.results.naming();
+        let names = result_names::name_results(&found, folder, format, naming);
         let header = ShardHeader {
             shard: task.shard,
             of: task.of,
@@ -278,7 +319,7 @@ impl Worker {
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);
-        let reports = self.evaluator.evaluate(&self.arguments, jobs, &mut shard)?;
+        let evaluated = self.evaluator.evaluate(&self.arguments, jobs, &mut shard)?;
         let record = match task.record {
             true => shard.finish().map(|()| None),
             false => shard.finish_elsewhere().map(Some),
@@ -286,7 +327,7 @@ impl Worker {
         Ok(ShardOutcome {
             made: shard.made,
             skipped: shard.skipped,
-            rotations: reports.iter().map(EvaluationReport::rotations).sum(),
+            rotations: evaluated.rotations,
             device: self.evaluator.device.label.clone(),
             failed: shard.header.failed,
             record,
@@ -387,6 +428,7 @@ impl ShardRecord {
             input,
             code,
             message,
+            result: None,
         });
     }
 
@@ -472,7 +514,12 @@ pub fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
 #[must_use]
 pub fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
     let mut found: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    // The results of an input of which a part failed are not all.
+    let unfinished = ManifestLines::parse(text.as_bytes()).inputs;
     for entry in entries_of(text) {
+        if unfinished.contains_key(entry.whole().0) {
+            continue;
+        }
         let lines = found.entry(key_of(&entry)).or_default();
         lines.push(entry::line(&entry));
     }
@@ -530,6 +577,7 @@ mod tests {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: "CPU".to_owned(),
             one_of: one_of.map(|(all, count)| (all.to_owned(), count)),
+            warnings: Vec::new(),
         })
     }
 

@@ -2,6 +2,7 @@
 //! is there.
 
 use std::fs;
+use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -30,10 +31,9 @@ fn directories_patterns_and_lists_name_inputs() {
 
     fs::write(folder.join("list"), "# two of them\n\nb.dat\nwalks/a.dat\n").unwrap();
     succeed(folder, &["eval", "--files-from", "list", "-o", "listed"]);
-    assert_eq!(
-        names(&folder.join("listed")),
-        ["a.npy", "b.npy", "manifest.jsonl"]
-    );
+    // The results of a list keep its tree.
+    let listed = ["b.npy", "manifest.jsonl", "walks/a.npy"];
+    assert_eq!(names(&folder.join("listed")), listed);
     let mut child = command(folder, &["info", "--files-from", "-", "a.dat"])
         .stdin(fs::File::open(folder.join("list")).unwrap())
         .stdout(Stdio::piped())
@@ -81,7 +81,10 @@ fn a_batch_goes_on_after_a_failure_and_can_be_checked() {
         whole.keys().collect::<Vec<_>>(),
         ["a.npy", "b.npy", "manifest.jsonl"]
     );
-    succeed(folder, &["check", "out"]);
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let failed = "1 input failed (the first: bad.dat:2:8: error[E020]";
+    assert!(check.words.contains(failed), "{}", check.words);
 
     // Again: refused, or skipped, or done again.
     let again = run(folder, &batch);
@@ -162,9 +165,363 @@ fn resuming_does_not_replace_what_no_manifest_names() {
     );
     let failed = run(folder, &["eval", "bad.dat", "none.dat", "-o", "failed"]);
     assert_eq!(failed.code, 4, "{}", failed.words);
-    assert_eq!(names(&folder.join("failed")), Vec::<String>::new());
+    assert_eq!(names(&folder.join("failed")), ["manifest.jsonl"]);
+    assert_eq!(run(folder, &["check", "failed"]).code, 8);
     let single = run(folder, &["eval", "a.dat", "-o", "o.npy", "--resume"]);
     assert_eq!(single.code, 2, "{}", single.words);
+}
+
+/// The lines of a manifest.
+fn manifest(folder: &Path) -> Vec<serde_json::Value> {
+    let text = fs::read_to_string(folder.join("manifest.jsonl")).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+/// A glTF is what its buffer beside it says too.
+#[cfg(unix)]
+#[test]
+fn an_input_is_all_files_that_it_refers_to() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let mut model: serde_json::Value =
+        serde_json::from_str(&crate::attack::two_animations()).unwrap();
+    model["buffers"][0]["uri"] = "keys.bin".into();
+    fs::write(folder.join("m.gltf"), model.to_string()).unwrap();
+    let numbers = |w: f32| [0f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.6, w];
+    let write = |w: f32| {
+        let bytes: Vec<u8> = numbers(w).iter().flat_map(|it| it.to_le_bytes()).collect();
+        fs::write(folder.join("keys.bin"), bytes).unwrap();
+    };
+    write(0.8);
+    let batch = [
+        "eval", "m.gltf", "a.dat", "-o", "out", "--resume", "--device", "cpu",
+    ];
+    succeed(folder, &batch);
+    succeed(folder, &["check", "out"]);
+    let again = succeed(folder, &batch);
+    assert!(again.words.contains("2 results skipped"), "{}", again.words);
+    let before = tree(&folder.join("out"));
+    write(-0.8);
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let stale = "m.Run.npy: its input m.gltf has changed";
+    assert!(check.words.contains(stale), "{}", check.words);
+    let again = succeed(folder, &batch);
+    let made = "2 results made of 1 input, 1 result skipped";
+    assert!(again.words.contains(made), "{}", again.words);
+    assert_ne!(tree(&folder.join("out"))["m.Run.npy"], before["m.Run.npy"]);
+    succeed(folder, &["check", "out"]);
+}
+
+/// The name of a result depends on its input alone.
+#[test]
+fn a_result_keeps_its_name_when_another_input_appears_beside_it() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("walks")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("walks/walk.dat")).unwrap();
+    let batch = ["eval", "walks", "-o", "out", "--resume", "--device", "cpu"];
+    succeed(folder, &batch);
+    fs::copy(folder.join("b.dat"), folder.join("walks/walk.tum")).unwrap();
+    let both = run(folder, &[&batch[..], &["--from", "dat"]].concat());
+    assert_eq!(both.code, 3, "{}", both.words);
+    let refused = "walks/walk.tum: its result and that of walks/walk.dat would both be out/walk.npy; \
+                   give --names full";
+    assert!(both.words.contains(refused), "{}", both.words);
+    assert!(
+        both.words.contains("1 result made, 1 input failed"),
+        "{}",
+        both.words
+    );
+    assert_eq!(manifest(&folder.join("out"))[0]["input"], "walks/walk.dat");
+    let full = [
+        "eval", "walks", "-o", "full", "--from", "dat", "--names", "full",
+    ];
+    succeed(folder, &full);
+    let expected = ["manifest.jsonl", "walk.dat.npy", "walk.tum.npy"];
+    assert_eq!(names(&folder.join("full")), expected);
+    let again = succeed(folder, &[&full[..], &["--resume"]].concat());
+    assert!(again.words.contains("2 results skipped"), "{}", again.words);
+}
+
+/// An input that a batch has not come to is not forgotten.
+#[test]
+fn an_unfinished_batch_is_not_called_complete() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let batch = [
+        "eval", "a.dat", "b.dat", "-o", "out", "--resume", "--device", "cpu",
+    ];
+    succeed(folder, &batch);
+    let whole = tree(&folder.join("out"));
+    let path = folder.join("out/manifest.jsonl");
+    let text = fs::read_to_string(&path).unwrap();
+    let first = text.lines().next().unwrap();
+    let pending = r#"{"state":"pending","input":"b.dat","result":"b.npy"}"#;
+    fs::write(&path, format!("{first}\n{pending}\n")).unwrap();
+    fs::remove_file(folder.join("out/b.npy")).unwrap();
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let unfinished = "1 input has no result yet (the first: b.dat)";
+    assert!(check.words.contains(unfinished), "{}", check.words);
+    succeed(folder, &batch);
+    assert_eq!(tree(&folder.join("out")), whole);
+    succeed(folder, &["check", "out"]);
+
+    // A first line that cannot be read has a remedy that works.
+    fs::write(&path, text.replacen("output", "0utput", 1)).unwrap();
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    assert!(
+        check.words.contains("--overwrite` makes all results again"),
+        "{}",
+        check.words
+    );
+    let again = [&batch[..5], &["--overwrite", "--device", "cpu"]].concat();
+    succeed(folder, &again);
+    assert_eq!(tree(&folder.join("out")), whole);
+}
+
+#[test]
+fn results_without_inputs_are_told_and_pruned() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("walks/deep")).unwrap();
+    for name in ["a.dat", "deep/b.dat", "deep/c.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join("walks").join(name)).unwrap();
+    }
+    fs::copy(folder.join("bad.dat"), folder.join("walks/bad.dat")).unwrap();
+    let batch = ["eval", "walks", "-o", "out", "--resume", "--device", "cpu"];
+    assert_eq!(run(folder, &batch).code, 3);
+    let gone = ["bad.dat", "deep/b.dat", "deep/c.dat"];
+    for name in gone {
+        fs::remove_file(folder.join("walks").join(name)).unwrap();
+    }
+    let again = succeed(folder, &batch);
+    let told = "2 results have no input any more (--prune removes what has none)";
+    assert!(again.words.contains(told), "{}", again.words);
+    let check = succeed(folder, &["check", "out"]);
+    assert!(
+        check.words.contains("2 results have no input"),
+        "{}",
+        check.words
+    );
+    // What is not the result any more stays.
+    fs::write(folder.join("out/deep/c.npy"), "mine").unwrap();
+    let pruned = succeed(folder, &[&batch[..], &["--prune"]].concat());
+    assert!(
+        pruned.words.contains("b.npy: removed; its input is gone"),
+        "{}",
+        pruned.words
+    );
+    assert!(
+        pruned
+            .words
+            .contains("c.npy: has no input any more, but differs"),
+        "{}",
+        pruned.words
+    );
+    assert_eq!(
+        names(&folder.join("out")),
+        ["a.npy", "deep/c.npy", "manifest.jsonl"]
+    );
+    let refused = run(
+        folder,
+        &["eval", "walks", "-o", "s", "--shard", "1/1", "--prune"],
+    );
+    assert_eq!(refused.code, 2, "{}", refused.words);
+}
+
+/// Warnings and failures are in the manifest and in JSON; a long batch prints a line for each code.
+#[test]
+fn a_long_batch_prints_at_most_a_screen() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("walks")).unwrap();
+    fs::write(folder.join("turned.dat"), "# 1 1\n0 1 0 0 0\n1 0 1 0 0\n").unwrap();
+    for number in 0..30 {
+        let copy = |from: &str, to: String| {
+            fs::copy(folder.join(from), folder.join("walks").join(to)).unwrap();
+        };
+        copy("turned.dat", format!("{number}.dat"));
+        copy("bad.dat", format!("bad{number}.dat"));
+    }
+    let batch = ["eval", "walks", "-o", "out", "--device", "cpu", "--json"];
+    let made = run(folder, &batch);
+    assert_eq!(made.code, 3, "{}", made.words);
+    let lines = made.words.lines().count();
+    assert!(lines <= 16, "{lines}: {}", made.words);
+    let said = [
+        "W012 30 files: neighbouring keys 180° apart (--verbose lists them)",
+        "E020 20 more files: the wrong number of columns (--verbose lists them)",
+        "30 results made, 30 inputs failed; listed in out/manifest.jsonl",
+    ];
+    for line in said {
+        assert!(made.words.contains(line), "{}", made.words);
+    }
+    let json: Vec<serde_json::Value> = serde_json::from_slice(&made.out).unwrap();
+    let states = |state: &str| json.iter().filter(|it| it["state"] == state).count();
+    assert_eq!((states("made"), states("failed")), (30, 30));
+    assert_eq!(json[0]["warnings"][0]["code"], "W012");
+    let lines = manifest(&folder.join("out"));
+    assert_eq!(lines.len(), 60);
+    assert_eq!(lines[0]["warnings"][0]["code"], "W012");
+    assert_eq!(lines[59]["state"], "failed");
+    let all = run(
+        folder,
+        &[&batch[..], &["--overwrite", "--verbose"]].concat(),
+    );
+    assert_eq!(all.words.matches("warning[W012]").count(), 30);
+    assert_eq!(all.words.matches("error[E020]").count(), 30);
+    assert_eq!(all.words.matches(".npy\n").count(), 30, "{}", all.words);
+}
+
+/// What is not a file is told, and the others are evaluated.
+#[cfg(unix)]
+#[test]
+fn directories_may_have_anything() {
+    use std::os::unix::fs::symlink;
+
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("walks/old")).unwrap();
+    for name in ["walks/a.dat", "walks/a_draft.dat", "walks/old/b.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join(name)).unwrap();
+    }
+    symlink("..", folder.join("walks/old/up")).unwrap();
+    symlink("round.dat", folder.join("walks/round.dat")).unwrap();
+    symlink("nowhere", folder.join("walks/notes.txt")).unwrap();
+    let pipe = std::process::Command::new("mkfifo")
+        .arg(folder.join("walks/pipe.dat"))
+        .status();
+    assert!(pipe.unwrap().success());
+    let _socket = std::os::unix::net::UnixListener::bind(folder.join("walks/s.dat")).unwrap();
+    let line = [
+        "eval",
+        "walks",
+        "-o",
+        "out",
+        "--exclude",
+        "*_draft.*",
+        "--device",
+        "cpu",
+    ];
+    let made = succeed(folder, &line);
+    for told in [
+        "walks/old/up: is a link to walks, a directory that it is in; not followed",
+        "walks/round.dat: is a link in a circle of links; not followed",
+        "walks/pipe.dat: is a named pipe; skipped (--pipes reads it)",
+        "walks/s.dat: is a socket; skipped",
+    ] {
+        assert!(made.words.contains(told), "{}", made.words);
+    }
+    assert_eq!(
+        names(&folder.join("out")),
+        ["a.npy", "manifest.jsonl", "old/b.npy"]
+    );
+    let lines = manifest(&folder.join("out"));
+    let skipped = lines.iter().filter(|line| line["state"] == "skipped");
+    assert_eq!(skipped.count(), 4);
+    succeed(folder, &["check", "out"]);
+    let shards = [&line[..3], &["shards"], &line[4..], &["--shard", "1/1"]].concat();
+    succeed(folder, &shards);
+    succeed(folder, &["merge", "shards"]);
+    assert_eq!(tree(&folder.join("shards")), tree(&folder.join("out")));
+
+    let empty = run(folder, &["eval", "empty", "walks/old", "-o", "partly"]);
+    assert_eq!(empty.code, 3, "{}", empty.words);
+    let told = "empty: error[E002]: is a directory without a file of a format that is read";
+    assert!(empty.words.contains(told), "{}", empty.words);
+    let none = run(folder, &["eval", "a.dat", "-o", "none", "--exclude", "*"]);
+    assert_eq!(none.code, 2, "{}", none.words);
+    assert!(
+        none.words
+            .contains("--exclude leaves out all inputs (1 input)"),
+        "{}",
+        none.words
+    );
+
+    // A list ended by NUL characters, named below a directory.
+    fs::write(folder.join("list"), "walks/a.dat\0walks/old/b.dat\0").unwrap();
+    let listed = [
+        "eval",
+        "--files-from",
+        "list",
+        "-0",
+        "--base",
+        "walks",
+        "-o",
+        "based",
+    ];
+    succeed(folder, &listed);
+    assert_eq!(
+        names(&folder.join("based")),
+        ["a.npy", "manifest.jsonl", "old/b.npy"]
+    );
+    let outside = run(
+        folder,
+        &[
+            "eval",
+            "a.dat",
+            "walks/a.dat",
+            "--base",
+            "walks",
+            "-o",
+            "no",
+        ],
+    );
+    assert_eq!(outside.code, 2, "{}", outside.words);
+    assert!(
+        outside.words.contains("a.dat: is not below --base walks"),
+        "{}",
+        outside.words
+    );
+}
+
+/// Data that nobody can read is no success, and a terminal gets no binary numbers.
+#[cfg(target_os = "linux")]
+#[test]
+fn results_do_not_vanish_in_standard_output() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let program = env!("CARGO_BIN_EXE_tumble");
+    let shell = |line: &str| {
+        let mut shell = std::process::Command::new("sh");
+        finish(
+            shell
+                .current_dir(folder)
+                .args(["-c", line])
+                .output()
+                .unwrap(),
+        )
+    };
+    let closed = shell(&format!("{program} eval a.dat -o - >&-"));
+    assert_eq!(closed.code, 7, "{}", closed.words);
+    assert!(
+        closed.words.contains("standard output is closed"),
+        "{}",
+        closed.words
+    );
+    let null = shell(&format!("{program} eval a.dat -o - >/dev/null"));
+    assert_eq!(null.code, 0, "{}", null.words);
+    let has_script = std::process::Command::new("script")
+        .arg("--version")
+        .output();
+    if has_script.is_err() {
+        eprintln!("NO script (util-linux): a terminal was not tried");
+        return;
+    }
+    let terminal = |format: &str| {
+        let line = format!("{program} eval a.dat -o - --format {format}");
+        let output = shell(&format!("script -qec '{line}' /dev/null </dev/null"));
+        (output.code, String::from_utf8(output.out).unwrap())
+    };
+    let (code, words) = terminal("npy");
+    assert_eq!(code, 2, "{words}");
+    assert!(words.contains("standard output is a terminal"), "{words}");
+    assert_eq!(terminal("csv").0, 0);
 }
 
 /// Kills at random moments, each resumed: whatever lies under its name is whole at any

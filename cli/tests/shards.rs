@@ -1,6 +1,5 @@
 //! Shards: many processes fill one directory, and merging makes of it what one process would have.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -209,7 +208,12 @@ fn refused_inputs_are_told_and_the_others_made() {
     let line = ["eval", "bad", "-o", "none", "--shard", "1/1"];
     assert_eq!(run(folder, &line).code, 4);
     assert_eq!(run(folder, &["merge", "none"]).code, 4);
-    assert_eq!(tree(&folder.join("none")), BTreeMap::new());
+    let text = fs::read_to_string(folder.join("none/manifest.jsonl")).unwrap();
+    let failed = r#"{"state":"failed","input":"bad/a.dat","result":"a.npy","code":4,"#;
+    assert!(
+        text.starts_with(failed) && text.lines().count() == 1,
+        "{text}"
+    );
 }
 
 /// Kills at random moments, of shards that are resumed: nothing is lost, nothing half-written stays.

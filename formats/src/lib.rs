@@ -62,6 +62,7 @@ pub mod printable;
 pub mod quaternion;
 mod rate;
 pub mod reduce;
+pub mod referred;
 pub mod rotation_form;
 mod rotation_matrix;
 pub mod sample;
@@ -84,6 +85,7 @@ pub use crate::diagnostic::{Code, Diagnostic, Location, Severity};
 pub use crate::feature::Feature;
 pub use crate::format::{Format, Loaded, ReadOptions};
 use crate::path::PathFormat;
+pub use crate::source::file_kind;
 use crate::surface::SurfaceFormat;
 pub use crate::text::lines::Limits;
 

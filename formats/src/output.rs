@@ -51,6 +51,9 @@ pub enum OutputError {
         /// Path of the input.
         input: PathBuf,
     },
+    /// Standard output is closed, so that what is written to it would be lost.
+    #[error("standard output is closed; give a file, or leave standard output open")]
+    Closed,
     /// Writing failed; an existing file is unchanged.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
@@ -189,6 +192,9 @@ impl Output {
     ) -> Result<Self, OutputError> {
         let path = path.to_owned();
         if path.as_os_str() == "-" {
+            if is_standard_closed() {
+                return Err(OutputError::Closed);
+            }
             let writer = OutputSink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
             return Ok(Self { path, writer });
         }
@@ -491,6 +497,25 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
         }),
         _ => Ok(()),
     }
+}
+
+/// Whether this process was started with its standard output closed. Rust's runtime then opens `/dev/null` in its
+/// place, for reading and writing; redirections to `/dev/null` open it for writing alone.
+#[cfg(target_os = "linux")]
+fn is_standard_closed() -> bool {
+    use rustix::fs::{OFlags, fcntl_getfl, fstat, stat};
+
+    let out = io::stdout();
+    let is_null = fstat(&out)
+        .ok()
+        .zip(stat("/dev/null").ok())
+        .is_some_and(|(out, null)| (out.st_dev, out.st_ino) == (null.st_dev, null.st_ino));
+    is_null && fcntl_getfl(&out).is_ok_and(|flags| flags & OFlags::RWMODE == OFlags::RDWR)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn is_standard_closed() -> bool {
+    false
 }
 
 fn parent(path: &Path) -> PathBuf {

@@ -160,8 +160,10 @@ const BUFFER: usize = 1 << 18;
 /// The length above which an input is refused, unless the caller raises the limit.
 pub(super) const MAX_BYTES: u64 = 16 << 30;
 
+/// What a path names, in words: `a file`, `a directory`, `a named pipe`, `a socket` or `a device`.
 #[cfg(unix)]
-fn file_kind(metadata: &Metadata) -> &'static str {
+#[must_use]
+pub fn file_kind(metadata: &Metadata) -> &'static str {
     use std::os::unix::fs::FileTypeExt;
     let kind = metadata.file_type();
     if kind.is_dir() {
@@ -177,8 +179,10 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     }
 }
 
+/// What a path names, in words: `a file` or `a directory`.
 #[cfg(not(unix))]
-fn file_kind(metadata: &Metadata) -> &'static str {
+#[must_use]
+pub fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() {
         "a directory"
     } else {

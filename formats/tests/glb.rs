@@ -68,12 +68,3 @@ pub(crate) fn text_of(path: &Path) -> String {
 pub(crate) fn members(text: &str) -> Text {
     serde_json::from_str(text).unwrap()
 }
-
-pub(crate) fn entries(text: &Text, list: &str) -> Vec<Box<RawValue>> {
-    let raw = text.get(list).map_or("[]", |raw| raw.get());
-    serde_json::from_str(raw).unwrap()
-}
-
-pub(crate) fn raw(list: &[Box<RawValue>]) -> Vec<&str> {
-    list.iter().map(|raw| raw.get()).collect()
-}

@@ -72,7 +72,8 @@ mod _tumble {
     use crate::save::save;
     #[pymodule_export]
     use crate::shards::{
-        Plan, Record, Worker, inputs_of, kernels_sha256, manifest_by_input, manifest_results, merge,
+        Plan, Record, Worker, input_sha256, inputs_of, kernels_sha256, manifest_by_input,
+        manifest_results, manifest_unfinished, merge, referred_files,
     };
     #[pymodule_export]
     use crate::stream::{Chunk, Chunks};

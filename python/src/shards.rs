@@ -34,6 +34,25 @@ pub(crate) fn inputs_of(line: Vec<OsString>) -> PyResult<Vec<OsString>> {
     Ok(inputs.into_iter().map(PathBuf::into_os_string).collect())
 }
 
+/// The files that an input refers to, relative to its folder.
+#[pyfunction]
+pub(crate) fn referred_files(path: PathBuf) -> Vec<OsString> {
+    let files = shards::referred_files(&path).into_iter();
+    files.map(PathBuf::into_os_string).collect()
+}
+
+/// The hash of an input with the files that it refers to; None if it cannot be read.
+#[pyfunction]
+pub(crate) fn input_sha256(py: Python<'_>, path: PathBuf) -> Option<String> {
+    py.detach(|| shards::input_sha256(&path))
+}
+
+/// A line for each input in a manifest that failed or has no result yet.
+#[pyfunction]
+pub(crate) fn manifest_unfinished(text: &str) -> Vec<String> {
+    shards::manifest_unfinished(text)
+}
+
 /// The hash of every kernel: machines that agree in it, and in the version, write the same bytes.
 #[pyfunction]
 pub(crate) fn kernels_sha256() -> &'static str {
@@ -126,6 +145,12 @@ pub(crate) struct Worker {
 
 #[pymethods]
 impl Worker {
+    /// What the results of an input are known by, of its path below the library.
+    fn key_of(&self, below: PathBuf) -> String {
+        let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+        worker.key_of(&below)
+    }
+
     #[new]
     fn new(py: Python<'_>, line: Vec<OsString>, threads: Option<usize>) -> PyResult<Self> {
         py.detach(|| {

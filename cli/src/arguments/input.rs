@@ -3,18 +3,20 @@
 
 use std::collections::HashSet;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
 use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
+use tumble_formats::printable::printable;
+use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions, file_kind};
 use walkdir::WalkDir;
 
 use crate::arguments::reading::ReadingArguments;
 use crate::arguments::tracks::TrackArguments;
-use crate::arguments::wildcard::{self, is_pattern};
+use crate::arguments::wildcard::{self, PathPattern, is_pattern};
+use crate::batch::entry::InputEntry;
 use crate::messages::exit::{self, Failure};
 use crate::messages::progress::busy;
 use crate::messages::{names, words};
@@ -28,6 +30,13 @@ pub(crate) struct Inputs {
     /// Also the inputs in a text file, one a line (`-`: standard input)
     #[arg(long, value_name = "LIST")]
     files_from: Option<PathBuf>,
+    /// With --files-from: the inputs end in NUL characters, as `find -print0` writes them, instead of line ends
+    #[arg(short = '0', long, requires = "files_from")]
+    null: bool,
+    /// Leave out inputs by a pattern of a name (of a file or a folder), or of several in a row, such as
+    /// '*_draft.bvh' or 'takes/old'; may be given several times
+    #[arg(long, value_name = "PATTERN", value_parser = PathPattern::new)]
+    exclude: Vec<PathPattern>,
     /// Read named pipes too
     #[arg(long)]
     pipes: bool,
@@ -63,7 +72,7 @@ impl Inputs {
                 "standard input cannot be both {all}; put one in a file"
             )));
         }
-        let gathered = GatheredInputs::new(&self.paths, self.files_from.as_deref())?;
+        let gathered = GatheredInputs::new(&self.paths, &self.selection())?;
         let paths = gathered.paths();
         self.check_formats(&paths.iter().collect::<Vec<_>>())?;
         Ok(gathered)
@@ -77,6 +86,29 @@ impl Inputs {
         };
         let formats = || paths.iter().map(format);
         self.reading.check(formats).map_err(Failure::usage)
+    }
+
+    /// The inputs of a library, with the options that select some of them.
+    pub(crate) fn gather_library(&self, library: &Path) -> Result<GatheredInputs, Failure> {
+        let selection = InputSelection {
+            list: None,
+            ..self.selection()
+        };
+        GatheredInputs::new(&[library.to_owned()], &selection)
+    }
+
+    /// Whether `--exclude` leaves out a file of this path.
+    pub(crate) fn excludes(&self, path: &Path) -> bool {
+        self.selection().excludes(path)
+    }
+
+    fn selection(&self) -> InputSelection<'_> {
+        InputSelection {
+            list: self.files_from.as_deref(),
+            is_null_separated: self.null,
+            exclude: &self.exclude,
+            pipes: self.pipes,
+        }
     }
 
     /// Whether an input is read with extra keys that follow its curves.
@@ -141,6 +173,9 @@ impl Inputs {
     /// As [`Inputs::load_quietly`], without a progress display.
     pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
         let options = self.options()?;
+        if path.is_dir() {
+            return Err(directory_failure(path));
+        }
         let refuse = |diagnostic: Diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",
@@ -212,11 +247,31 @@ fn no_clips(path: &Path) -> Failure {
     Failure::new(exit::ALL_INPUTS, message)
 }
 
+/// The failure of a directory that no files were found in.
+fn directory_failure(path: &Path) -> Failure {
+    let refuse = |code, message: String| {
+        Failure::input(
+            &Diagnostic::new(path.display().to_string(), code, message),
+            "",
+        )
+    };
+    if let Err(error) = std::fs::read_dir(path) {
+        let message = format!("is a directory that cannot be read: {error}");
+        return refuse(Code::Open, message);
+    }
+    let mut endings: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+    endings.sort_unstable();
+    let message = format!(
+        "is a directory without a file of a format that is read ({}); give its files one by one if their names \
+         end otherwise",
+        endings.join(", ")
+    );
+    refuse(Code::NotAFile, message)
+}
+
 /// Prints the warnings of an input.
 pub(crate) fn print_warnings(loaded: &Loaded) {
-    for warning in loaded.warnings.iter().chain(&loaded.refused) {
-        words::note(&warning.to_string());
-    }
+    words::warnings(loaded.warnings.iter().chain(&loaded.refused));
 }
 
 /// The failure of a command that works on one clip for a file with several.
@@ -233,6 +288,25 @@ pub(crate) struct GatheredInputs {
     pub(crate) files: Vec<FoundInput>,
     /// The command line has a directory, a pattern or a list: there may be any number of files.
     pub(crate) many: bool,
+    /// What directories have that looks like an input but is none: pipes, sockets, links in a circle.
+    pub(crate) skipped: Vec<InputEntry>,
+}
+
+/// Which inputs are meant, besides those that are named.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct InputSelection<'a> {
+    /// A file that lists more of them.
+    pub(crate) list: Option<&'a Path>,
+    pub(crate) is_null_separated: bool,
+    pub(crate) exclude: &'a [PathPattern],
+    /// Whether named pipes in directories are inputs.
+    pub(crate) pipes: bool,
+}
+
+impl InputSelection<'_> {
+    fn excludes(&self, path: &Path) -> bool {
+        self.exclude.iter().any(|pattern| pattern.matches(path))
+    }
 }
 
 /// One input file, and its path below a directory of results.
@@ -241,8 +315,8 @@ pub(crate) struct FoundInput {
     pub(crate) path: PathBuf,
     /// Its name, or its path below a directory that the command line names.
     pub(crate) below: PathBuf,
-    /// It was found below a directory, rather than named.
-    pub(crate) is_from_directory: bool,
+    /// The directory that it was found below, rather than named.
+    pub(crate) root: Option<Arc<Path>>,
 }
 
 impl FoundInput {
@@ -251,31 +325,68 @@ impl FoundInput {
         Self {
             path,
             below,
-            is_from_directory: false,
+            root: None,
         }
     }
 
-    /// The directory that it was met below.
-    pub(crate) fn root(&self) -> Option<&Path> {
-        let steps = self.below.components().count();
-        self.path
-            .ancestors()
-            .nth(steps)
-            .filter(|_| self.is_from_directory)
+    /// The same, whose result lies below the directory of results as it lies below `base`.
+    ///
+    /// # Errors
+    /// When it does not lie below `base`.
+    pub(crate) fn below(mut self, base: &Path) -> Result<Self, Failure> {
+        let relative = |path: &Path, base: &Path| path.strip_prefix(base).ok().map(Path::to_owned);
+        let real = || {
+            let parent = self.path.parent().filter(|parent| *parent != Path::new(""));
+            let parent = parent.unwrap_or(Path::new(".")).canonicalize().ok()?;
+            let path = parent.join(self.path.file_name()?);
+            relative(&path, &base.canonicalize().ok()?)
+        };
+        let is_plain = |path: &PathBuf| plain(path).as_ref() == Some(path);
+        let below = relative(&self.path, base).filter(is_plain).or_else(real);
+        self.below = below.ok_or_else(|| {
+            let (name, base) = (names::input(&self.path), base.display());
+            Failure::usage(format!(
+                "{name}: is not below --base {base}; give a directory that has all inputs"
+            ))
+        })?;
+        Ok(self)
     }
 }
 
 impl GatheredInputs {
+    /// Files that were named.
+    pub(crate) fn of(files: Vec<FoundInput>) -> Self {
+        Self {
+            files,
+            many: true,
+            skipped: Vec::new(),
+        }
+    }
+
     /// Files named on the command line come first, then those of the list.
-    pub(crate) fn new(paths: &[PathBuf], list: Option<&Path>) -> Result<Self, Failure> {
+    pub(crate) fn new(paths: &[PathBuf], selection: &InputSelection<'_>) -> Result<Self, Failure> {
         let mut gathered = Self {
             files: Vec::new(),
-            many: list.is_some(),
+            many: selection.list.is_some(),
+            skipped: Vec::new(),
         };
-        let listed = list.map_or_else(|| Ok(Vec::new()), read_list)?;
+        let listed = selection.list.map_or_else(
+            || Ok(Vec::new()),
+            |list| read_list(list, selection.is_null_separated),
+        )?;
         let mut seen = HashSet::new();
-        for path in paths.iter().chain(&listed) {
-            for found in gathered.expand(path) {
+        let mut excluded = 0;
+        let named = paths.iter().map(|path| (path, false));
+        for (path, is_listed) in named.chain(listed.iter().map(|path| (path, true))) {
+            for mut found in gathered.expand(path, selection) {
+                if selection.excludes(&found.path) && !names::is_standard(&found.path) {
+                    excluded += 1;
+                    continue;
+                }
+                // The results of a list keep its tree.
+                if is_listed && let Some(below) = plain(&found.path) {
+                    found.below = below;
+                }
                 // A missing file is reported when it is opened.
                 let identity = found.path.canonicalize();
                 if seen.insert(identity.unwrap_or_else(|_| found.path.clone())) {
@@ -286,9 +397,21 @@ impl GatheredInputs {
                 }
             }
         }
+        for skipped in &gathered.skipped {
+            let message = skipped.message.as_deref().unwrap_or_default();
+            words::note(&format!("{}: {message}", printable(&skipped.input)));
+        }
         if gathered.files.is_empty() {
-            let list = list.map(names::input).unwrap_or_default();
-            return Err(Failure::usage(format!("{list}: lists no files")));
+            return Err(Failure::usage(match (excluded, selection.list) {
+                (0, list) => format!(
+                    "{}: lists no files",
+                    list.map(names::input).unwrap_or_default()
+                ),
+                _ => {
+                    let all = words::count(excluded, "input");
+                    format!("--exclude leaves out all inputs ({all}); is the pattern too wide?")
+                }
+            }));
         }
         Ok(gathered)
     }
@@ -297,7 +420,7 @@ impl GatheredInputs {
         self.files.iter().map(|found| found.path.clone()).collect()
     }
 
-    fn expand(&mut self, path: &Path) -> Vec<FoundInput> {
+    fn expand(&mut self, path: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
         let alone = || {
             let name = path.file_name().unwrap_or(path.as_os_str());
             FoundInput::named(path.to_owned(), name.into())
@@ -306,7 +429,7 @@ impl GatheredInputs {
             return vec![alone()];
         }
         let found = if path.is_dir() {
-            below(path)
+            self.below(path, selection)
         } else {
             matches(path)
         };
@@ -317,31 +440,106 @@ impl GatheredInputs {
         self.many = true;
         found
     }
+
+    /// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
+    /// too, which fails when it is opened.
+    fn below(&mut self, directory: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
+        let root: Arc<Path> = directory.into();
+        let relative = |path: &Path| path.strip_prefix(directory).unwrap_or(path).to_owned();
+        let walk = WalkDir::new(directory)
+            .follow_links(true)
+            .sort_by_file_name();
+        let walk = walk.into_iter().filter_entry(|entry| {
+            entry.depth() == 0 || !selection.excludes(&relative(entry.path()))
+        });
+        let mut found = Vec::new();
+        for entry in walk {
+            let is_input = match &entry {
+                Ok(entry) if entry.file_type().is_dir() => continue,
+                Ok(entry) if Format::of(entry.path()).is_none() => continue,
+                Ok(entry) if entry.file_type().is_file() => Ok(()),
+                Ok(entry) => {
+                    let kind = entry
+                        .metadata()
+                        .map_or("no file", |found| file_kind(&found));
+                    match kind {
+                        "a named pipe" if selection.pipes => Ok(()),
+                        "a named pipe" => Err(format!("is {kind}; skipped (--pipes reads it)")),
+                        _ => Err(format!("is {kind}; skipped")),
+                    }
+                }
+                Err(error) => match unreadable(error) {
+                    UnreadableEntry::Input => Ok(()),
+                    UnreadableEntry::Skipped(why) => Err(why),
+                    UnreadableEntry::Other => continue,
+                },
+            };
+            let path = match &entry {
+                Ok(entry) => entry.path(),
+                Err(error) => error.path().unwrap_or(directory),
+            };
+            match is_input {
+                Ok(()) => found.push(FoundInput {
+                    path: path.to_owned(),
+                    below: relative(path),
+                    root: Some(Arc::clone(&root)),
+                }),
+                Err(why) => self.skipped.push(InputEntry::skipped(path, why)),
+            }
+        }
+        found
+    }
 }
 
-/// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
-/// too, which fails when it is opened.
-fn below(directory: &Path) -> Vec<FoundInput> {
-    let walk = WalkDir::new(directory).follow_links(true);
-    let mut found = Vec::new();
-    for entry in walk.sort_by_file_name() {
-        let path = match entry {
-            Ok(entry) if entry.file_type().is_dir() => continue,
-            Ok(entry) if Format::of(entry.path()).is_some() => entry.into_path(),
-            Ok(_) => continue,
-            Err(error) => match error.path() {
-                Some(path) => path.to_owned(),
-                None => continue,
-            },
-        };
-        let below = path.strip_prefix(directory).unwrap_or(&path).to_owned();
-        found.push(FoundInput {
-            path,
-            below,
-            is_from_directory: true,
-        });
+/// What a walk could not look into.
+enum UnreadableEntry {
+    /// It is an input, which fails.
+    Input,
+    /// It leads to nothing new; with the reason.
+    Skipped(String),
+    /// Nothing that would be an input.
+    Other,
+}
+
+fn unreadable(error: &walkdir::Error) -> UnreadableEntry {
+    if let Some(ancestor) = error.loop_ancestor() {
+        let ancestor = ancestor.display();
+        return UnreadableEntry::Skipped(format!(
+            "is a link to {ancestor}, a directory that it is in; not followed"
+        ));
     }
-    found
+    let Some(path) = error.path() else {
+        return UnreadableEntry::Other;
+    };
+    let is_link = path
+        .symlink_metadata()
+        .is_ok_and(|found| found.is_symlink());
+    match error.io_error().map(io::Error::kind) {
+        Some(io::ErrorKind::NotFound) if is_link && Format::of(path).is_none() => {
+            UnreadableEntry::Other
+        }
+        Some(io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) | None => {
+            UnreadableEntry::Input
+        }
+        // Links that lead to each other.
+        Some(_) if is_link => {
+            UnreadableEntry::Skipped("is a link in a circle of links; not followed".to_owned())
+        }
+        Some(_) => UnreadableEntry::Input,
+    }
+}
+
+/// The path without `.`; `None` if it is absolute or has `..`, so that it does not stay below a directory.
+fn plain(path: &Path) -> Option<PathBuf> {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::Normal(name) => plain.push(name),
+            Component::CurDir => {}
+            _ => return None,
+        }
+    }
+    Some(plain)
 }
 
 /// The files that a pattern matches: shells expand patterns, but not in lists, not in
@@ -360,8 +558,9 @@ fn matches(pattern: &Path) -> Vec<FoundInput> {
         .collect()
 }
 
-/// A path on each line; blank lines and lines that begin with `#` are none.
-fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
+/// The paths in a list: one on each line, where blank lines and lines that begin with `#` are none; or ended by NUL
+/// characters.
+fn read_list(list: &Path, is_null_separated: bool) -> Result<Vec<PathBuf>, Failure> {
     let read = if names::is_standard(list) {
         let mut text = Vec::new();
         io::stdin().read_to_end(&mut text).map(|_| text)
@@ -375,6 +574,10 @@ fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
             format!("{name}: the list cannot be read: {error}"),
         )
     })?;
+    if is_null_separated {
+        let paths = text.split(|&byte| byte == 0);
+        return Ok(paths.filter(|path| !path.is_empty()).map(named).collect());
+    }
     let lines = text
         .split(|&byte| byte == b'\n')
         .map(<[u8]>::trim_ascii_end);

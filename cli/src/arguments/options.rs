@@ -14,7 +14,7 @@ use tumble_formats::end_frame::EndFrame;
 use tumble_formats::format::{Format, FormatOption};
 
 use crate::arguments::output::OutputArguments;
-use crate::batch::digest::InputFile;
+use crate::batch::digest::{self, InputFile};
 use crate::messages::exit::Failure;
 
 /// A rule about an option of this name; the name is that of its field, with `_`.
@@ -116,6 +116,9 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     // Inputs.
     silent("paths"),
     silent("files_from"),
+    silent("null"),
+    silent("base"),
+    silent("exclude"),
     silent("pipes"),
     silent("max_size"),
     silent("max_memory"),
@@ -144,6 +147,9 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     silent("out"),
     silent("overwrite"),
     silent("resume"),
+    silent("prune"),
+    silent("names"),
+    silent("verbose"),
     silent("format"),
     silent("times_out"),
     silent("shard"),
@@ -380,10 +386,11 @@ impl CommandLine {
     }
 }
 
-/// The hash of a file; empty where it cannot be read again, as standard input. The name of a folder.
+/// The hash of a file; empty where it cannot be read again, as standard input. That of the models in a folder of
+/// body models.
 fn content(file: &str) -> String {
     if Path::new(file).is_dir() {
-        return file.to_owned();
+        return digest::of_folder(Path::new(file), "npz");
     }
     let file = InputFile::new(Path::new(file));
     file.sha256().unwrap_or_default().to_owned()

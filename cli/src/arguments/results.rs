@@ -9,14 +9,15 @@ use tumble_formats::format::{Document, FormatOption, MotionOptions, left_behind}
 use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
-use tumble_formats::{Feature, Format, Loaded};
+use tumble_formats::{Code, Diagnostic, Feature, Format};
 
 use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
 use crate::batch::output_plan::{self, OutputPlan, OutputRequest};
-use crate::batch::pipeline::{BatchOptions, Pipeline};
+use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
+use crate::batch::result_names::ResultNaming;
 use crate::batch::target::{self, Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::{names, words};
+use crate::messages::names;
 
 const ONE_INPUT: &str = "--times-out needs a single input whose result is a single file";
 
@@ -31,6 +32,21 @@ pub(crate) struct ResultArguments {
     /// the same options
     #[arg(long)]
     resume: bool,
+    /// In a directory of results: remove those whose inputs are gone, and their lines in the manifest
+    #[arg(long)]
+    prune: bool,
+    /// In a directory of results: how results are named after their inputs
+    #[arg(long, value_name = "NAMES", value_enum, default_value_t)]
+    names: ResultNaming,
+    /// Name results by the paths of their inputs below this directory
+    #[arg(long, value_name = "DIR")]
+    base: Option<PathBuf>,
+    /// Print every result and every warning of a batch, which otherwise prints a summary if it is long
+    #[arg(short, long)]
+    verbose: bool,
+    /// Print JSON: about the results and the inputs that failed
+    #[arg(long)]
+    json: bool,
     /// The format of the results [default: by the name of the output; to standard output npy]
     #[arg(long, visible_alias = "to", value_parser = target::format())]
     format: Option<&'static Format>,
@@ -45,14 +61,12 @@ impl ResultArguments {
     pub(crate) fn picture(
         &self,
         file: &Path,
-        inputs: &GatheredInputs,
         plan: &OutputPlan,
     ) -> Result<Option<Destination>, Failure> {
-        let inputs = inputs.paths();
-        if inputs.len() > 1 {
+        if plan.paths.len() + plan.refused.len() > 1 {
             return Err(Failure::usage("--plot needs a single input"));
         }
-        let destination = Destination::of_picture(file, self.overwrite, &inputs)?;
+        let destination = Destination::of_picture(file, self.overwrite, &plan.paths)?;
         for target in &plan.targets {
             destination.refuse_same(target.path())?;
         }
@@ -73,6 +87,41 @@ impl ResultArguments {
         }
     }
 
+    /// The inputs with the paths of their results: those below `--base`.
+    pub(crate) fn based(&self, mut inputs: GatheredInputs) -> Result<GatheredInputs, Failure> {
+        if let Some(base) = &self.base {
+            let files = inputs.files.into_iter().map(|found| found.below(base));
+            inputs.files = files.collect::<Result<_, Failure>>()?;
+        }
+        Ok(inputs)
+    }
+
+    /// How results are named.
+    pub(crate) fn naming(&self) -> ResultNaming {
+        self.names
+    }
+
+    /// Whether every line of a batch is printed.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.verbose
+    }
+
+    /// Whether JSON is printed.
+    pub(crate) fn prints_json(&self) -> bool {
+        self.json
+    }
+
+    /// Refuses options for shards that need all results of a directory.
+    pub(crate) fn check_shards(&self) -> Result<(), Failure> {
+        match self.prune {
+            true => Err(Failure::usage(
+                "--prune needs all inputs, and a shard has some of them; merge the shards, then run the command \
+                 once more with --resume --prune and without shards",
+            )),
+            false => Ok(()),
+        }
+    }
+
     /// The format that was asked for.
     pub(crate) fn format(&self) -> Option<&'static Format> {
         self.format
@@ -89,7 +138,8 @@ impl ResultArguments {
     }
 
     /// The destination of each input's result. Everything that can be refused is refused here, before any work.
-    pub(crate) fn plan(&self, inputs: &GatheredInputs) -> Result<OutputPlan, Failure> {
+    pub(crate) fn plan(&self, inputs: GatheredInputs) -> Result<OutputPlan, Failure> {
+        let inputs = &self.based(inputs)?;
         let mut plan = output_plan::plan(
             inputs,
             OutputRequest {
@@ -97,8 +147,15 @@ impl ResultArguments {
                 format: self.format,
                 overwrite: self.overwrite,
                 resume: self.resume,
+                prune: self.prune,
+                naming: self.names,
             },
         )?;
+        if self.json && plan.targets.iter().any(ResultTarget::is_standard) {
+            return Err(Failure::usage(
+                "--json and the result cannot both go to standard output; give -o FILE",
+            ));
+        }
         if let Some(file) = &self.times_out {
             let (1, None, Some(target)) = (plan.targets.len(), &plan.manifest, plan.targets.pop())
             else {
@@ -112,7 +169,7 @@ impl ResultArguments {
                     format.name
                 )));
             }
-            let destination = Destination::new(file, self.overwrite, &inputs.paths())?;
+            let destination = Destination::new(file, self.overwrite, &plan.paths)?;
             plan.targets.push(target.with_times(destination)?);
         }
         Ok(plan)
@@ -125,19 +182,27 @@ impl ResultArguments {
         plan: OutputPlan,
         options: String,
     ) -> Pipeline<'static> {
-        let jobs = plan.paths.into_iter().zip(plan.targets).collect();
-        match plan.manifest {
-            None => Pipeline::of_one(reader, jobs, plan.refused),
+        let inputs = PipelineInputs {
+            jobs: plan.paths.into_iter().zip(plan.targets).collect(),
+            refused: plan.refused,
+            skipped: plan.skipped,
+        };
+        let pipeline = match plan.manifest {
+            None => Pipeline::of_one(reader, inputs),
             Some(manifest) => Pipeline::of_batch(
                 reader,
-                jobs,
-                plan.refused,
+                inputs,
                 BatchOptions {
                     options,
                     resume: self.resume,
+                    verbose: self.verbose,
                 },
                 Box::new(manifest),
             ),
+        };
+        match self.json {
+            true => pipeline.with_json(),
+            false => pipeline,
         }
     }
 }
@@ -157,20 +222,19 @@ pub(crate) fn check_sequence(
 }
 
 /// The document to rewrite, where the result is the input file with other keys. `otherwise` is the
-/// reason for a new file of the same format, if there is one; then a note lists what is not copied.
+/// reason for a new file of the same format, if there is one; then a warning lists what is not copied.
 pub(crate) fn document_to_rewrite<'a>(
-    name: &str,
-    loaded: &'a Loaded,
-    target: &ResultTarget,
+    work: &'a ClipWork,
     otherwise: Option<&str>,
 ) -> Option<&'a dyn Document> {
+    let (loaded, format) = (&work.input.loaded, work.target.format());
     let document = loaded.document.as_deref()?;
     let adjusted = loaded.is_adjusted.then_some("other units or axes make");
     let why = otherwise.or(adjusted);
-    if let Some(lost) = left_behind(document, &loaded.warnings, target.format(), why) {
-        words::note(&format!("{name}: {lost}"));
+    if let Some(lost) = left_behind(document, &loaded.warnings, format, why) {
+        work.warn(Diagnostic::new(&work.name, Code::NoRoom, lost));
     }
-    (document.writes(target.format()) && why.is_none()).then_some(document)
+    (document.writes(format) && why.is_none()).then_some(document)
 }
 
 /// Why a selection of an input makes a new file, rather than the input's file with other keys.

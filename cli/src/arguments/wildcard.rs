@@ -128,6 +128,78 @@ impl PatternPart {
     }
 }
 
+/// A pattern of names in a path: of one name, or of several that follow each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PathPattern {
+    names: Vec<PathPart>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum PathPart {
+    Name(Wildcard),
+    /// Any folders, also none.
+    Folders,
+}
+
+impl PathPattern {
+    /// Reads a pattern.
+    ///
+    /// # Errors
+    /// When it has no name, or as [`Wildcard::new`]; in words.
+    pub(crate) fn new(text: &str) -> Result<Self, String> {
+        let names = text.split('/').filter(|name| !matches!(*name, "" | "."));
+        let names = names.map(|name| match name {
+            "**" => Ok(PathPart::Folders),
+            name => Wildcard::new(name).map(PathPart::Name),
+        });
+        let names: Vec<PathPart> = names.collect::<Result<_, String>>()?;
+        match names.is_empty() {
+            true => Err("expected a pattern of a name, such as '*_draft.bvh'".to_owned()),
+            false => Ok(Self { names }),
+        }
+    }
+
+    /// Whether it matches names of the path that follow each other, anywhere in it: a file, or a folder that it is in.
+    pub(crate) fn matches(&self, path: &Path) -> bool {
+        let names = path.components().filter_map(|component| match component {
+            Component::Normal(name) => Some(name.to_string_lossy()),
+            _ => None,
+        });
+        let names: Vec<_> = names.collect();
+        // The parts of the pattern that are left at each name, of those that begin at any of the names before.
+        let mut open = vec![false; self.names.len() + 1];
+        for name in &names {
+            open[0] = true;
+            self.skip_folders(&mut open);
+            let mut next = vec![false; open.len()];
+            for (index, part) in self
+                .names
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| open[*index])
+            {
+                match part {
+                    PathPart::Name(wildcard) => next[index + 1] |= wildcard.matches(name),
+                    PathPart::Folders => next[index] = true,
+                }
+            }
+            self.skip_folders(&mut next);
+            if next[self.names.len()] {
+                return true;
+            }
+            open = next;
+        }
+        false
+    }
+
+    /// `**` may stand for no folder.
+    fn skip_folders(&self, open: &mut [bool]) {
+        for (index, part) in self.names.iter().enumerate() {
+            open[index + 1] |= open[index] && matches!(part, PathPart::Folders);
+        }
+    }
+}
+
 /// The files and folders that a pattern of paths matches, sorted; none where a part of it is malformed.
 /// Folders that cannot be read match nothing.
 pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
@@ -136,6 +208,11 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
     for (index, component) in components.iter().enumerate() {
         let name = match component {
             Component::Normal(name) => name.to_str().unwrap_or_default(),
+            Component::ParentDir => {
+                found = found.into_iter().map(parent_of).collect();
+                remove_repeated(&mut found);
+                continue;
+            }
             other => {
                 found.iter_mut().for_each(|path| path.push(other));
                 continue;
@@ -145,6 +222,7 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
             // The folders themselves too; as the last part, also all files in them.
             let is_last = index + 1 == components.len();
             found = found.iter().flat_map(|path| tree(path, is_last)).collect();
+            remove_repeated(&mut found);
             continue;
         }
         if !is_pattern(name) {
@@ -160,9 +238,27 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
             .collect();
     }
     found.retain(|path| path.symlink_metadata().is_ok());
-    found.sort_unstable();
-    found.dedup();
+    remove_repeated(&mut found);
     found
+}
+
+/// The folder above a path. Above a link it is that of the folder that the link leads to.
+fn parent_of(mut path: PathBuf) -> PathBuf {
+    let is_name = matches!(path.components().next_back(), Some(Component::Normal(_)));
+    let is_folder = path.symlink_metadata().is_ok_and(|found| found.is_dir());
+    match is_name && is_folder {
+        true => {
+            path.pop();
+        }
+        false => path.push(".."),
+    }
+    path
+}
+
+/// Sorts paths and removes those that occur twice, so that patterns with `..` do not multiply them.
+fn remove_repeated(paths: &mut Vec<PathBuf>) {
+    paths.sort_unstable();
+    paths.dedup();
 }
 
 fn folder(path: &Path) -> &Path {
@@ -228,6 +324,29 @@ mod tests {
         assert!(Wildcard::new("a[").is_err() && Wildcard::new("[!").is_err());
     }
 
+    #[test]
+    fn patterns_of_paths_match_names_that_follow_each_other() {
+        for (pattern, path, is_match) in [
+            ("*_draft.bvh", "walks/run_draft.bvh", true),
+            ("*_draft.bvh", "walks/run.bvh", false),
+            ("old", "walks/old/run.bvh", true),
+            ("old", "walks/older/run.bvh", false),
+            ("takes/old", "walks/takes/old/run.bvh", true),
+            ("takes/old/", "takes/old", true),
+            ("takes/old", "takes/new/old/run.bvh", false),
+            ("takes/**/old", "takes/new/old/run.bvh", true),
+            ("takes/**/old", "takes/old/run.bvh", true),
+            ("**/run.*", "run.bvh", true),
+            ("./run.bvh", "walks/run.bvh", true),
+            ("[a-c]*/run.*", "../b/run.bvh", true),
+        ] {
+            let found = PathPattern::new(pattern).unwrap().matches(Path::new(path));
+            assert_eq!(found, is_match, "{pattern} {path}");
+        }
+        assert!(PathPattern::new("").is_err() && PathPattern::new("./").is_err());
+        assert!(PathPattern::new("a/[b").unwrap_err().contains("no end"));
+    }
+
     /// It would take longer than the universe is old to try every split.
     #[test]
     fn many_stars_take_no_time() {
@@ -257,6 +376,11 @@ mod tests {
         assert_eq!(found("**/*.dat"), ["4.dat", "a/1.dat", "b/c/3.dat"]);
         assert_eq!(found("a/[12].*"), ["a/1.dat", "a/2.bvh"]);
         assert_eq!(found("b/?/3.dat"), ["b/c/3.dat"]);
+        // A path that ends in its folder is not another one.
+        assert_eq!(found("*/../*.dat"), ["4.dat"]);
+        assert_eq!(found("*/../a/1.dat"), ["a/1.dat"]);
+        let round = "*/../".repeat(40);
+        assert_eq!(found(&format!("{round}*.dat")), ["4.dat"]);
         assert_eq!(found("none/*"), [""; 0]);
         assert_eq!(found("*/none"), [""; 0]);
     }

@@ -1,12 +1,13 @@
 //! The lines of a manifest, those of earlier batches, and what records new ones.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
+use tumble_formats::Diagnostic;
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
 use crate::batch::digest;
@@ -39,7 +40,123 @@ pub(crate) struct ManifestEntry {
     /// how many clips there are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) one_of: Option<(String, usize)>,
+    /// The warnings about the input and about writing the result.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) warnings: Vec<RecordedWarning>,
 }
+
+/// A warning in a manifest and in JSON.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct RecordedWarning {
+    pub(crate) code: String,
+    /// Line and column, or the place inside the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) location: Option<String>,
+    pub(crate) message: String,
+}
+
+impl From<&Diagnostic> for RecordedWarning {
+    fn from(warning: &Diagnostic) -> Self {
+        Self {
+            code: warning.code.name().to_owned(),
+            location: warning.location.as_ref().map(ToString::to_string),
+            message: warning.message.clone(),
+        }
+    }
+}
+
+/// An input without a result, or with a part of its results.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct InputEntry {
+    pub(crate) state: InputState,
+    /// As on the command line.
+    pub(crate) input: String,
+    /// The result that it has, or would have; `None` where it can have no name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) result: Option<String>,
+    /// The exit code of a command that has this input alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) code: Option<u8>,
+    /// Why it failed or was skipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) message: Option<String>,
+}
+
+/// Why an input has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum InputState {
+    /// It was refused, or some of its animations were.
+    Failed,
+    /// The batch has not come to it.
+    Pending,
+    /// It is no file that can be read, such as a named pipe in a directory.
+    Skipped,
+}
+
+impl InputEntry {
+    /// An input that a batch has yet to evaluate.
+    pub(crate) fn pending(input: &Path, result: &str) -> Self {
+        Self {
+            state: InputState::Pending,
+            input: input.display().to_string(),
+            result: Some(result.to_owned()),
+            code: None,
+            message: None,
+        }
+    }
+
+    /// An input that failed.
+    pub(crate) fn failed(input: &Path, result: Option<&str>, failure: &Failure) -> Self {
+        Self {
+            state: InputState::Failed,
+            input: input.display().to_string(),
+            result: result.map(str::to_owned),
+            code: Some(failure.code),
+            message: Some(failure.message().to_owned()),
+        }
+    }
+
+    /// What looks like an input but is none, and why.
+    pub(crate) fn skipped(path: &Path, why: String) -> Self {
+        Self {
+            state: InputState::Skipped,
+            input: path.display().to_string(),
+            result: None,
+            code: None,
+            message: Some(why),
+        }
+    }
+
+    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
+        let entry: Self = serde_json::from_slice(line).ok()?;
+        entry
+            .result
+            .as_deref()
+            .is_none_or(is_beneath)
+            .then_some(entry)
+    }
+
+    /// By what entries of one input are known to be of one: its result, or else its name behind a character that
+    /// no result begins with.
+    pub(crate) fn key(&self) -> String {
+        let by_input = || Self::key_by_input(&self.input);
+        self.result.clone().unwrap_or_else(by_input)
+    }
+
+    fn key_by_input(input: &str) -> String {
+        format!("/{input}")
+    }
+
+    /// The entry as a line.
+    pub(crate) fn line(&self) -> String {
+        serde_json::to_string(self).expect("strings and numbers") + "\n"
+    }
+}
+
+/// The entries of inputs without results, by [`InputEntry::key`].
+pub(crate) type InputEntries = BTreeMap<String, InputEntry>;
 
 impl ManifestEntry {
     /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
@@ -57,10 +174,22 @@ impl ManifestEntry {
         }
     }
 
+    /// Removes what earlier lines say of its input: it has a result.
+    pub(crate) fn settle(&self, inputs: &mut InputEntries) {
+        if !inputs.is_empty() {
+            inputs.remove(self.whole().0);
+            inputs.remove(&InputEntry::key_by_input(&self.input));
+        }
+    }
+
     /// Whether it is the result of the same request.
     pub(crate) fn is_made_from(&self, input_sha256: &str, options: &str) -> bool {
-        self.input_sha256.as_deref() == Some(input_sha256)
-            && self.options == options
+        self.input_sha256.as_deref() == Some(input_sha256) && self.is_made_with(options)
+    }
+
+    /// As [`ManifestEntry::is_made_from`], of any input.
+    pub(crate) fn is_made_with(&self, options: &str) -> bool {
+        self.options == options
             && self.kernels_sha256 == kernels_sha256()
             && self.tumble == env!("CARGO_PKG_VERSION")
     }
@@ -73,10 +202,24 @@ pub(crate) fn kernels_sha256() -> &'static str {
     &HASH
 }
 
-/// A manifest's lines: the last one for each output, and how many are no entries.
+/// A manifest's lines: the last one for each output and each input, and how many are no entries.
 pub(crate) struct ManifestLines {
     pub(crate) entries: BTreeMap<String, ManifestEntry>,
+    pub(crate) inputs: InputEntries,
     pub(crate) damaged: usize,
+}
+
+/// What a line of a manifest is about.
+enum ManifestLine {
+    Result(ManifestEntry),
+    Input(InputEntry),
+}
+
+impl ManifestLine {
+    fn parse(line: &[u8]) -> Option<Self> {
+        let result = ManifestEntry::of_line(line).map(Self::Result);
+        result.or_else(|| InputEntry::of_line(line).map(Self::Input))
+    }
 }
 
 impl ManifestLines {
@@ -84,18 +227,40 @@ impl ManifestLines {
     pub(crate) fn parse(bytes: &[u8]) -> Self {
         let mut lines = Self {
             entries: BTreeMap::new(),
+            inputs: BTreeMap::new(),
             damaged: 0,
         };
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
-            match ManifestEntry::of_line(line) {
-                Some(entry) => {
+            match ManifestLine::parse(line) {
+                Some(ManifestLine::Result(entry)) => {
+                    entry.settle(&mut lines.inputs);
                     lines.entries.insert(entry.output.clone(), entry);
+                }
+                Some(ManifestLine::Input(entry)) => {
+                    lines.inputs.insert(entry.key(), entry);
                 }
                 None if line.ends_with(b"\n") && line.len() > 1 => lines.damaged += 1,
                 None => {}
             }
         }
         lines
+    }
+}
+
+impl ManifestLines {
+    /// Adds later lines.
+    pub(crate) fn extend(&mut self, later: Self) {
+        for entry in later.entries.values() {
+            entry.settle(&mut self.inputs);
+        }
+        self.entries.extend(later.entries);
+        self.inputs.extend(later.inputs);
+        self.damaged += later.damaged;
+    }
+
+    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    pub(crate) fn unfinished(&self) -> BTreeSet<String> {
+        self.inputs.keys().cloned().collect()
     }
 }
 
@@ -124,7 +289,7 @@ pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
     let mut first = Vec::new();
     let mut reader = BufReader::new(file.try_clone().map_err(failed)?).take(MAX_LINE);
     reader.read_until(b'\n', &mut first).map_err(failed)?;
-    if ManifestEntry::of_line(&first).is_none() {
+    if ManifestLine::parse(&first).is_none() {
         return refuse(
             "is not a manifest of tumble: its first line is not an entry; move it, give another directory, \
              or --overwrite to replace it",
@@ -149,10 +314,27 @@ pub(crate) fn warn_of_damaged_lines(folder: &Path, lines: usize) {
 /// The longest line, in bytes.
 const MAX_LINE: u64 = 1 << 20;
 
+/// What a batch is about to do.
+pub(crate) struct BatchStart<'a> {
+    /// Each input that it evaluates, with the name of its result.
+    pub(crate) inputs: Vec<(&'a Path, &'a str)>,
+    /// What directories have that is skipped.
+    pub(crate) skipped: Vec<InputEntry>,
+    /// As in [`ManifestEntry`].
+    pub(crate) options: &'a str,
+    /// Whether results that are done are skipped.
+    pub(crate) resume: bool,
+}
+
 /// Records the results of a batch.
 pub(crate) trait ResultRecorder {
     /// The results recorded before this batch.
     fn previous(&self) -> PreviousEntries;
+
+    /// The batch begins.
+    fn begin(&mut self, _start: BatchStart<'_>) -> Result<(), Failure> {
+        Ok(())
+    }
 
     /// Records a complete result, which is renamed now or together with others.
     fn keep(&mut self, entry: ManifestEntry, written: WrittenFile) -> Result<(), Failure>;
@@ -160,8 +342,11 @@ pub(crate) trait ResultRecorder {
     /// A result, or the results of its clips, exist already.
     fn skip(&mut self, _output: &str) {}
 
+    /// All results of an input are made.
+    fn end_input(&mut self, _output: &str) {}
+
     /// An input failed; the batch continues.
-    fn refuse(&mut self, _path: &Path, _failure: &Failure) {}
+    fn refuse(&mut self, entry: InputEntry) -> Result<(), Failure>;
 
     /// The file that lists the results.
     fn list(&self) -> PathBuf;
@@ -182,13 +367,20 @@ pub(crate) trait ResultRecorder {
 pub(crate) struct PreviousEntries {
     pub(super) folder: PathBuf,
     pub(super) entries: Arc<BTreeMap<String, ManifestEntry>>,
+    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    pub(super) unfinished: Arc<BTreeSet<String>>,
 }
 
 impl PreviousEntries {
-    pub(crate) fn new(folder: &Path, entries: BTreeMap<String, ManifestEntry>) -> Self {
+    pub(crate) fn new(
+        folder: &Path,
+        entries: BTreeMap<String, ManifestEntry>,
+        unfinished: BTreeSet<String>,
+    ) -> Self {
         Self {
             folder: folder.to_owned(),
             entries: Arc::new(entries),
+            unfinished: Arc::new(unfinished),
         }
     }
 
@@ -211,6 +403,9 @@ impl PreviousEntries {
                 && digest::is_whole(&self.folder, &entry.output, bytes, sha256)
                     .is_ok_and(|is_whole| is_whole)
         };
+        if self.unfinished.contains(output) {
+            return false;
+        }
         if let Some(entry) = self.entries.get(output) {
             return is_whole(entry);
         }

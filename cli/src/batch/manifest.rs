@@ -1,15 +1,17 @@
 //! The manifest of a directory of results: what each was made from and how, and its
-//! hash. One JSON object a line.
+//! hash; and the inputs that have no result, or not all. One JSON object a line.
 //!
-//! While a batch runs, a line is added for each result before the result is renamed: a file that does
-//! not match its line is to be made again. At the end the lines are sorted and the file is replaced, so
-//! that a batch that was stopped and resumed ends with the bytes of one that was not.
+//! A batch begins with a line for each input that it will evaluate (`pending`), so that a batch that did not
+//! come to its end is known by them. While it runs, a line is added for each result before the result is
+//! renamed (a file that does not match its line is to be made again), and for each input that failed. At the
+//! end the lines are sorted and the file is replaced, so that a batch that was stopped and resumed ends with
+//! the bytes of one that was not.
 //!
 //! A file is a manifest if its first line is an entry; any other file of its name is refused unless
 //! files may be replaced. Lines are added only to a file that this batch has created: hard links to an
 //! older one keep its bytes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -18,18 +20,31 @@ use std::sync::Arc;
 use tumble_formats::beneath::parent_beneath;
 use tumble_formats::output::Output;
 
+use crate::batch::digest;
 use crate::batch::entry::{
-    self, ManifestEntry, ManifestLines, NAME, PreviousEntries, ResultRecorder, line, of_clips,
+    self, BatchStart, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
+    PreviousEntries, ResultRecorder, line, of_clips,
 };
 use crate::batch::shards::{plan::RecordedPlan, record};
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
+use crate::messages::{names, words};
 
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
     previous: Arc<BTreeMap<String, ManifestEntry>>,
+    /// The results of inputs that earlier batches have not finished.
+    unfinished: Arc<BTreeSet<String>>,
     added: BTreeMap<String, ManifestEntry>,
+    /// The inputs without results, or without all of them, as they are now.
+    inputs: InputEntries,
+    /// The results of this batch's inputs, each of all clips.
+    planned: BTreeSet<String>,
+    /// Those of `planned` whose files have all been made.
+    ended: BTreeSet<String>,
+    /// Whether results without an input are removed.
+    pub(crate) prune: bool,
     /// Whether there is a file of its name: a manifest, or a file to replace.
     exists: bool,
     /// The file that lines are appended to; `None` before the first.
@@ -77,18 +92,20 @@ impl Manifest {
             Err(_) if overwrite && folder.join(NAME).is_file() => true,
             Err(failure) => return Err(failure),
         };
-        let ManifestLines {
-            entries: mut previous,
-            damaged,
-        } = ManifestLines::parse(&bytes);
-        entry::warn_of_damaged_lines(folder, damaged);
+        let mut lines = ManifestLines::parse(&bytes);
+        entry::warn_of_damaged_lines(folder, lines.damaged);
         if has_shards {
-            previous.extend(record::entries(folder));
+            lines.extend(record::lines(folder));
         }
         Ok(Self {
             folder: folder.to_owned(),
-            previous: Arc::new(previous),
+            unfinished: Arc::new(lines.unfinished()),
+            previous: Arc::new(lines.entries),
             added: BTreeMap::new(),
+            inputs: lines.inputs,
+            planned: BTreeSet::new(),
+            ended: BTreeSet::new(),
+            prune: false,
             exists,
             journal: None,
             has_shards,
@@ -107,50 +124,135 @@ impl Manifest {
         self.previous.contains_key(output) || of_clips(&self.previous, output).next().is_some()
     }
 
-    /// Adds a line, in one piece.
+    /// Adds the line of a result, in one piece.
     pub(crate) fn add(&mut self, entry: ManifestEntry) -> Result<(), Failure> {
+        entry.settle(&mut self.inputs);
+        let text = line(&entry);
+        self.added.insert(entry.output.clone(), entry);
+        self.append(&text)
+    }
+
+    /// Appends a line that the fields have already.
+    fn append(&mut self, text: &str) -> Result<(), Failure> {
         match &mut self.journal {
             Some(journal) => {
-                let written = journal.write_all(line(&entry).as_bytes());
+                let written = journal.write_all(text.as_bytes());
                 let synced = written.and_then(|()| journal.sync_data());
-                synced.map_err(|error| self.failed(&error))?;
+                synced.map_err(|error| self.failed(&error))
             }
-            None => {
-                let lines = self.previous.values().chain([&entry]);
-                self.journal = self.replace(lines)?;
-                self.exists = true;
-            }
+            None => self.begin_journal(),
         }
-        self.added.insert(entry.output.clone(), entry);
+    }
+
+    /// Writes all lines into a new file, which lines are appended to.
+    fn begin_journal(&mut self) -> Result<(), Failure> {
+        self.journal = self.replace(&BTreeSet::new())?;
+        self.exists = true;
         Ok(())
     }
 
     fn is_empty(&self) -> bool {
-        self.previous.is_empty() && self.added.is_empty()
+        self.previous.is_empty() && self.added.is_empty() && self.inputs.is_empty()
+    }
+
+    /// The entries of all results, in order.
+    fn results(&self) -> BTreeMap<&str, &ManifestEntry> {
+        let all = self.previous.values().chain(self.added.values());
+        all.map(|entry| (&*entry.output, entry)).collect()
     }
 
     /// Puts the lines in order.
     fn finish(mut self) -> Result<(), Failure> {
         // Windows replaces no file that is open.
         self.journal = None;
+        let orphans = self.orphans();
+        let pruned = match self.prune {
+            true => self.remove(&orphans)?,
+            false => BTreeSet::new(),
+        };
+        if let Some(first) = orphans.first().filter(|_| !self.prune) {
+            let results = words::count(orphans.len(), "result");
+            let have = if orphans.len() == 1 { "has" } else { "have" };
+            let first = self.folder.join(first);
+            words::note(&format!(
+                "{results} {have} no input any more (--prune removes what has none), the first is {}",
+                first.display()
+            ));
+        }
         if !self.is_empty() {
-            let mut entries: BTreeMap<&String, &ManifestEntry> = self.previous.iter().collect();
-            entries.extend(&self.added);
-            self.replace(entries.into_values())?;
+            self.replace(&pruned)?;
         }
         self.forget_shards()
     }
 
-    /// Replaces the file whole; gives it, open at its end.
-    fn replace<'a>(
-        &self,
-        lines: impl Iterator<Item = &'a ManifestEntry>,
-    ) -> Result<Option<File>, Failure> {
+    /// The results that have no input any more: the input is gone, or has other clips than before.
+    fn orphans(&self) -> BTreeSet<String> {
+        let is_orphan = |entry: &ManifestEntry| {
+            let whole = entry.whole().0;
+            match self.planned.contains(whole) {
+                true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
+                false => is_gone(&entry.input),
+            }
+        };
+        let results = self.results().into_values();
+        let orphans = results.filter(|entry| is_orphan(entry));
+        orphans.map(|entry| entry.output.clone()).collect()
+    }
+
+    /// Removes the files of results, and directories that are empty then. A file that is not the one that its line
+    /// describes stays, with its line.
+    fn remove(&self, outputs: &BTreeSet<String>) -> Result<BTreeSet<String>, Failure> {
+        let results = self.results();
+        let mut removed = BTreeSet::new();
+        for output in outputs {
+            let (entry, path) = (results[&**output], self.folder.join(output));
+            let shown = path.display();
+            let whole = digest::is_whole(
+                &self.folder,
+                output,
+                entry.output_bytes,
+                &entry.output_sha256,
+            );
+            match whole {
+                Ok(true) => {
+                    let parent = parent_beneath(&self.folder, Path::new(output));
+                    let gone = parent.and_then(|parent| {
+                        std::fs::remove_file(&path)?;
+                        Ok(parent)
+                    });
+                    let mut parent =
+                        gone.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
+                    // The first that is not empty stays, and those above it.
+                    while parent != self.folder && std::fs::remove_dir(&parent).is_ok() {
+                        parent.pop();
+                    }
+                    words::note(&format!("{shown}: removed; its input is gone"));
+                }
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                _ => {
+                    words::warning(&format!(
+                        "{shown}: has no input any more, but differs from its line in the manifest; it stays"
+                    ));
+                    continue;
+                }
+            }
+            removed.insert(output.clone());
+        }
+        Ok(removed)
+    }
+
+    /// Replaces the file whole, without the lines of some results; gives it, open at its end.
+    fn replace(&self, without: &BTreeSet<String>) -> Result<Option<File>, Failure> {
         let path = self.folder.join(NAME);
         let output = Output::create(&path, self.exists, &[]);
         let mut output = output.map_err(|error| Failure::output(&error))?;
-        for entry in lines {
-            let written = output.write_all(line(entry).as_bytes());
+        let results = self.results().into_values();
+        let results = results.filter(|entry| !without.contains(&entry.output));
+        let lines = results
+            .map(line)
+            .chain(self.inputs.values().map(InputEntry::line));
+        for line in lines {
+            let written = output.write_all(line.as_bytes());
             written.map_err(|error| self.failed(&error))?;
         }
         output
@@ -171,11 +273,66 @@ impl Manifest {
     }
 }
 
+/// Whether an input does not exist any more. If no folder of its path exists, nothing is known of it: the path may be
+/// one of another machine, or relative to another folder.
+pub(crate) fn is_gone(input: &str) -> bool {
+    let path = Path::new(input);
+    let is_missing = |path: &Path| {
+        let found = std::fs::symlink_metadata(path);
+        found.is_err_and(|error| {
+            matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            )
+        })
+    };
+    // A name that is not UTF-8 is recorded with replacement characters.
+    if names::is_standard(path) || input.contains("://") || input.contains('\u{fffd}') {
+        return false;
+    }
+    let mut folders = path.ancestors().skip(1);
+    let mut folders = folders
+        .by_ref()
+        .filter(|folder| folder.file_name().is_some());
+    let is_bare = path.components().count() == 1;
+    is_missing(path) && (is_bare || folders.any(|folder| !is_missing(folder)))
+}
+
 impl ResultRecorder for Manifest {
     fn previous(&self) -> PreviousEntries {
         PreviousEntries {
             folder: self.folder.clone(),
             entries: Arc::clone(&self.previous),
+            unfinished: Arc::clone(&self.unfinished),
+        }
+    }
+
+    fn begin(&mut self, start: BatchStart<'_>) -> Result<(), Failure> {
+        // An input that is gone has not failed any more; pruned is all that this batch does not have.
+        let prune = self.prune;
+        self.inputs.retain(|_, entry| {
+            entry.state != InputState::Skipped && !prune && !is_gone(&entry.input)
+        });
+        let skipped = start.skipped.into_iter();
+        self.inputs
+            .extend(skipped.map(|entry| (entry.key(), entry)));
+        let previous = self.previous();
+        let is_same = |result: &str| {
+            let mut made = previous.results_of(result).peekable();
+            made.peek().is_some() && made.all(|entry| entry.is_made_with(start.options))
+        };
+        let mut has_pending = false;
+        for (input, result) in start.inputs {
+            self.planned.insert(result.to_owned());
+            if !(start.resume && is_same(result)) || self.unfinished.contains(result) {
+                let entry = InputEntry::pending(input, result);
+                self.inputs.insert(entry.key(), entry);
+                has_pending = true;
+            }
+        }
+        match has_pending {
+            true => self.begin_journal(),
+            false => Ok(()),
         }
     }
 
@@ -187,6 +344,20 @@ impl ResultRecorder for Manifest {
             // is made again.
             self.added.remove(&output);
         })
+    }
+
+    fn skip(&mut self, output: &str) {
+        self.inputs.remove(output);
+    }
+
+    fn end_input(&mut self, output: &str) {
+        self.ended.insert(output.to_owned());
+    }
+
+    fn refuse(&mut self, entry: InputEntry) -> Result<(), Failure> {
+        let text = entry.line();
+        self.inputs.insert(entry.key(), entry);
+        self.append(&text)
     }
 
     fn list(&self) -> PathBuf {
@@ -201,7 +372,6 @@ impl ResultRecorder for Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::batch::digest;
     use crate::batch::entry::kernels_sha256;
 
     fn entry(output: &str, hash: &str) -> ManifestEntry {
@@ -217,6 +387,7 @@ mod tests {
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),
             one_of: None,
+            warnings: Vec::new(),
         }
     }
 

@@ -8,4 +8,5 @@ pub(crate) mod pipeline;
 pub(crate) mod result_names;
 pub(crate) mod room;
 pub(crate) mod shards;
+pub(crate) mod summary;
 pub(crate) mod target;

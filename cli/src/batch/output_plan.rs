@@ -12,9 +12,9 @@ use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
-use crate::batch::entry;
+use crate::batch::entry::{self, InputEntry};
 use crate::batch::manifest::Manifest;
-use crate::batch::result_names::{ResultName, format, name_results};
+use crate::batch::result_names::{ResultName, ResultNaming, format, name_results};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
 use crate::batch::shards::record;
 use crate::batch::target::{self, Destination, ResultTarget, choose, extensions, of};
@@ -27,9 +27,17 @@ pub(crate) struct OutputPlan {
     /// The inputs that have targets.
     pub(crate) paths: Vec<PathBuf>,
     pub(crate) targets: Vec<ResultTarget>,
-    /// The failures of inputs that have no target.
-    pub(crate) refused: Vec<Failure>,
+    /// Inputs that have no target.
+    pub(crate) refused: Vec<UnplannedInput>,
+    /// What directories of inputs have that is skipped.
+    pub(crate) skipped: Vec<InputEntry>,
     pub(crate) manifest: Option<Manifest>,
+}
+
+/// An input that has no target, and why.
+pub(crate) struct UnplannedInput {
+    pub(crate) path: PathBuf,
+    pub(crate) failure: Failure,
 }
 
 /// The options that decide where results go.
@@ -39,6 +47,8 @@ pub(crate) struct OutputRequest<'a> {
     pub(crate) format: Option<&'static Format>,
     pub(crate) overwrite: bool,
     pub(crate) resume: bool,
+    pub(crate) prune: bool,
+    pub(crate) naming: ResultNaming,
 }
 
 /// Plans the targets. Refuses, before any work, outputs that exist, that are inputs, or that two inputs share.
@@ -63,10 +73,14 @@ pub(crate) fn plan(
                 let message = "--resume is for a directory of results";
                 return Err(Failure::usage(message));
             }
+            if request.prune {
+                return Err(Failure::usage("--prune is for a directory of results"));
+            }
             let format = choose(out, request.format)?;
             let destination = Destination::new(out, request.overwrite, &paths)?;
             // The surest check is to try.
             destination.check_writable()?;
+            destination.refuse_terminal(format.is_text)?;
             OutputPlan {
                 paths,
                 targets: vec![ResultTarget::new(destination, format, String::new())],
@@ -110,13 +124,14 @@ fn in_folder(
 ) -> Result<OutputPlan, Failure> {
     let format = format(folder, request.format)?;
     let files = without_results(inputs.files.clone(), folder)?;
-    let names = name_results(&files, folder, format);
+    let names = name_results(&files, folder, format, request.naming);
     let shards = RecordedPlan::read(folder)?;
     if let Some(recorded) = &shards {
         refuse_shards(recorded, &names, folder, request)?;
     }
     target::create_folder(folder)?;
-    let manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
+    let mut manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
+    manifest.prune = request.prune;
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
     let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);
@@ -135,7 +150,10 @@ fn in_folder(
                 plan.paths.push(found.path.clone());
                 plan.targets.push(target);
             }
-            Err(failure) => plan.refused.push(failure),
+            Err(failure) => plan.refused.push(UnplannedInput {
+                path: found.path.clone(),
+                failure,
+            }),
         }
     }
     // Locked files are being written: they are kept.
@@ -144,6 +162,7 @@ fn in_folder(
     for folder in &result_folder.made {
         remove_abandoned(folder);
     }
+    plan.skipped.clone_from(&inputs.skipped);
     plan.manifest = Some(manifest);
     Ok(plan)
 }
@@ -162,7 +181,7 @@ pub(crate) fn without_results(
         return Ok(inputs);
     };
     let below: Vec<bool> = (inputs.iter())
-        .map(|found| found.is_from_directory && is_below(&found.path, &real))
+        .map(|found| found.root.is_some() && is_below(&found.path, &real))
         .collect();
     let has_results = || {
         let manifest = entry::open(folder).is_ok_and(|manifest| manifest.is_some());
@@ -174,7 +193,8 @@ pub(crate) fn without_results(
     let names = record::names(folder);
     let is_result = |found: &FoundInput| {
         // Where inputs and results share a directory, the manifest tells them apart.
-        let is_shared = found.root().is_some_and(|root| is_below(root, &real));
+        let root = found.root.as_deref();
+        let is_shared = root.is_some_and(|root| is_below(root, &real));
         let path = found.path.canonicalize().unwrap_or_default();
         let name = path.strip_prefix(&real).ok().and_then(Path::to_str);
         !is_shared || name.is_some_and(|name| names.contains(name))

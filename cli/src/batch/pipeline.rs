@@ -10,8 +10,10 @@
 //!
 //! A thread reads, and hashes, the next input of a batch while the command works on one: at most one waits,
 //! so that at most two are in memory. A failure of an input is reported when the next one begins, and the
-//! others go on, unless they would fail alike.
+//! others go on, unless they would fail alike. Warnings of a batch are summed up at its end ([`BatchSummary`]);
+//! those of a single input are printed as they come.
 
+use std::cell::RefCell;
 use std::collections::{HashSet, VecDeque};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -20,19 +22,36 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
+use serde::Serialize;
+use serde_json::{Value, json};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Feature, Loaded};
+use tumble_formats::{Diagnostic, Feature, Loaded};
 
 use crate::arguments::input::{InputReader, check_complete, print_warnings, several_clips_failure};
 use crate::batch::digest::InputFile;
-use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder, kernels_sha256};
+use crate::batch::entry::{
+    BatchStart, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
+    kernels_sha256,
+};
+use crate::batch::output_plan::UnplannedInput;
+use crate::batch::summary::BatchSummary;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
 use crate::messages::progress::busy;
-use crate::messages::{names, signals, words};
+use crate::messages::{listing, names, signals, words};
 
 /// An input and the target of its result.
 pub(crate) type PipelineJob = (PathBuf, ResultTarget);
+
+/// What a command is to work on.
+#[derive(Default)]
+pub(crate) struct PipelineInputs {
+    pub(crate) jobs: Vec<PipelineJob>,
+    /// Inputs that have no job.
+    pub(crate) refused: Vec<UnplannedInput>,
+    /// What directories of inputs have that is skipped.
+    pub(crate) skipped: Vec<InputEntry>,
+}
 
 /// The options of a batch.
 pub(crate) struct BatchOptions {
@@ -40,6 +59,8 @@ pub(crate) struct BatchOptions {
     pub(crate) options: String,
     /// Results that are done are skipped.
     pub(crate) resume: bool,
+    /// Every result and every warning is printed.
+    pub(crate) verbose: bool,
 }
 
 /// A result that still has its temporary name, the device that computed it, and the message about it.
@@ -64,9 +85,30 @@ pub(crate) struct ClipWork {
     pub(crate) name: String,
     pub(crate) target: ResultTarget,
     clips: std::ops::Range<usize>,
+    warnings: RefCell<Vec<Diagnostic>>,
+    /// Whether warnings are printed as they come, and not at the end of the batch.
+    prints: bool,
 }
 
 impl ClipWork {
+    /// Adds a warning about the clips, or about what is made of them.
+    pub(crate) fn warn(&self, warning: Diagnostic) {
+        if self.prints {
+            words::note(&warning.to_string());
+        }
+        self.warnings.borrow_mut().push(warning);
+    }
+
+    /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing where the input's are
+    /// not known.
+    pub(crate) fn sizes(&self, written: &WrittenFile) -> String {
+        let size = |bytes: u64| words::bytes(bytes as f64);
+        let before = self.input.file.bytes();
+        before.map_or(String::new(), |before| {
+            format!(" ({} → {})", size(before), size(written.bytes))
+        })
+    }
+
     /// The clips.
     pub(crate) fn clips(&self) -> Vec<&Motion> {
         self.input.loaded.clips[self.clips.clone()].iter().collect()
@@ -88,10 +130,15 @@ impl ClipWork {
         let (name, target) = (&self.name, &self.target);
         let on_device = device.map_or(String::new(), |device| format!(", on {device}"));
         let spent = words::duration(self.input.started.elapsed());
+        // Files of clips have what the input's has; arrays and tables of rotations are something else.
+        let sizes = match target.format().write {
+            None => self.sizes(&written),
+            Some(_) => String::new(),
+        };
         EvaluatedResult {
             written,
             device: device.unwrap_or("none").to_owned(),
-            message: format!("{name}: {done}{on_device} in {spent} → {target}"),
+            message: format!("{name}: {done}{on_device} in {spent} → {target}{sizes}"),
         }
     }
 }
@@ -104,6 +151,8 @@ pub(crate) struct Pipeline<'a> {
     /// Nothing for a single result.
     batch: Option<BatchRecords<'a>>,
     outcomes: Outcomes,
+    /// The records of results and failures, where they are printed as JSON.
+    json: Option<Vec<Value>>,
 }
 
 /// Where inputs come from.
@@ -135,43 +184,56 @@ struct CurrentInput {
     files: VecDeque<Result<ClipFile, Failure>>,
     file_count: usize,
     failed: Vec<Failure>,
+    /// The warnings so far: those of the input, and those about its clips.
+    warnings: Vec<Diagnostic>,
 }
 
 /// The results of a batch.
 struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
+    summary: BatchSummary,
     options: String,
     inputs: usize,
     made: HashSet<String>,
+    /// The inputs with all their results, and those with some of them.
+    done: usize,
+    done_in_part: usize,
     skipped: usize,
     failed: usize,
 }
 
 impl<'a> Pipeline<'a> {
     /// Of a single result, without a manifest.
-    pub(crate) fn of_one(
-        reader: impl InputReader,
-        jobs: Vec<PipelineJob>,
-        refused: Vec<Failure>,
-    ) -> Self {
-        let mut outcomes = Outcomes::of(refused.len() + jobs.len());
-        add_all(&mut outcomes, refused);
-        Self {
+    pub(crate) fn of_one(reader: impl InputReader, inputs: PipelineInputs) -> Self {
+        let PipelineInputs { jobs, refused, .. } = inputs;
+        let mut pipeline = Self {
+            outcomes: Outcomes::of(refused.len() + jobs.len()),
             inputs: InputSource::One(Box::new(reader), jobs.into_iter()),
             current: None,
             batch: None,
-            outcomes,
-        }
+            json: None,
+        };
+        pipeline.refuse_all(refused);
+        pipeline
     }
 
-    /// Of results that `records` records. `refused`: the failures of inputs that have no job.
+    /// Of results that `records` records.
     pub(crate) fn of_batch(
         reader: impl InputReader,
-        jobs: Vec<PipelineJob>,
-        refused: Vec<Failure>,
-        BatchOptions { options, resume }: BatchOptions,
-        records: Box<dyn ResultRecorder + 'a>,
+        inputs: PipelineInputs,
+        options: BatchOptions,
+        mut records: Box<dyn ResultRecorder + 'a>,
     ) -> Self {
+        let PipelineInputs {
+            jobs,
+            refused,
+            skipped,
+        } = inputs;
+        let BatchOptions {
+            options,
+            resume,
+            verbose,
+        } = options;
         let job_count = jobs.len();
         let inputs = refused.len() + job_count;
         let mut outcomes = Outcomes::of(inputs);
@@ -181,35 +243,71 @@ impl<'a> Pipeline<'a> {
             options: options.clone(),
             resume,
         };
+        let begun = records.begin(BatchStart {
+            inputs: jobs
+                .iter()
+                .map(|(path, target)| (&**path, target.name()))
+                .collect(),
+            skipped,
+            options: &options,
+            resume,
+        });
         let batch = BatchRecords {
             records,
+            summary: BatchSummary::new(inputs, verbose),
             options,
             inputs,
             made: HashSet::new(),
+            done: 0,
+            done_in_part: 0,
             skipped: 0,
-            failed: refused.len(),
+            failed: 0,
         };
         let (hand_over, read_jobs) = sync_channel(0);
-        let reader = thread::Builder::new().spawn(move || reading.read_all(jobs, &hand_over));
-        let inputs = match reader {
+        let start = || thread::Builder::new().spawn(move || reading.read_all(jobs, &hand_over));
+        let started = begun.and_then(|()| {
+            start().map_err(|error| {
+                let message =
+                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                Failure::new(DEVICE, message)
+            })
+        });
+        let inputs = match started {
             Ok(thread) => InputSource::Ahead {
                 read_jobs,
                 left: job_count,
                 thread,
             },
-            Err(error) => {
-                let message =
-                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
-                outcomes.end(Failure::new(DEVICE, message));
+            Err(failure) => {
+                outcomes.end(failure);
                 InputSource::None
             }
         };
-        add_all(&mut outcomes, refused);
-        Self {
+        let mut pipeline = Self {
             inputs,
             current: None,
             batch: Some(batch),
             outcomes,
+            json: None,
+        };
+        pipeline.refuse_all(refused);
+        pipeline
+    }
+
+    /// The same, which prints JSON about all results and failures at the end.
+    pub(crate) fn with_json(self) -> Self {
+        Self {
+            json: Some(Vec::new()),
+            ..self
+        }
+    }
+
+    /// Adds the failures of inputs that have no job.
+    fn refuse_all(&mut self, refused: Vec<UnplannedInput>) {
+        for UnplannedInput { path, failure } in refused {
+            if !self.outcomes.is_ended() {
+                self.add(&path, None, Err(failure));
+            }
         }
     }
 
@@ -224,6 +322,8 @@ impl<'a> Pipeline<'a> {
                             name: file.name,
                             target: file.target,
                             clips: file.clips,
+                            warnings: RefCell::default(),
+                            prints: self.batch.is_none(),
                         });
                     }
                     Some(Err(failure)) => self.fail(failure),
@@ -242,30 +342,62 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Keeps what was made of a file's clips, or its failure; gives the report of a result that is kept.
-    pub(crate) fn keep<T>(
+    /// Keeps what was made of a file's clips, or its failure; gives whether it is kept. `report` is what JSON says
+    /// of it: the fields of one record, or a list of those of several.
+    pub(crate) fn keep<T: Serialize>(
         &mut self,
         work: &ClipWork,
         made: Result<(EvaluatedResult, T), Failure>,
-    ) -> Option<T> {
-        let kept = made.and_then(|(result, report)| {
+    ) -> bool {
+        let mut warnings = work.warnings.borrow_mut();
+        let kept = made.and_then(|(mut result, report)| {
+            let of_file = std::mem::take(&mut result.written.warnings);
+            if self.batch.is_none() {
+                words::warnings(&of_file);
+            }
+            warnings.extend(of_file);
+            let input = &work.input.loaded.warnings;
+            let recorded = input.iter().chain(&*warnings).map(RecordedWarning::from);
+            let recorded: Vec<RecordedWarning> = recorded.collect();
+            let sizes = [work.input.file.bytes(), Some(result.written.bytes)];
             match &mut self.batch {
                 Some(batch) => {
                     let whole = self.current.as_ref().map_or("", |it| it.target.name());
-                    batch.keep(work, whole, result)?;
+                    batch.keep(work, whole, result, recorded.clone())?;
                 }
                 None => {
                     result.written.commit()?;
                     words::note(&result.message);
                 }
             }
-            Ok(report)
+            if let Some(json) = &mut self.json {
+                json.extend(records_of(work, &recorded, sizes, &report));
+            }
+            Ok(())
         });
-        kept.map_err(|failure| self.fail(failure)).ok()
+        if let Some(current) = &mut self.current {
+            current.warnings.append(&mut warnings);
+        }
+        kept.map_err(|failure| self.fail(failure)).is_ok()
     }
 
-    /// Ends the work; the exit code of the command.
+    /// Ends the work: the exit code of the command.
     pub(crate) fn finish(self) -> Result<(), Failure> {
+        let (outcome, json) = self.finish_with_json();
+        if let Some(json) = json {
+            listing::json(&json)?;
+        }
+        outcome
+    }
+
+    /// As [`Pipeline::finish`]; gives the records instead of printing them as JSON.
+    pub(crate) fn finish_with_json(mut self) -> (Result<(), Failure>, Option<Vec<Value>>) {
+        let json = self.json.take();
+        let outcome = self.end();
+        (outcome, json)
+    }
+
+    fn end(self) -> Result<(), Failure> {
         self.inputs.close();
         if let Some(batch) = self.batch {
             batch.summarize();
@@ -285,15 +417,30 @@ impl<'a> Pipeline<'a> {
                 batch.skipped += 1;
                 batch.records.skip(target.name());
             }
+            if let Some(json) = &mut self.json {
+                let (input, output) = (names::input(&path), target.path().display().to_string());
+                json.push(json!({"state": "kept", "input": input, "output": output}));
+            }
             return;
         };
         let files = loaded.and_then(|loaded| {
-            print_warnings(&loaded);
-            let files = clip_files(&path, &loaded, &target)?;
+            match &mut self.batch {
+                None => print_warnings(&loaded),
+                Some(batch) => {
+                    let parts = loaded.refused.iter();
+                    parts.for_each(|fault| batch.summary.fail(&Failure::input(fault, "")));
+                }
+            }
+            let files = clip_files(&path, &loaded, &target).inspect_err(|_| {
+                if let Some(batch) = &mut self.batch {
+                    batch.summary.warn(&loaded.warnings);
+                }
+            })?;
             Ok((loaded, files))
         });
         match files {
             Ok((loaded, files)) => {
+                let warnings = loaded.warnings.clone();
                 let input = OpenInput {
                     file,
                     loaded,
@@ -305,9 +452,10 @@ impl<'a> Pipeline<'a> {
                     file_count: files.len(),
                     files,
                     failed: Vec::new(),
+                    warnings,
                 });
             }
-            Err(failure) => self.add(&path, Err(failure)),
+            Err(failure) => self.add(&path, Some(target.name()), Err(failure)),
         }
     }
 
@@ -319,7 +467,7 @@ impl<'a> Pipeline<'a> {
         if failure.is_final() {
             let path = current.input.file.path().to_owned();
             self.current = None;
-            self.add(&path, Err(failure));
+            self.add(&path, None, Err(failure));
         } else {
             current.failed.push(failure);
         }
@@ -333,43 +481,98 @@ impl<'a> Pipeline<'a> {
         let path = current.input.file.path();
         let name = names::input(path);
         let failed = current.failed.len();
+        let batch = &mut self.batch;
+        let mut report = |failure: &Failure| match batch {
+            Some(batch) => batch.summary.fail(failure),
+            None => {
+                failure.report();
+            }
+        };
         let outcome = match current.failed.pop() {
             None => check_complete(&name, &current.input.loaded),
             Some(last) => {
-                current.failed.iter().for_each(|failure| {
-                    failure.report();
-                });
+                current.failed.iter().for_each(&mut report);
                 if failed == current.file_count {
                     Err(last)
                 } else {
-                    last.report();
+                    report(&last);
                     let all = current.file_count;
                     let message = format!("{name}: {failed} of {all} animations failed");
                     Err(Failure::new(SOME_INPUTS, message))
                 }
             }
         };
-        self.add(path, outcome);
+        if let Some(batch) = &mut self.batch {
+            batch.summary.warn(&current.warnings);
+            if outcome.is_ok() {
+                batch.done += 1;
+                batch.records.end_input(current.target.name());
+            }
+        }
+        self.add(path, Some(current.target.name()), outcome);
     }
 
-    /// Adds the outcome of an input.
-    fn add(&mut self, path: &Path, outcome: Result<(), Failure>) {
-        if let (Err(failure), Some(batch)) = (&outcome, &mut self.batch)
+    /// Adds the outcome of an input; `result` is the name of its result.
+    fn add(&mut self, path: &Path, result: Option<&str>, outcome: Result<(), Failure>) {
+        let entry = outcome.as_ref().err().map(|failure| {
+            let result = result.filter(|result| !result.is_empty());
+            InputEntry::failed(path, result, failure)
+        });
+        if let (Some(entry), Some(json)) = (&entry, &mut self.json) {
+            json.push(serde_json::to_value(entry).expect("strings and numbers"));
+        }
+        let Some(batch) = &mut self.batch else {
+            self.outcomes.add(outcome);
+            return;
+        };
+        let mut recorded = Ok(());
+        if let (Err(failure), Some(entry)) = (&outcome, entry)
             && !failure.is_final()
         {
-            batch.failed += 1;
-            batch.records.refuse(path, failure);
+            match failure.code {
+                SOME_INPUTS => batch.done_in_part += 1,
+                _ => batch.failed += 1,
+            }
+            recorded = batch.records.refuse(entry);
         }
-        self.outcomes.add(outcome);
+        let summary = &mut batch.summary;
+        self.outcomes
+            .add_reporting(outcome, |failure| summary.fail(failure));
+        if let Err(failure) = recorded {
+            self.outcomes.end(failure);
+        }
     }
 }
 
-fn add_all(outcomes: &mut Outcomes, refused: Vec<Failure>) {
-    for failure in refused {
-        if !outcomes.is_ended() {
-            outcomes.add(Err(failure));
+/// The records of a result in JSON.
+fn records_of(
+    work: &ClipWork,
+    warnings: &[RecordedWarning],
+    [bytes_before, bytes_after]: [Option<u64>; 2],
+    report: &impl Serialize,
+) -> Vec<Value> {
+    let base = json!({
+        "state": "made",
+        "input": work.name,
+        "output": work.target.path().display().to_string(),
+        "bytes_before": bytes_before,
+        "bytes_after": bytes_after,
+        "warnings": warnings,
+        "seconds": work.input.started.elapsed().as_secs_f64(),
+    });
+    let fields = serde_json::to_value(report).expect("strings and numbers");
+    let of_each = match fields {
+        Value::Array(each) => each,
+        one => vec![one],
+    };
+    let record = |fields: Value| {
+        let mut record = base.clone();
+        if let (Value::Object(record), Value::Object(fields)) = (&mut record, fields) {
+            record.extend(fields);
         }
-    }
+        record
+    };
+    of_each.into_iter().map(record).collect()
 }
 
 impl InputSource {
@@ -415,21 +618,22 @@ impl BatchRecords<'_> {
         work: &ClipWork,
         whole: &str,
         mut result: EvaluatedResult,
+        warnings: Vec<RecordedWarning>,
     ) -> Result<(), Failure> {
         let name = work.target.name();
         // Clips of one input may be called as another input is: walk.glb's `Run` and walk.Run.bvh.
         if !self.made.insert(name.to_owned()) {
             let input = names::input(work.path());
             return Err(Failure::usage(format!(
-                "{input}: another input's result is {name} already; evaluate them into different \
-                 directories"
+                "{input}: another input's result is {name} already; give --names full, or evaluate them into \
+                 different directories"
             )));
         }
         let digest = result.written.digest.take().unwrap_or_default();
         let clips = work.input.loaded.clips.len();
         let entry = ManifestEntry {
             output: name.to_owned(),
-            output_bytes: digest.bytes(),
+            output_bytes: result.written.bytes,
             output_sha256: digest.finish(),
             input: work.path().display().to_string(),
             input_sha256: work.input.file.sha256().map(str::to_owned),
@@ -438,32 +642,52 @@ impl BatchRecords<'_> {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: result.device,
             one_of: (name != whole).then(|| (whole.to_owned(), clips)),
+            warnings,
         };
         self.records.keep(entry, result.written)?;
-        self.records.tell(&result.message);
+        if let Some(line) = self.summary.result(&result.message) {
+            self.records.tell(line);
+        }
         Ok(())
     }
 
-    /// The summary of a batch of several inputs.
+    /// The summary of a batch: its warnings, and of several inputs, how many of them are done.
     fn summarize(&self) {
-        let (made, skipped, failed) = (self.made.len(), self.skipped, self.failed);
-        if self.inputs <= 1 && skipped == 0 {
+        for line in self.summary.lines() {
+            self.records.tell(&line);
+        }
+        if self.inputs <= 1 && self.skipped == 0 {
             return;
         }
         let list = self.records.list();
-        let mut parts = vec![format!("{} made", words::count(made, "result"))];
-        if skipped > 0 {
-            let results = words::count(skipped, "result");
+        let (results, made_of) = (self.made.len(), self.done + self.done_in_part);
+        let mut made = format!("{} made", words::count(results, "result"));
+        if results != made_of {
+            made += &format!(" of {}", words::count(made_of, "input"));
+        }
+        if self.done_in_part > 0 {
+            made += &format!(" ({} in part)", self.done_in_part);
+        }
+        let mut parts = vec![made];
+        if self.skipped > 0 {
+            let results = words::count(self.skipped, "result");
             parts.push(format!("{results} skipped (already complete)"));
         }
-        if failed > 0 {
-            parts.push(format!("{} failed", words::count(failed, "input")));
+        if self.failed > 0 {
+            parts.push(format!("{} failed", words::count(self.failed, "input")));
         }
-        let summary = parts.join(", ");
-        self.records.tell(&match list.exists() || made > 0 {
-            true => format!("{summary}; listed in {}", list.display()),
-            false => summary,
-        });
+        let left = self.inputs - (made_of + self.skipped + self.failed).min(self.inputs);
+        if left > 0 {
+            parts.push(format!("{} not reached", words::count(left, "input")));
+        }
+        let mut summary = parts.join(", ");
+        if list.exists() || results > 0 {
+            summary += &format!("; listed in {}", list.display());
+        }
+        if self.summary.is_shortened() {
+            summary += " (--verbose prints a line for each)";
+        }
+        self.records.tell(&summary);
     }
 }
 

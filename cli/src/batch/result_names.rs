@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use tumble_formats::format::Format;
 
 use crate::arguments::input::FoundInput;
@@ -31,31 +32,55 @@ pub(crate) fn format(
     choose(Path::new("-"), requested)
 }
 
-/// The names of the results in the directory, in the order of their inputs. Those of `walk.bvh` and
-/// `walk.tum` are `walk.bvh.npy` and `walk.tum.npy`.
+/// How results are named after their inputs. The name of a result depends on its input alone, so that it stays
+/// when other inputs appear beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum ResultNaming {
+    /// walk.bvh becomes walk.npy
+    #[default]
+    Stem,
+    /// walk.bvh becomes walk.bvh.npy
+    Full,
+}
+
+impl ResultNaming {
+    /// The path of an input's result below the directory of results.
+    fn name(self, format: &Format, found: &FoundInput) -> PathBuf {
+        match self {
+            Self::Stem => below(found).with_extension(format.name),
+            Self::Full => {
+                let mut name = below(found).as_os_str().to_owned();
+                name.push(format!(".{}", format.name));
+                name.into()
+            }
+        }
+    }
+}
+
+/// The names of the results in the directory, in the order of their inputs. Inputs whose results would have one name
+/// are refused, except the one whose result has it already.
 pub(crate) fn name_results(
     inputs: &[FoundInput],
     folder: &Path,
     format: &Format,
+    naming: ResultNaming,
 ) -> Vec<ResultName> {
     let sources: HashSet<PathBuf> = (inputs.iter())
         .filter_map(|found| found.path.canonicalize().ok())
         .collect();
-    let mut names: Vec<PathBuf> = (inputs.iter())
-        .map(|found| name_for(format, found))
+    let names: Vec<PathBuf> = (inputs.iter())
+        .map(|found| naming.name(format, found))
         .collect();
-    let shared = counts(&names);
-    let whole: Vec<PathBuf> = (inputs.iter().zip(&names))
-        .map(|(found, name)| match shared[name] {
-            1 => name.clone(),
-            _ => whole_name_for(format, found),
-        })
-        .collect();
-    names = whole;
-    let mut owners: HashMap<&Path, Vec<&Path>> = HashMap::new();
+    let mut sharing: HashMap<&Path, Vec<&FoundInput>> = HashMap::new();
     for (found, name) in inputs.iter().zip(&names) {
-        owners.entry(name).or_default().push(&found.path);
+        sharing.entry(name).or_default().push(found);
     }
+    let shared = sharing.iter().filter(|(_, inputs)| inputs.len() > 1);
+    let shared: HashSet<&str> = shared.filter_map(|(name, _)| name.to_str()).collect();
+    let owners = match shared.is_empty() {
+        true => HashMap::new(),
+        false => record::inputs_of(folder, &shared),
+    };
     let checked = inputs.iter().zip(&names).map(|(found, name)| {
         let input = names::input(&found.path);
         let refuse = |why: String| Err(Failure::usage(format!("{input}: {why}")));
@@ -65,13 +90,22 @@ pub(crate) fn name_results(
             let target = target.display();
             return refuse(format!("its result {target} is an input; give another directory"));
         }
-        let other = owners[name.as_path()].iter().find(|other| **other != found.path);
-        if let Some(other) = other {
+        let owner = name.to_str().and_then(|name| owners.get(name));
+        let has_it = owner.is_some_and(|owner| *owner == found.path.display().to_string());
+        let others = &sharing[name.as_path()];
+        let other = others.iter().find(|other| other.path != found.path);
+        if let Some(other) = other.filter(|_| !has_it) {
+            let remedy = match others.iter().all(|other| other.below == found.below) {
+                true => {
+                    "give their directory, whose tree is kept, or --base, or evaluate them into different \
+                     directories"
+                }
+                false => "give --names full, which names results after the whole names of inputs",
+            };
+            let other = names::input(&other.path);
+            let target = target.display();
             return refuse(format!(
-                "its result and that of {} would both be {}; give their directory, whose tree is \
-                 kept, or evaluate them into different directories",
-                names::input(other),
-                target.display()
+                "its result and that of {other} would both be {target}; {remedy}"
             ));
         }
         let length = name.file_name().map_or(0, std::ffi::OsStr::len);
@@ -99,14 +133,19 @@ pub(crate) fn name_results(
 
 /// Refuses inputs whose results would have the same name: a worker has only some of the inputs, and
 /// could not tell.
-pub(crate) fn refuse_shared_names(inputs: &[FoundInput], format: &Format) -> Result<(), Failure> {
+pub(crate) fn refuse_shared_names(
+    inputs: &[FoundInput],
+    format: &Format,
+    naming: ResultNaming,
+) -> Result<(), Failure> {
     let mut owners = HashMap::new();
     for found in inputs {
-        let name = name_for(format, found);
+        let name = naming.name(format, found);
         let shown = name.display().to_string();
         if let Some(other) = owners.insert(name, &found.path) {
             return Err(Failure::usage(format!(
-                "{} and {} would both write {shown}; evaluate them into different directories",
+                "{} and {} would both write {shown}; give --names full, or evaluate them into different \
+                 directories",
                 names::input(other),
                 names::input(&found.path),
             )));
@@ -115,29 +154,9 @@ pub(crate) fn refuse_shared_names(inputs: &[FoundInput], format: &Format) -> Res
     Ok(())
 }
 
-fn counts(names: &[PathBuf]) -> HashMap<&PathBuf, usize> {
-    let mut counts = HashMap::new();
-    for name in names {
-        *counts.entry(name).or_default() += 1;
-    }
-    counts
-}
-
 fn below(found: &FoundInput) -> &Path {
     match names::is_standard(&found.path) {
         true => Path::new("stdin"),
         false => &found.below,
     }
-}
-
-/// `walk.dat` becomes `walk.npy`, where it lies.
-fn name_for(format: &Format, found: &FoundInput) -> PathBuf {
-    below(found).with_extension(format.name)
-}
-
-/// `walk.dat` becomes `walk.dat.npy`.
-fn whole_name_for(format: &Format, found: &FoundInput) -> PathBuf {
-    let mut name = below(found).as_os_str().to_owned();
-    name.push(format!(".{}", format.name));
-    name.into()
 }

@@ -2,7 +2,7 @@
 //! at all; and the target of a result, which is a destination with a format.
 
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -20,9 +20,9 @@ use tumble_formats::output::{Output, check_target};
 use crate::batch::digest::Digest;
 use crate::batch::room;
 use crate::messages::exit::{BROKEN_PIPE, Failure, OUTPUT};
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::signals::{self, WritingGuard};
-use crate::messages::{names, words};
 
 /// The requested format, else that of the path's extension.
 pub(crate) fn choose(
@@ -191,7 +191,7 @@ impl ResultTarget {
         self.destination.prepare(None, write)
     }
 
-    /// Writes a motion file, which `write` makes in memory, and prints its warnings.
+    /// Writes a motion file, which `write` makes in memory with warnings.
     pub(crate) fn write_motion(
         &self,
         write: impl FnOnce(&mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
@@ -201,10 +201,11 @@ impl ResultTarget {
             WriteError::Io(error) => Failure::writing(&self.to_string(), &error),
             WriteError::Refused(diagnostic) => Failure::input(&diagnostic, ""),
         })?;
-        for warning in warnings {
-            words::note(&warning.to_string());
-        }
-        self.prepare(|out| out.write_all(&bytes))
+        let written = self.prepare(|out| out.write_all(&bytes))?;
+        Ok(WrittenFile {
+            warnings,
+            ..written
+        })
     }
 
     /// Writes sampled clips as a motion file: into `document`, where the input's file is written again
@@ -225,17 +226,16 @@ impl ResultTarget {
                 document.write(&clips, options, self.path(), out)
             }
         })?;
-        self.write_times(sampled)?;
-        Ok(written)
+        Ok(written.with(self.write_times(sampled)?))
     }
 
     /// Writes the times of a motion file, where they go to a separate file.
-    fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
+    fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<Option<WrittenFile>, Failure> {
         let (Some(destination), [sampled]) = (&self.times, sampled) else {
-            return Ok(());
+            return Ok(None);
         };
-        let written = destination.prepare(None, |out| write_frame_times(sampled, out))?;
-        written.commit()
+        let written = destination.prepare(None, |out| write_frame_times(sampled, out));
+        written.map(Some)
     }
 
     /// Writes one result that is in memory.
@@ -389,6 +389,12 @@ pub(crate) struct Destination {
 pub(crate) struct WrittenFile {
     output: Output,
     pub(crate) digest: Option<Digest>,
+    /// Its length.
+    pub(crate) bytes: u64,
+    /// What its format could not store, or has changed.
+    pub(crate) warnings: Vec<Diagnostic>,
+    /// Files that get their names together with it.
+    beside: Vec<WrittenFile>,
     _writing: Option<WritingGuard>,
 }
 
@@ -402,10 +408,17 @@ impl WrittenFile {
         })
     }
 
+    /// The same, with another file that gets its name together with it.
+    pub(crate) fn with(mut self, beside: Option<WrittenFile>) -> Self {
+        self.beside.extend(beside);
+        self
+    }
+
     pub(crate) fn commit(self) -> Result<(), Failure> {
         self.output
             .commit()
-            .map_err(|error| Failure::output(&error))
+            .map_err(|error| Failure::output(&error))?;
+        self.beside.into_iter().try_for_each(Self::commit)
     }
 }
 
@@ -446,6 +459,17 @@ impl Destination {
         }
         let message = "would be written twice by this command; give each file a different name";
         Err(Failure::usage(format!("{self}: {message}")))
+    }
+
+    /// Refuses bytes that are not text on a terminal, which would obey some of them.
+    pub(crate) fn refuse_terminal(&self, is_text: bool) -> Result<(), Failure> {
+        if is_text || !self.is_standard() || !io::stdout().is_terminal() {
+            return Ok(());
+        }
+        Err(Failure::usage(
+            "standard output is a terminal, and the result is binary; give -o FILE, or send it to a file or a \
+             program",
+        ))
     }
 
     /// The same destination with another name.
@@ -515,6 +539,7 @@ impl Destination {
         let FinishedStream {
             output,
             digest,
+            bytes,
             broken_pipe,
         } = stream.end();
         if let Some(stopped) = signals::stopped() {
@@ -524,6 +549,9 @@ impl Destination {
             Ok(()) => Ok(WrittenFile {
                 output,
                 digest,
+                bytes,
+                warnings: Vec::new(),
+                beside: Vec::new(),
                 _writing: writing,
             }),
             Err(_) if broken_pipe => Err(Failure::quiet(BROKEN_PIPE)),
@@ -575,6 +603,8 @@ pub(crate) struct OutputStream {
     output: Output,
     progress: Option<MeasuredProgress>,
     digest: Option<Digest>,
+    /// Bytes so far.
+    bytes: u64,
     /// Kept here because writers wrap the error in another kind.
     broken_pipe: bool,
 }
@@ -583,6 +613,7 @@ pub(crate) struct OutputStream {
 struct FinishedStream {
     output: Output,
     digest: Option<Digest>,
+    bytes: u64,
     /// Its reader went away.
     broken_pipe: bool,
 }
@@ -593,6 +624,7 @@ impl OutputStream {
             output,
             progress,
             digest,
+            bytes: 0,
             broken_pipe: false,
         }
     }
@@ -601,6 +633,7 @@ impl OutputStream {
         FinishedStream {
             output: self.output,
             digest: self.digest,
+            bytes: self.bytes,
             broken_pipe: self.broken_pipe,
         }
     }
@@ -621,6 +654,7 @@ impl Write for OutputStream {
         }
         let result = self.output.write(bytes);
         let written = self.watch(result)?;
+        self.bytes += written as u64;
         if let Some(digest) = &mut self.digest {
             digest.update(&bytes[..written]);
         }

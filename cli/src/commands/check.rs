@@ -1,13 +1,15 @@
-//! `tumble check`: have the results of a batch changed?
+//! `tumble check`: is a batch complete, and have its results or its inputs changed?
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::batch::digest;
-use crate::batch::entry::{ManifestEntry, ManifestLines, NAME};
+use crate::batch::digest::{self, InputFile};
+use crate::batch::entry::{self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME};
+use crate::batch::manifest::is_gone;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
@@ -21,9 +23,12 @@ use crate::threads::on_threads;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 `tumble eval` writes a manifest into every directory of results: for each result a line of
-JSON with the SHA-256 of the result and of its input, the options, the kernels, the program's
-version and the device. If shards are missing in the directory, it checks the results of the
-complete shards, and prints how many there are.
+JSON with the SHA-256 of the result and of its input (with the files that it refers to), the
+options, the kernels, the program's version and the device; and a line for each input that
+failed or has no result yet. The exit code is 0 only if the batch is complete: all inputs have
+their results, no result has changed, and neither has an input that is found by its path in
+the manifest. If shards are missing in the directory, it checks the results of the complete
+shards, and prints how many there are.
 
 Examples:
   tumble check results/manifest.jsonl
@@ -37,6 +42,8 @@ pub(crate) struct Arguments {
 enum Fault {
     Damaged,
     Unreadable(io::Error),
+    /// Its input has other bytes than those that it was made from.
+    Stale,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -66,19 +73,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             )
         })?,
     };
-    let ManifestLines {
-        mut entries,
-        damaged,
-    } = ManifestLines::parse(&bytes);
+    let mut lines = ManifestLines::parse(&bytes);
     if shards.is_some() {
-        entries.extend(record::entries(folder));
-    } else if entries.is_empty() {
+        lines.extend(record::lines(folder));
+    } else if lines.entries.is_empty() && lines.inputs.is_empty() {
         let message = format!("{shown}: is not a manifest; `tumble eval` writes one, {NAME}");
         return Err(Failure::new(ALL_INPUTS, message));
     }
-    let entries: Vec<ManifestEntry> = entries.into_values().collect();
+    let entries: Vec<ManifestEntry> = lines.entries.into_values().collect();
+    let inputs = busy("checking inputs", || InputHashes::of(&entries));
     let faults: Vec<(&ManifestEntry, Fault)> = busy("checking", || {
-        let faulty = |entry| fault(folder, entry).map(|fault| (entry, fault));
+        let faulty = |entry| fault(folder, entry, &inputs).map(|fault| (entry, fault));
         on_threads(
             || entries.par_iter().filter_map(faulty).collect(),
             || entries.iter().filter_map(faulty).collect(),
@@ -90,27 +95,86 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         words::error(&match fault {
             Fault::Damaged => format!("{output}: its bits have changed since it was written"),
             Fault::Unreadable(error) => format!("{output}: cannot be read: {error}"),
+            Fault::Stale => {
+                let input = &entry.input;
+                format!("{output}: its input {input} has changed since it was written")
+            }
         });
     }
-    if damaged > 0 {
+    inputs.note_missing(&entries);
+    if lines.damaged > 0 {
         words::error(&format!(
             "{shown}: {} damaged",
-            words::count(damaged, "line")
+            words::count(lines.damaged, "line")
         ));
     }
     let total = words::count(entries.len(), "result");
-    if faults.len() + damaged > 0 {
-        let message = format!(
-            "{} of {total} differ; `tumble eval … --resume` makes them again",
-            faults.len()
-        );
-        return Err(Failure::new(DIFFERENCE, message));
+    let mut missing: Vec<String> = Vec::new();
+    if faults.len() + lines.damaged > 0 {
+        missing.push(format!("{} of {total} differ", faults.len()));
+    }
+    missing.extend(unfinished(&entries, lines.inputs.values()));
+    if !missing.is_empty() {
+        let missing = missing.join(", ");
+        // Without its first line a manifest is no longer taken for one.
+        let is_known = shards.is_some() || entry::open(folder).is_ok();
+        let remedy = match is_known {
+            true => "`tumble eval … --resume` makes them again",
+            false => {
+                "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
+            }
+        };
+        return Err(Failure::new(DIFFERENCE, format!("{missing}; {remedy}")));
     }
     listing::text(&format!("{total}, unchanged since they were written\n"))?;
     match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
     }
+}
+
+/// The inputs without a result, and those with a part of their results: how many, and the first.
+fn unfinished<'a>(
+    entries: &[ManifestEntry],
+    inputs: impl Iterator<Item = &'a InputEntry>,
+) -> Vec<String> {
+    let (mut failed, mut pending) = (Vec::new(), BTreeSet::new());
+    for entry in inputs {
+        match entry.state {
+            InputState::Failed => failed.push(entry),
+            InputState::Pending => {
+                pending.insert(&*entry.input);
+            }
+            InputState::Skipped => {}
+        }
+    }
+    let failed_results: BTreeSet<&str> = failed
+        .iter()
+        .filter_map(|it| it.result.as_deref())
+        .collect();
+    // A batch was stopped between the clips of an input.
+    let mut clips: BTreeMap<(&str, usize), (usize, &str)> = BTreeMap::new();
+    for entry in entries {
+        clips.entry(entry.whole()).or_insert((0, &entry.input)).0 += 1;
+    }
+    let cut = clips
+        .iter()
+        .filter(|((whole, count), (found, _))| found < count && !failed_results.contains(whole));
+    pending.extend(cut.map(|(_, (_, input))| input));
+    let mut texts = Vec::new();
+    if let Some(first) = failed.first() {
+        let inputs = words::count(failed.len(), "input");
+        let message = first.message.as_deref().unwrap_or_default();
+        texts.push(format!("{inputs} failed (the first: {message})"));
+    }
+    if let Some(first) = pending.first() {
+        let inputs = words::count(pending.len(), "input");
+        let have = if pending.len() == 1 { "has" } else { "have" };
+        texts.push(format!(
+            "{inputs} {have} no result yet (the first: {first})"
+        ));
+    }
+    texts
 }
 
 /// What is yet to do in a directory with shards.
@@ -122,11 +186,66 @@ fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
     }
 }
 
-fn fault(folder: &Path, entry: &ManifestEntry) -> Option<Fault> {
+fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Option<Fault> {
     let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
     match digest::is_whole(folder, &entry.output, bytes, sha256) {
+        Ok(true) if inputs.differ(entry) => Some(Fault::Stale),
         Ok(true) => None,
         Ok(false) => Some(Fault::Damaged),
         Err(error) => Some(Fault::Unreadable(error)),
+    }
+}
+
+/// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none: results
+/// may be checked on another machine than that of their inputs.
+struct InputHashes<'a>(BTreeMap<&'a str, Option<String>>);
+
+impl<'a> InputHashes<'a> {
+    fn of(entries: &'a [ManifestEntry]) -> Self {
+        let hashed = entries.iter().filter(|entry| entry.input_sha256.is_some());
+        let inputs: BTreeSet<&str> = hashed.map(|entry| &*entry.input).collect();
+        let hash = |input: &'a str| {
+            let file = InputFile::new(Path::new(input));
+            (input, file.sha256().map(str::to_owned))
+        };
+        let inputs: Vec<&str> = inputs.into_iter().collect();
+        let hashes: Vec<(&str, Option<String>)> = on_threads(
+            || inputs.par_iter().map(|input| hash(input)).collect(),
+            || inputs.iter().map(|input| hash(input)).collect(),
+        );
+        Self(hashes.into_iter().collect())
+    }
+
+    /// Whether the input of a result is there and has other bytes than those that the result was made from.
+    fn differ(&self, entry: &ManifestEntry) -> bool {
+        let now = self.0.get(&*entry.input).and_then(Option::as_ref);
+        now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now))
+    }
+
+    /// Says how many results have no input any more, and how many inputs were not found to be compared.
+    fn note_missing(&self, entries: &[ManifestEntry]) {
+        let missing: BTreeSet<&str> = (self.0.iter())
+            .filter_map(|(input, hash)| hash.is_none().then_some(*input))
+            .filter(|input| !Path::new(input).exists())
+            .collect();
+        let gone: BTreeSet<&str> = missing.iter().copied().filter(|it| is_gone(it)).collect();
+        let orphans = entries.iter().filter(|entry| gone.contains(&*entry.input));
+        let orphans: Vec<&ManifestEntry> = orphans.collect();
+        if let Some(first) = orphans.first() {
+            let results = words::count(orphans.len(), "result");
+            let have = if orphans.len() == 1 { "has" } else { "have" };
+            words::note(&format!(
+                "{results} {have} no input any more (`tumble eval … --resume --prune` removes what has none), the \
+                 first is {}",
+                first.output
+            ));
+        }
+        let elsewhere = missing.len() - gone.len();
+        if elsewhere > 0 {
+            let inputs = words::count(elsewhere, "input");
+            words::note(&format!(
+                "{inputs} not found from this directory: whether they have changed was not checked"
+            ));
+        }
     }
 }

@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(&files)?;
+    let plan = arguments.results.plan(files)?;
     check_stores_keys(&plan)?;
     let format = plan.targets.first().map(ResultTarget::format);
     if let Some(format) = format.filter(|format| !format.takes(FormatOption::Order))
@@ -107,7 +107,7 @@ impl Arguments {
     fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
         let (name, clips, target) = (&*work.name, work.clips(), &work.target);
         let loaded = &work.input.loaded;
-        let document = document_to_rewrite(name, loaded, target, self.makes_new(target));
+        let document = document_to_rewrite(work, self.makes_new(target));
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
         let is_whole = (self.start, self.end) == (None, None);

@@ -13,7 +13,7 @@ use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
-use crate::arguments::input::GatheredInputs;
+use crate::arguments::input::{GatheredInputs, InputSelection};
 use crate::arguments::interpolation::Outside;
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::PathArguments;
@@ -77,9 +77,9 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let inputs = GatheredInputs::new(&arguments.paths, None)?;
+    let inputs = GatheredInputs::new(&arguments.paths, &InputSelection::default())?;
     let samples = arguments.sampling.samples()?;
-    let plan = arguments.results.plan(&inputs)?;
+    let plan = arguments.results.plan(inputs)?;
     let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let reader = arguments.path.clone();

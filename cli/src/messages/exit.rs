@@ -4,9 +4,9 @@ use std::io;
 
 use tumble::Error;
 use tumble::vulkan::VulkanError;
-use tumble_formats::Diagnostic;
 use tumble_formats::output::OutputError;
 use tumble_formats::printable::printable;
+use tumble_formats::{Code, Diagnostic};
 
 use crate::messages::words;
 
@@ -33,6 +33,8 @@ pub(crate) struct Failure {
     plain: bool,
     /// An output that cannot be written, where another one may be.
     is_of_one: bool,
+    /// The code of the first error of an input.
+    input_code: Option<Code>,
 }
 
 impl Failure {
@@ -43,6 +45,7 @@ impl Failure {
             more: Vec::new(),
             plain: false,
             is_of_one: false,
+            input_code: None,
         }
     }
 
@@ -95,6 +98,7 @@ impl Failure {
         Self {
             more: each.collect(),
             plain: true,
+            input_code: refused.first().map(|fault| fault.code),
             ..Self::new(ALL_INPUTS, first)
         }
     }
@@ -104,6 +108,7 @@ impl Failure {
         let message = format!("{diagnostic}{hint}");
         Self {
             plain: true,
+            input_code: Some(diagnostic.code),
             ..Self::new(ALL_INPUTS, message)
         }
     }
@@ -114,6 +119,7 @@ impl Failure {
             OutputError::Write { path, source } => {
                 Self::writing(&path.display().to_string(), source)
             }
+            OutputError::Closed => Self::new(OUTPUT, error.to_string()),
             OutputError::NoDirectory { .. } => Self {
                 is_of_one: true,
                 ..Self::new(OUTPUT, error.to_string())
@@ -175,6 +181,11 @@ impl Failure {
         let lines = std::iter::once(&self.message).chain(&self.more);
         let lines: Vec<_> = lines.map(|line| printable(line)).collect();
         lines.join("\n")
+    }
+
+    /// The code of the error of an input.
+    pub(crate) fn input_code(&self) -> Option<Code> {
+        self.input_code
     }
 
     /// Its message.
@@ -255,11 +266,22 @@ impl Outcomes {
 
     /// Adds the outcome of an input.
     pub(crate) fn add(&mut self, outcome: Result<(), Failure>) {
+        self.add_reporting(outcome, |failure| {
+            failure.report();
+        });
+    }
+
+    /// As [`Outcomes::add`]; a failure that does not end the command is reported by `report`.
+    pub(crate) fn add_reporting(
+        &mut self,
+        outcome: Result<(), Failure>,
+        report: impl FnOnce(&Failure),
+    ) {
         match outcome {
             Ok(()) => {}
             Err(failure) if failure.is_final() || self.total == 1 => self.end(failure),
             Err(failure) => {
-                failure.report();
+                report(&failure);
                 match failure.code {
                     SOME_INPUTS => self.failed_in_part += 1,
                     _ => self.failed += 1,

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use clap::error::{ContextKind, ContextValue};
 use tumble::names::by_meaning;
+use tumble_formats::Diagnostic;
 use tumble_formats::guarded::is_guarded;
 use tumble_formats::printable::printable;
 
@@ -27,6 +28,13 @@ pub(crate) fn warning(message: &str) {
 /// One line, whatever names are in it.
 pub(crate) fn note(message: &str) {
     let _ = writeln!(anstream::stderr(), "{}", printable(message));
+}
+
+/// Prints warnings about an input, or errors of parts of it.
+pub(crate) fn warnings<'a>(warnings: impl IntoIterator<Item = &'a Diagnostic>) {
+    for warning in warnings {
+        note(&warning.to_string());
+    }
 }
 
 /// Prints an error of the command line, or help. clap prints arguments unescaped, and a shell's pattern

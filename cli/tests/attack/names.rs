@@ -50,8 +50,9 @@ fn no_name_ends_a_batch() {
         first.words
     );
     let made = entries(&folder.join("out"));
-    assert_eq!(made.len(), 8, "{made:?}");
-    assert!(made.contains(&format!("{}.npy", "x".repeat(251))));
+    // Results of a list keep its tree.
+    assert_eq!(made.len(), 9, "{made:?}");
+    assert!(made.contains(&format!("walks/{}.npy", "x".repeat(251))));
     let whole = tree(&folder.join("out"));
     for _ in 0..2 {
         let resumed = run(folder, &[&line[..], &["--resume"]].concat());
@@ -63,7 +64,9 @@ fn no_name_ends_a_batch() {
         );
         assert_eq!(tree(&folder.join("out")), whole);
     }
-    succeed(folder, &["check", "out"]);
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    assert!(check.words.contains("2 inputs failed"), "{}", check.words);
 
     let line = [
         "eval",
@@ -140,7 +143,10 @@ fn one_clip_that_cannot_be_written_does_not_end_the_others() {
         there.contains("m.Walk.npy") && there.contains("a.npy"),
         "{there:?}"
     );
-    succeed(folder, &["check", "out"]);
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let failed = "1 input failed (the first: m.gltf: 1 of 2 animations failed);";
+    assert!(check.words.contains(failed), "{}", check.words);
     fs::remove_dir(folder.join("out/m.Run.npy")).unwrap();
     succeed(
         folder,
@@ -150,9 +156,9 @@ fn one_clip_that_cannot_be_written_does_not_end_the_others() {
     succeed(folder, &["check", "out"]);
 }
 
-/// Two inputs of one stem get two results; two of one name fail, and no other.
+/// Inputs whose results would share a name fail, and no other; whole names tell two of one stem apart.
 #[test]
-fn inputs_of_one_stem_are_both_evaluated() {
+fn results_never_share_a_name() {
     let temporary = sample_folder();
     let folder = temporary.path();
     fs::create_dir(folder.join("walks")).unwrap();
@@ -160,22 +166,26 @@ fn inputs_of_one_stem_are_both_evaluated() {
     for name in ["walks/walk.dat", "walks/walk.DAT", "walks/other.dat"] {
         fs::write(folder.join(name), &keys).unwrap();
     }
-    succeed(folder, &["eval", "walks", "-o", "out"]);
+    let stems = run(folder, &["eval", "walks", "-o", "stems"]);
+    assert_eq!(stems.code, 3, "{}", stems.words);
+    assert!(stems.words.contains("give --names full"), "{}", stems.words);
+    let full = ["eval", "walks", "--names", "full", "-o"];
+    succeed(folder, &[&full[..], &["out"]].concat());
     let made = entries(&folder.join("out"));
     let expected = [
         "manifest.jsonl",
-        "other.npy",
+        "other.dat.npy",
         "walk.DAT.npy",
         "walk.dat.npy",
     ];
     assert!(made.iter().eq(expected), "{made:?}");
-    let resumed = succeed(folder, &["eval", "walks", "-o", "out", "--resume"]);
+    let resumed = succeed(folder, &[&full[..], &["out", "--resume"]].concat());
     assert!(
         resumed.words.contains("3 results skipped"),
         "{}",
         resumed.words
     );
-    succeed(folder, &["eval", "walks", "-o", "shards", "--shard", "1/1"]);
+    succeed(folder, &[&full[..], &["shards", "--shard", "1/1"]].concat());
     succeed(folder, &["merge", "shards"]);
     assert_eq!(tree(&folder.join("shards")), tree(&folder.join("out")));
 

@@ -1,6 +1,6 @@
 //! The container of a file: JSON alone (`.gltf`), or JSON, a BIN chunk and perhaps others (GLB).
 
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -135,6 +135,28 @@ impl Container {
         }
         Ok(())
     }
+}
+
+/// The JSON of a file, read without the other chunks of a GLB; `None` if the file is invalid or longer than `limit`.
+pub(super) fn json_alone(mut file: impl Read, limit: u64) -> Option<String> {
+    let mut bytes = Vec::new();
+    file.by_ref().take(20).read_to_end(&mut bytes).ok()?;
+    let is_glb = bytes.starts_with(MAGIC);
+    let length = match is_glb {
+        true => {
+            let length = u32::from_le_bytes(*bytes.get(12..)?.first_chunk()?);
+            bytes.clear();
+            u64::from(length)
+        }
+        false => limit.saturating_add(1),
+    };
+    let rest = length.saturating_sub(bytes.len() as u64);
+    file.take(rest).read_to_end(&mut bytes).ok()?;
+    if (bytes.len() as u64 == length) != is_glb {
+        return None;
+    }
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
+    String::from_utf8(text.to_vec()).ok()
 }
 
 /// The bytes that make a length a multiple of four.

@@ -18,6 +18,7 @@ use crate::gltf::data::BufferData;
 use crate::gltf::edits::Edits;
 use crate::gltf::gather;
 use crate::gltf::json::{Json, JsonMembers};
+use crate::gltf::prune::prune;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, Channel};
 use crate::gltf::skins;
@@ -174,6 +175,7 @@ impl Document for GltfDocument {
         if !self.container.is_glb() && !is_text {
             gather::images(&reader, &mut edits, &mut data)?;
         }
+        let mut is_baked = false;
         for (read, (index, sampled)) in clips {
             let cuts = is_cut(read, sampled);
             if cuts && read.beside > 0 {
@@ -198,19 +200,26 @@ impl Document for GltfDocument {
                 )?;
                 baking.bake(&mut edits)?;
                 data.append(&mut edits, &baking.bytes);
+                is_baked = true;
             }
         }
         let bin = data.finish(&json, &mut edits);
-        let text = edits.finish();
+        let bin = bin.map(|parts| parts.concat());
+        let mut text = edits.finish();
+        drop(data);
+        let mut bin = bin.filter(|_| !is_text);
+        if is_baked {
+            (text, bin) = prune(&json, (text, bin));
+        }
         if is_text {
             out.write_all(text.as_bytes())?;
         } else {
-            let length = |part: &&[u8]| part.len() as u64;
-            let bytes = text.len() as u64 + bin.iter().flatten().map(length).sum::<u64>();
-            check_length(&json, bytes)?;
-            self.container.write_glb(&text, bin.as_deref(), out)?;
+            let bytes = text.len() + bin.as_ref().map_or(0, Vec::len);
+            check_length(&json, bytes as u64)?;
+            let parts = bin.as_deref().map(|bin| [bin]);
+            self.container
+                .write_glb(&text, parts.as_ref().map(<[_; 1]>::as_slice), out)?;
         }
-        drop(data);
         // Whatever else is remarkable was said when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
         warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));

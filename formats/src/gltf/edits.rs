@@ -6,6 +6,7 @@ use std::ops::Range;
 use serde_json::value::RawValue;
 
 use crate::gltf::json::Json;
+use crate::gltf::prune::LeftOut;
 
 /// The changes to make, in any order.
 pub(super) struct Edits<'a> {
@@ -76,6 +77,21 @@ impl<'a> Edits<'a> {
         let entries = self.missing.entry(list).or_default();
         entries.push(entry);
         entries.len() - 1
+    }
+
+    /// Removes entries of an array, which keeps at least one.
+    pub(super) fn remove_entries(&mut self, entries: &[&RawValue], left: &LeftOut) {
+        for &index in left.indices() {
+            let range = self.json.range(entries[index]);
+            // With the comma before it, or behind it where nothing before it stays.
+            let has_kept_before = left.before(index) < index;
+            let range = match (has_kept_before, entries.get(index + 1)) {
+                (true, _) => self.json.range(entries[index - 1]).end..range.end,
+                (false, Some(next)) => range.start..self.json.range(next).start,
+                (false, None) => range,
+            };
+            self.list.push((range, String::new()));
+        }
     }
 
     /// Number of entries of a top-level array, including the appended ones.

@@ -8,7 +8,7 @@
 //! returns the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` contains the
 //! hierarchy, `channel` the keys of one channel, and `animation` makes a clip of one animation. Writing the same file
 //! again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the text and by bytes that
-//! `data` appends, and `gather` embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new
+//! `data` appends, `prune` leaves out the keys that were replaced, and `gather` embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new
 //! file: `write_new`.
 
 mod animation;
@@ -25,6 +25,7 @@ mod matrix;
 pub mod meshes;
 mod meshopt;
 mod nodes;
+mod prune;
 pub(crate) mod quantized;
 mod reader;
 mod schema;
@@ -36,8 +37,9 @@ mod written_keys;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::fs::File;
 use std::io::BufRead;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic, Location};
@@ -48,7 +50,7 @@ use crate::gltf::document::GltfDocument;
 use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::{GltfReader, MESHOPT};
-use crate::gltf::schema::Asset;
+use crate::gltf::schema::{Asset, Buffer};
 use crate::source::Source;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
@@ -140,6 +142,21 @@ fn bytes_of(
     let bytes = source.into_bytes(limit)?;
     let folder = (path.as_os_str() != "-").then(|| path.parent().unwrap_or(Path::new("")));
     Ok((name, bytes, folder))
+}
+
+/// The files of a file's buffers, relative to its folder; those of URIs that are refused are left out.
+pub(crate) fn buffer_files(path: &Path, limits: Limits) -> Vec<PathBuf> {
+    let text = File::open(path).ok();
+    let text = text.and_then(|file| container::json_alone(file, limits.file));
+    let text = text.unwrap_or_default();
+    let Ok(json) = Json::parse("", &text) else {
+        return Vec::new();
+    };
+    let buffers = json.entries("buffers").iter();
+    let uris = buffers.filter_map(|raw| json.typed::<Buffer<'_>>(raw, "").ok()?.uri);
+    uris.filter(|uri| !uri::is_data(uri))
+        .filter_map(|uri| uri::relative(&uri).ok())
+        .collect()
 }
 
 /// Reads the bytes of a glTF file; `name` is the input's name in messages, and `folder` is the folder of the files

@@ -40,18 +40,21 @@ __all__ = [
     "encodings",
     "evaluate",
     "file_of_state",
+    "input_sha256",
     "inputs_of",
     "kernels_sha256",
     "load",
     "load_drivers",
     "manifest_by_input",
     "manifest_results",
+    "manifest_unfinished",
     "merge",
     "methods",
     "page",
     "panic",
     "path_errors",
     "reduce",
+    "referred_files",
     "run",
     "save",
     "set_probe",
@@ -1177,6 +1180,7 @@ class Worker:
     def device(self) -> str: ...
     @property
     def options(self) -> str: ...
+    def key_of(self, below: str) -> str: ...
     def run(
         self,
         folder: str,
@@ -1220,6 +1224,9 @@ class Record:
 
 def manifest_results(text: str) -> list[tuple[str, str, int]]: ...
 def manifest_by_input(text: str) -> dict[str, list[str]]: ...
+def manifest_unfinished(text: str) -> list[str]: ...
+def referred_files(path: str) -> list[str]: ...
+def input_sha256(path: str) -> str | None: ...
 def inputs_of(line: Sequence[str]) -> list[str]: ...
 def kernels_sha256() -> str: ...
 def merge(folder: str) -> tuple[int, str]: ...

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use tumble_formats::beneath::parent_beneath;
 use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
-use crate::batch::entry::{self, ManifestEntry, NAME};
+use crate::batch::entry::{
+    self, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
+};
 use crate::batch::manifest;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record::{self, MARK, RefusedInput};
@@ -108,8 +110,9 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     }
     let mut lines = Vec::new();
     let path = folder.join(NAME);
-    list_before(folder, &path, &mut lines)?;
-    let mut failed = Vec::new();
+    let mut inputs = list_before(folder, &path, &mut lines)?;
+    inputs.retain(|_, entry| entry.state != InputState::Skipped);
+    let mut failed: Vec<RefusedInput> = Vec::new();
     for shard in 1..=recorded.shards {
         let (bytes, refused, start) = read(folder, &recorded, shard).ok_or_else(|| {
             let message = format!("{shown}: shard {shard} was removed while it was merged");
@@ -117,10 +120,20 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
         })?;
         failed.extend(refused);
         list(&bytes, start, shard, &mut lines);
+        if !inputs.is_empty() {
+            let found = ManifestLines::parse(&bytes[start..]);
+            found
+                .entries
+                .values()
+                .for_each(|entry| entry.settle(&mut inputs));
+        }
     }
+    let refused = failed.iter().map(RefusedInput::entry);
+    let without_results = refused.chain(recorded.skipped.iter().cloned());
+    inputs.extend(without_results.map(|entry| (entry.key(), entry)));
     let lines = one_each(lines)?;
-    if !lines.is_empty() {
-        write(folder, &path, &lines)?;
+    if !lines.is_empty() || !inputs.is_empty() {
+        write(folder, &path, &lines, &inputs)?;
     }
     let parents: BTreeSet<PathBuf> = (lines.iter())
         .filter_map(|line| parent_beneath(folder, Path::new(&line.output)).ok())
@@ -138,10 +151,16 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     })
 }
 
-/// Lists the lines of the previous manifest, which may have a million: one is in memory at a time.
-fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Result<(), Failure> {
+/// Lists the lines of the previous manifest, which may have a million results: one is in memory at a time. Gives the
+/// entries of its inputs without results.
+fn list_before(
+    folder: &Path,
+    path: &Path,
+    lines: &mut Vec<ManifestLine>,
+) -> Result<InputEntries, Failure> {
+    let mut inputs = InputEntries::new();
     let Some(file) = entry::open(folder)? else {
-        return Ok(()); // mostly there is none
+        return Ok(inputs); // mostly there is none
     };
     let mut reader = BufReader::new(file);
     let (mut line, mut start) = (Vec::new(), 0);
@@ -154,11 +173,16 @@ fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Res
         })?;
         if length == 0 {
             entry::warn_of_damaged_lines(folder, damaged);
-            return Ok(());
+            return Ok(inputs);
         }
         let mut found = Vec::new();
         list(&line, 0, 0, &mut found);
-        damaged += usize::from(found.is_empty());
+        match InputEntry::of_line(&line) {
+            Some(entry) => {
+                inputs.insert(entry.key(), entry);
+            }
+            None => damaged += usize::from(found.is_empty()),
+        }
         lines.extend(found.pop().map(|ManifestLine { output, .. }| ManifestLine {
             output,
             file: 0,
@@ -168,7 +192,7 @@ fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Res
     }
 }
 
-/// Lists the lines of a file that are entries.
+/// Lists the lines of a file that are entries of results.
 fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<ManifestLine>) {
     let mut at = start;
     for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
@@ -210,7 +234,12 @@ fn one_each(mut lines: Vec<ManifestLine>) -> Result<Vec<ManifestLine>, Failure> 
 
 /// Writes the lines. Few files are in memory at once: the index of a million results takes 130 MB, their
 /// lines 500 MB.
-fn write(folder: &Path, path: &Path, lines: &[ManifestLine]) -> Result<(), Failure> {
+fn write(
+    folder: &Path,
+    path: &Path,
+    lines: &[ManifestLine],
+    inputs: &InputEntries,
+) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);
     let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
@@ -252,6 +281,9 @@ fn write(folder: &Path, path: &Path, lines: &[ManifestLine]) -> Result<(), Failu
             return Err(Failure::new(DIFFERENCE, message));
         }
         output.write_all(text).map_err(failed)?;
+    }
+    for entry in inputs.values() {
+        output.write_all(entry.line().as_bytes()).map_err(failed)?;
     }
     output.commit().map_err(|error| Failure::output(&error))
 }

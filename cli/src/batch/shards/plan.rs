@@ -10,10 +10,10 @@ use tumble_formats::beneath::{open_beneath, parent_beneath};
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
-use crate::arguments::input::FoundInput;
+use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::Digest;
-use crate::batch::entry::kernels_sha256;
-use crate::batch::result_names::{self, ResultName};
+use crate::batch::entry::{InputEntry, kernels_sha256};
+use crate::batch::result_names::{self, ResultName, ResultNaming};
 use crate::batch::shards::record::{self, FOLDER};
 use crate::batch::target;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -56,6 +56,9 @@ pub(crate) struct RecordedPlan {
     pub(crate) options: String,
     pub(crate) kernels_sha256: String,
     pub(crate) tumble: String,
+    /// What directories of inputs have that is skipped.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) skipped: Vec<InputEntry>,
 }
 
 /// The inputs of each shard: in their order, at most `MAX_INPUTS`, and at most `max_bytes` unless one
@@ -90,20 +93,21 @@ pub(crate) fn hash_of(names: &[ResultName]) -> String {
 impl ShardPlan {
     /// Cuts inputs, of those sizes, into shards.
     pub(crate) fn new(
-        inputs: Vec<FoundInput>,
+        inputs: GatheredInputs,
         sizes: &[u64],
         folder: &Path,
-        format: Option<&'static Format>,
+        (format, naming): (Option<&'static Format>, ResultNaming),
         options: String,
         shard_bytes: u64,
     ) -> Result<Self, Failure> {
-        if let Some(pipe) = inputs.iter().find(|found| names::is_standard(&found.path)) {
+        let files = inputs.files;
+        if let Some(pipe) = files.iter().find(|found| names::is_standard(&found.path)) {
             let name = names::input(&pipe.path);
             let message = format!("{name}: no other process can read it; give a file");
             return Err(Failure::usage(message));
         }
         let format = result_names::format(folder, format)?;
-        let names = result_names::name_results(&inputs, folder, format);
+        let names = result_names::name_results(&files, folder, format, naming);
         let cuts = cut(sizes, shard_bytes);
         let mut digest = Digest::default();
         let mut say = |text: &str| {
@@ -121,15 +125,16 @@ impl ShardPlan {
         let recorded = RecordedPlan {
             plan: digest.finish(),
             shards: cuts.len(),
-            inputs: inputs.len(),
+            inputs: files.len(),
             shard_bytes,
             outputs_sha256: hash_of(&names),
             options,
             kernels_sha256: kernels_sha256().to_owned(),
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
+            skipped: inputs.skipped,
         };
         Ok(Self {
-            inputs,
+            inputs: files,
             names,
             cuts,
             format,

@@ -1,6 +1,6 @@
 //! The file of a shard that is done: a header line, then its lines of the manifest.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
 use crate::batch::digest;
-use crate::batch::entry::{self, ManifestEntry, ManifestLines};
+use crate::batch::entry::{
+    self, InputEntry, InputState, ManifestEntry, ManifestLines, PreviousEntries,
+};
 
 /// The subdirectory of shards in a directory of results.
 pub(crate) const FOLDER: &str = "manifest.d";
@@ -38,6 +40,22 @@ pub(crate) struct RefusedInput {
     /// The exit code of a command that has this input alone.
     pub(crate) code: u8,
     pub(crate) message: String,
+    /// The result that it would have, where it can have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) result: Option<String>,
+}
+
+impl RefusedInput {
+    /// Its entry in a manifest.
+    pub(crate) fn entry(&self) -> InputEntry {
+        InputEntry {
+            state: InputState::Failed,
+            input: self.input.clone(),
+            result: self.result.clone().filter(|result| is_beneath(result)),
+            code: Some(self.code),
+            message: Some(self.message.clone()),
+        }
+    }
 }
 
 /// The file of a shard, below the directory of results.
@@ -116,16 +134,24 @@ pub(crate) fn whole(bytes: &[u8]) -> Option<(ShardHeader, usize)> {
     is_whole.then_some((header, start))
 }
 
-/// All results that done shards of a directory have made.
-pub(crate) fn entries(folder: &Path) -> BTreeMap<String, ManifestEntry> {
-    let mut all = BTreeMap::new();
+/// The lines of all shards of a directory: the results that they have made, and the inputs that failed.
+pub(crate) fn lines(folder: &Path) -> ManifestLines {
+    let mut all = ManifestLines::parse(&[]);
     for shard in numbers(folder) {
-        let bytes = bytes(folder, shard).unwrap_or_default();
-        if let Some((_, start)) = header(&bytes) {
-            all.extend(ManifestLines::parse(&bytes[start..]).entries);
-        }
+        all.extend(lines_of(&bytes(folder, shard).unwrap_or_default()));
     }
     all
+}
+
+/// The lines in the bytes of a shard's file.
+fn lines_of(bytes: &[u8]) -> ManifestLines {
+    let Some((header, start)) = header(bytes) else {
+        return ManifestLines::parse(&[]);
+    };
+    let mut lines = ManifestLines::parse(&bytes[start..]);
+    let failed = header.failed.iter().map(RefusedInput::entry);
+    lines.inputs = failed.map(|entry| (entry.key(), entry)).collect();
+    lines
 }
 
 /// The part of a line that names its result.
@@ -146,50 +172,60 @@ pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
 }
 
 /// The results, and the results of all clips of an input together, that a directory's manifests name.
-/// They may be a million: one line is in memory at a time.
 pub(crate) fn names(folder: &Path) -> HashSet<String> {
+    let mut known = HashSet::new();
+    for_each_line(folder, |line| {
+        if let Some((output, all)) = owner(line) {
+            known.insert(output);
+            known.extend(all);
+        }
+    });
+    known
+}
+
+/// The inputs of some results, as a directory's manifests name them.
+pub(crate) fn inputs_of(folder: &Path, results: &HashSet<&str>) -> HashMap<String, String> {
+    let mut inputs = HashMap::new();
+    for_each_line(folder, |line| {
+        let entry = ManifestEntry::of_line(line);
+        if let Some(entry) = entry.filter(|entry| results.contains(entry.whole().0)) {
+            inputs.insert(entry.whole().0.to_owned(), entry.input);
+        }
+    });
+    inputs
+}
+
+/// Passes on the lines of a directory's manifests, those of its shards first. They may be a million: one line is in
+/// memory at a time. A line that is not an entry, such as a shard's header, is among them.
+fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
     let shards = numbers(folder).into_iter();
     let shards = shards.filter_map(|shard| open_beneath(folder, &name(shard)).ok());
-    let mut known = HashSet::new();
     for file in shards.chain(entry::open(folder).ok().flatten()) {
-        // A line that is not an entry, such as a shard's header, has no output.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
-            if let Some((output, all)) = owner(&line) {
-                known.insert(output);
-                known.extend(all);
-            }
+            each(&line);
         }
     }
-    known
 }
 
 /// The entries for the results of one shard: those of the directory's manifest, replaced by those of the
 /// shard's file.
-pub(crate) fn previous(
-    folder: &Path,
-    shard: usize,
-    names: &[&str],
-) -> BTreeMap<String, ManifestEntry> {
+pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> PreviousEntries {
     let shard_names: HashSet<&str> = names.iter().copied().collect();
-    let mut found = BTreeMap::new();
+    let mut found = ManifestLines::parse(&[]);
     if let Ok(Some(file)) = entry::open(folder) {
         // The directory's may be of a million results: one line is in memory at a time.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
-            let Some((output, all)) = owner(&line) else {
-                continue;
-            };
-            let is_of_shard = shard_names.contains(&*output)
-                || all.is_some_and(|all| shard_names.contains(&*all));
-            if is_of_shard && let Some(entry) = ManifestEntry::of_line(&line) {
-                found.insert(output, entry);
+            let lines = ManifestLines::parse(&line);
+            let results = lines.entries.values().map(|entry| entry.whole().0);
+            let mut of_line = results.chain(lines.inputs.keys().map(|key| &**key));
+            if of_line.any(|whole| shard_names.contains(whole)) {
+                found.extend(lines);
             }
         }
     }
-    let bytes = bytes(folder, shard).unwrap_or_default();
-    if let Some((_, start)) = header(&bytes) {
-        found.extend(ManifestLines::parse(&bytes[start..]).entries);
-    }
-    found
+    found.extend(lines_of(&bytes(folder, shard).unwrap_or_default()));
+    let unfinished = found.unfinished();
+    PreviousEntries::new(folder, found.entries, unfinished)
 }
 
 #[cfg(test)]
@@ -209,6 +245,7 @@ mod tests {
             tumble: String::new(),
             device: String::new(),
             one_of: None,
+            warnings: Vec::new(),
         };
         let entries = [entry("a"), entry("b"), entry("c")];
         let all = text(&ShardHeader::default(), &entries);

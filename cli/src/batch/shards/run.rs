@@ -1,12 +1,13 @@
 //! Evaluates one shard: its results are renamed together, then the shard's file lists them.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_marked};
 
-use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder};
+use crate::batch::entry::{InputEntry, ManifestEntry, PreviousEntries, ResultRecorder};
 use crate::batch::output_plan::ResultFolder;
 use crate::batch::result_names::ResultName;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
@@ -39,7 +40,7 @@ impl<'a> Shard<'a> {
     pub(crate) fn new(folder: &'a Path, header: ShardHeader, names: &[&str], resume: bool) -> Self {
         let previous = match resume {
             true => record::previous(folder, header.shard, names),
-            false => Default::default(),
+            false => PreviousEntries::new(folder, BTreeMap::new(), BTreeSet::new()),
         };
         Self {
             folder,
@@ -47,7 +48,7 @@ impl<'a> Shard<'a> {
             quiet: false,
             made: 0,
             skipped: 0,
-            previous: PreviousEntries::new(folder, previous),
+            previous,
             entries: Vec::new(),
             waiting: Vec::new(),
         }
@@ -87,7 +88,7 @@ impl<'a> Shard<'a> {
                     if !self.quiet {
                         failure.report();
                     }
-                    self.add_refused(&path, &failure);
+                    self.add_refused(InputEntry::failed(&path, None, &failure));
                 }
             }
         }
@@ -98,11 +99,12 @@ impl<'a> Shard<'a> {
     }
 
     /// Records an input without a result.
-    fn add_refused(&mut self, path: &Path, failure: &Failure) {
+    fn add_refused(&mut self, entry: InputEntry) {
         self.header.failed.push(RefusedInput {
-            input: path.display().to_string(),
-            code: failure.code,
-            message: failure.message().to_owned(),
+            input: entry.input,
+            code: entry.code.unwrap_or_default(),
+            message: entry.message.unwrap_or_default(),
+            result: entry.result,
         });
     }
 
@@ -181,8 +183,9 @@ impl ResultRecorder for &mut Shard<'_> {
         self.entries.extend(there.cloned());
     }
 
-    fn refuse(&mut self, path: &Path, failure: &Failure) {
-        self.add_refused(path, failure);
+    fn refuse(&mut self, entry: InputEntry) -> Result<(), Failure> {
+        self.add_refused(entry);
+        Ok(())
     }
 
     fn list(&self) -> PathBuf {

@@ -103,9 +103,6 @@ pub(crate) struct Arguments {
         value_parser = words::parse_bytes
     )]
     pub(super) shard_bytes: u64,
-    /// Print JSON: about the results
-    #[arg(long)]
-    pub(super) json: bool,
 }
 
 fn layout() -> impl TypedValueParser<Value = Layout> {

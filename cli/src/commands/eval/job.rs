@@ -33,10 +33,6 @@ use crate::messages::words;
 /// The report of one result with `--json`.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct EvaluationReport {
-    /// The input, and its animation where it has several.
-    input: String,
-    /// Where the result is; `-` is standard output.
-    output: String,
     format: &'static str,
     tracks: usize,
     frames: usize,
@@ -54,7 +50,6 @@ pub(crate) struct EvaluationReport {
     order: Option<&'static str>,
     method: String,
     device: String,
-    seconds: f64,
 }
 
 impl EvaluationReport {
@@ -64,14 +59,14 @@ impl EvaluationReport {
     }
 }
 
-/// Evaluates all that a pipeline has; gives a report of each result that is kept.
+/// Evaluates all that a pipeline has; gives the number of rotations in the results that are kept.
 pub(super) fn evaluate_all(
     arguments: &Arguments,
     samples: &SampleRequest,
     device: &mut OpenedDevice,
     pipeline: &mut Pipeline<'_>,
-) -> Vec<EvaluationReport> {
-    let mut reports = Vec::new();
+) -> u64 {
+    let mut rotations = 0;
     while let Some(work) = pipeline.next_work() {
         let mut job = EvaluationJob {
             arguments,
@@ -82,9 +77,12 @@ pub(super) fn evaluate_all(
             left_out: None,
         };
         let made = job.evaluate();
-        reports.extend(pipeline.keep(&work, made));
+        let of_this = made.as_ref().map_or(0, |(_, report)| report.rotations());
+        if pipeline.keep(&work, made) {
+            rotations += of_this;
+        }
     }
-    reports
+    rotations
 }
 
 /// The evaluation of some clips of an input, into one file.
@@ -127,7 +125,7 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Motion {
             let some = self.arguments.command_line.has("tracks");
             let some = some.then_some("some tracks make");
-            document_to_rewrite(name, &self.work.input.loaded, target, some);
+            document_to_rewrite(work, some);
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
@@ -167,7 +165,7 @@ impl EvaluationJob<'_> {
         };
         let selected = self.arguments.inputs.tracks.select(clip, name)?;
         if let Some(warning) = curve_warning(name, &selected.set, &with(method)) {
-            words::note(&warning.to_string());
+            self.work.warn(warning);
         }
         Ok(())
     }
@@ -303,8 +301,6 @@ impl EvaluationJob<'_> {
             words::count(frames, "frame"),
         );
         let report = EvaluationReport {
-            input: work.name.clone(),
-            output: work.target.path().display().to_string(),
             format: work.target.format().name,
             tracks,
             frames,
@@ -319,7 +315,6 @@ impl EvaluationJob<'_> {
             order: order.map(ComponentOrder::name),
             method: method.to_owned(),
             device: device.clone(),
-            seconds: work.input.started.elapsed().as_secs_f64(),
         };
         (work.result(written, &done, Some(device)), report)
     }

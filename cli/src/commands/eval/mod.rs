@@ -4,12 +4,9 @@ mod arguments;
 pub(crate) mod job;
 pub(crate) mod shards;
 
-use crate::batch::target::ResultTarget;
-
 pub(crate) use crate::commands::eval::arguments::Arguments;
 use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::Failure;
-use crate::messages::listing;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(part) = arguments.shard {
@@ -20,25 +17,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;
     let samples = arguments.checked_samples()?;
-    let plan = arguments.results.plan(&inputs)?;
+    let plan = arguments.results.plan(inputs)?;
     // All targets have one format.
     if let Some(target) = plan.targets.first() {
         arguments.check_before(target.format())?;
-    }
-    if arguments.json && plan.targets.iter().any(ResultTarget::is_standard) {
-        return Err(Failure::usage(
-            "--json and the result cannot both go to standard output; give -o FILE",
-        ));
     }
     arguments.choose_keys();
     let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
-    let reports = evaluate_all(arguments, &samples, &mut device, &mut pipeline);
-    let outcome = pipeline.finish();
-    if arguments.json {
-        listing::json(&reports)?;
-    }
-    outcome
+    evaluate_all(arguments, &samples, &mut device, &mut pipeline);
+    pipeline.finish()
 }

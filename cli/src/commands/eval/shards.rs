@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
+use serde_json::Value;
+
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::input::FoundInput;
+use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::arguments::time::SampleRequest;
 use crate::batch::output_plan;
-use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineJob};
+use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
-use crate::commands::eval::job::{EvaluationReport, evaluate_all};
+use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::{listing, words};
 
@@ -19,12 +21,12 @@ use crate::messages::{listing, words};
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
     let mut evaluator = Evaluator::new(arguments)?;
     let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
-    let gathered = arguments.inputs.gather(false)?;
-    let files = output_plan::without_results(gathered.files, folder)?;
-    let sizes: Vec<u64> = files.iter().map(size).collect();
+    let mut gathered = arguments.results.based(arguments.inputs.gather(false)?)?;
+    gathered.files = output_plan::without_results(gathered.files, folder)?;
+    let sizes: Vec<u64> = gathered.files.iter().map(size).collect();
     let bytes = arguments.shard_bytes;
     let request = &evaluator.request;
-    let plan = request.plan(arguments, files, &sizes, folder, bytes)?;
+    let plan = request.plan(arguments, gathered, &sizes, folder, bytes)?;
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
     let (mut failed, mut inputs) = (0, 0);
@@ -51,11 +53,12 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
             .iter()
             .map(|found| found.path.clone());
         let jobs = shard.jobs(paths, &plan.names[range], plan.format);
-        reports.extend(evaluator.evaluate(arguments, jobs, &mut shard)?);
+        let evaluated = evaluator.evaluate(arguments, jobs, &mut shard)?;
+        reports.extend(evaluated.json.into_iter().flatten());
         shard.finish()?;
         failed += shard.header.failed.len();
     }
-    if arguments.json {
+    if arguments.results.prints_json() {
         listing::json(&reports)?;
     }
     match failed {
@@ -90,6 +93,7 @@ impl EvaluationRequest {
             let message = "--times -: no other process can read it; give a file";
             return Err(Failure::usage(message));
         }
+        arguments.results.check_shards()?;
         let samples = arguments.checked_samples()?;
         Ok(Self {
             options: arguments.options(&samples),
@@ -101,17 +105,26 @@ impl EvaluationRequest {
     pub(crate) fn plan(
         &self,
         arguments: &Arguments,
-        inputs: Vec<FoundInput>,
+        inputs: GatheredInputs,
         sizes: &[u64],
         folder: &Path,
         shard_bytes: u64,
     ) -> Result<ShardPlan, Failure> {
-        let format = arguments.results.format();
+        let results = &arguments.results;
+        let naming = (results.format(), results.naming());
         let options = self.options.clone();
-        let plan = ShardPlan::new(inputs, sizes, folder, format, options, shard_bytes)?;
+        let plan = ShardPlan::new(inputs, sizes, folder, naming, options, shard_bytes)?;
         arguments.check_before(plan.format)?;
         Ok(plan)
     }
+}
+
+/// What evaluating a shard came to.
+pub(crate) struct EvaluatedShard {
+    /// How many were evaluated.
+    pub(crate) rotations: u64,
+    /// The records of its results and failures, where they are asked for.
+    json: Option<Vec<Value>>,
 }
 
 /// A request and an open device, kept for shard after shard.
@@ -129,36 +142,45 @@ impl Evaluator {
         })
     }
 
-    /// Evaluates the inputs of a shard; gives a report of each result. Inputs that are refused are in the
-    /// shard's header, and no failure.
+    /// Evaluates the inputs of a shard. Inputs that are refused are in the shard's header, and no failure.
     pub(crate) fn evaluate(
         &mut self,
         arguments: &Arguments,
         jobs: Vec<PipelineJob>,
         shard: &mut Shard<'_>,
-    ) -> Result<Vec<EvaluationReport>, Failure> {
+    ) -> Result<EvaluatedShard, Failure> {
         arguments.choose_keys();
         let refused = shard.header.failed.len();
         let (inputs, quiet) = (jobs.len(), shard.quiet);
         let options = BatchOptions {
             options: self.request.options.clone(),
             resume: arguments.results.is_resumed(),
+            verbose: arguments.results.is_verbose(),
         };
         let reader = arguments.inputs.clone();
         let records = Box::new(&mut *shard);
-        let mut pipeline = Pipeline::of_batch(reader, jobs, Vec::new(), options, records);
+        let work = PipelineInputs {
+            jobs,
+            ..PipelineInputs::default()
+        };
+        let mut pipeline = Pipeline::of_batch(reader, work, options, records);
+        if arguments.results.prints_json() {
+            pipeline = pipeline.with_json();
+        }
         let samples = &self.request.samples;
-        let reports = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
-        match pipeline.finish() {
+        let rotations = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
+        let (outcome, json) = pipeline.finish_with_json();
+        let evaluated = EvaluatedShard { rotations, json };
+        match outcome {
             Err(failure) if failure.is_final() => Err(failure),
             Err(failure) => {
                 // The failure of a single input has not been reported yet.
                 if inputs == 1 && shard.header.failed.len() > refused && !quiet {
                     failure.report();
                 }
-                Ok(reports)
+                Ok(evaluated)
             }
-            Ok(()) => Ok(reports),
+            Ok(()) => Ok(evaluated),
         }
     }
 }

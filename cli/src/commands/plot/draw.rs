@@ -8,7 +8,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::batch::target::Destination;
+use crate::batch::target::{Destination, WrittenFile};
 use crate::commands::picture;
 use crate::commands::plot::figure::{Dots, Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis};
 use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};
@@ -25,8 +25,8 @@ const PIXELS: u32 = 2;
 const FINER: u32 = 10;
 const MARGIN: f64 = 16.0;
 
-/// Draws into a file, which ends in .svg or .png.
-pub(crate) fn write(figure: &Figure, destination: &Destination) -> Result<(), Failure> {
+/// Draws into a file, which ends in .svg or .png and gets its name by [`WrittenFile::commit`].
+pub(crate) fn prepare(figure: &Figure, destination: &Destination) -> Result<WrittenFile, Failure> {
     let name = destination.to_string();
     let extension = destination.path().extension().unwrap_or_default();
     let drawn = match extension.to_string_lossy().to_lowercase().as_str() {
@@ -38,7 +38,7 @@ pub(crate) fn write(figure: &Figure, destination: &Destination) -> Result<(), Fa
         }
     };
     let bytes = drawn.map_err(|error| Failure::writing(&name, &error))?;
-    destination.write(None, |out| out.write_all(&bytes))
+    destination.prepare(None, |out| out.write_all(&bytes))
 }
 
 /// A figure as the text of an SVG file.

@@ -15,7 +15,7 @@ use tumble_formats::format::{FormatOption, MotionOptions, Quantization};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Motion, SampledClip};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, quantize_all, reduce};
-use tumble_formats::{Feature, Format, Loaded};
+use tumble_formats::{Feature, Format};
 
 use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
@@ -28,7 +28,7 @@ use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::{listing, names, words};
+use crate::messages::{names, words};
 
 /// Remove keys from motion; the curves of the remaining keys stay within a tolerance of all samples
 #[derive(Debug, Args)]
@@ -81,9 +81,6 @@ pub(crate) struct Arguments {
     /// Also draw, as .svg or .png: the errors of the joints over time; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Print JSON: about the results
-    #[arg(long)]
-    json: bool,
 }
 
 fn curve() -> impl TypedValueParser<Value = ReducedCurve> {
@@ -101,7 +98,6 @@ fn curve() -> impl TypedValueParser<Value = ReducedCurve> {
 struct ReductionReport {
     /// The input, and its animation where it has several.
     input: String,
-    output: String,
     keys_before: usize,
     keys_after: usize,
     samples: usize,
@@ -140,9 +136,9 @@ impl LargestError {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(&files)?;
+    let plan = arguments.results.plan(files)?;
     let plot = match &arguments.plot {
-        Some(file) => arguments.results.picture(file, &files, &plan)?,
+        Some(file) => arguments.results.picture(file, &plan)?,
         None => None,
     };
     let format = plan.targets.first().map(ResultTarget::format);
@@ -158,18 +154,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
     let options = format!("reduce {}", arguments.command_line.options());
-    let mut all = Vec::new();
     let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.make(&engine, &work, plot.as_ref());
-        all.extend(pipeline.keep(&work, made).into_iter().flatten());
+        pipeline.keep(&work, made);
     }
-    let outcome = pipeline.finish();
-    if arguments.json {
-        listing::json(&all)?;
-    }
-    outcome
+    pipeline.finish()
 }
 
 impl Arguments {
@@ -203,7 +194,6 @@ impl Arguments {
     ) -> Result<(EvaluatedResult, Vec<ReductionReport>), Failure> {
         let started = Instant::now();
         let (name, clips, target) = (&*work.name, &*work.clips(), &work.target);
-        let loaded = &work.input.loaded;
         let name_of = |clip: &&Motion| match clips.len() {
             1 => name.to_owned(),
             _ => format!("{name} {}", names::clip(clip)),
@@ -217,16 +207,19 @@ impl Arguments {
         let all = self.smaller(engine, &names, all)?;
         let quantize = all.first().and_then(|pair| pair.1);
         let all: Vec<Reduced> = all.into_iter().map(|pair| pair.0).collect();
-        if let (Some(destination), [reduced]) = (plot, &*all) {
-            picture::draw(&names::file(work.path()), reduced, destination)?;
-        }
-        let written = self.write(engine, (name, clips), (&all, quantize), loaded, target)?;
+        let plotted = match (plot, &*all) {
+            (Some(destination), [reduced]) => {
+                let title = names::file(work.path());
+                Some(picture::draw(&title, reduced, destination)?)
+            }
+            _ => None,
+        };
+        let written = self.write(engine, work, (&all, quantize))?.with(plotted);
         let mut reports = Vec::new();
         let mut lines = Vec::new();
         for (reduced, input) in all.iter().zip(names) {
             let report = ReductionReport {
                 input,
-                output: target.to_string(),
                 keys_before: reduced.keys[0],
                 keys_after: reduced.keys[1],
                 samples: reduced.times.len(),
@@ -238,10 +231,20 @@ impl Arguments {
             reports.push(report);
         }
         let spent = words::duration(started.elapsed());
+        let mut sizes = work.sizes(&written);
+        if let Some(before) = work
+            .input
+            .file
+            .bytes()
+            .filter(|&before| before < written.bytes)
+        {
+            let more = words::bytes((written.bytes - before) as f64);
+            sizes += &format!(", {more} more than the input");
+        }
         let evaluated = EvaluatedResult {
             written,
             device: engine.device_name().to_owned(),
-            message: format!("{} in {spent} → {target}", lines.join("; ")),
+            message: format!("{} in {spent} → {target}{sizes}", lines.join("; ")),
         };
         Ok((evaluated, reports))
     }
@@ -356,11 +359,10 @@ impl Arguments {
     fn write(
         &self,
         engine: &Engine,
-        (name, clips): (&str, &[&Motion]),
+        work: &ClipWork,
         (reduced, quantize): (&[Reduced], Option<Quantization>),
-        loaded: &Loaded,
-        target: &ResultTarget,
     ) -> Result<WrittenFile, Failure> {
+        let (name, clips, target) = (&*work.name, work.clips(), &work.target);
         let format = target.format();
         let keys_per_channel = format.takes(FormatOption::AtKeys);
         let mut samples = Vec::new();
@@ -390,7 +392,7 @@ impl Arguments {
             .collect();
         let options = MotionOptions {
             sequence: self.sequence,
-            box_length: loaded.box_length,
+            box_length: work.input.loaded.box_length,
             quantize,
             meshopt: self.meshopt,
             ..target.motion_options()
@@ -401,7 +403,7 @@ impl Arguments {
             true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),
         };
-        let document = document_to_rewrite(name, loaded, target, otherwise);
+        let document = document_to_rewrite(work, otherwise);
         let indices = clips.iter().map(|clip| clip.index);
         target.write_clips(&sampled, indices, document, &options)
     }

@@ -2,7 +2,7 @@
 
 use tumble_formats::reduce::Reduced;
 
-use crate::batch::target::Destination;
+use crate::batch::target::{Destination, WrittenFile};
 use crate::commands::plot::draw;
 use crate::commands::plot::figure::{
     Figure, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,
@@ -18,7 +18,7 @@ pub(super) fn draw(
     title: &str,
     reduced: &Reduced,
     destination: &Destination,
-) -> Result<(), Failure> {
+) -> Result<WrittenFile, Failure> {
     let panels = [
         ("largest angle of all joints", "degrees", 1f64.to_degrees()),
         ("largest distance of all joints", "units", 1.0),
@@ -59,5 +59,5 @@ pub(super) fn draw(
         columns: 1,
         panels: panels.collect(),
     };
-    draw::write(&figure, destination)
+    draw::prepare(&figure, destination)
 }

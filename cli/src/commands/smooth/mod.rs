@@ -110,9 +110,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(&files)?;
+    let plan = arguments.results.plan(files)?;
     let plot = match &arguments.plot {
-        Some(file) => arguments.results.picture(file, &files, &plan)?,
+        Some(file) => arguments.results.picture(file, &plan)?,
         None => None,
     };
     check_sequence(
@@ -156,6 +156,7 @@ impl Arguments {
                 smoothed(device, name, clip, smoothing, rate)
             })
             .collect::<Result<Vec<_>, Failure>>()?;
+        let mut plotted = None;
         if let ([clip], [smoothed_clip], Some(destination)) = (&*clips, &*samples, plot) {
             let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
             let names: Vec<String> = names.collect();
@@ -172,16 +173,16 @@ impl Arguments {
                 before: &smoothed_clip.before,
                 after: &smoothed_clip.after,
             };
-            picture::draw(&subject, destination)?;
+            plotted = Some(picture::draw(&subject, destination)?);
         }
         let options = MotionOptions {
             sequence: self.sequence,
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        let document = document_to_rewrite(name, loaded, target, makes_new(&self.inputs));
+        let document = document_to_rewrite(work, makes_new(&self.inputs));
         let result = (target, options, document);
-        let written = write(name, &clips, &samples, result)?;
+        let written = write(work, &clips, &samples, result)?.with(plotted);
         let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
         let mut kernels: Vec<String> = kernels.collect();
         kernels.dedup();
@@ -236,11 +237,12 @@ fn smoothed(
 
 /// Writes the rotations of one clip that is nothing else, or clips as a motion file, as `tumble eval` does.
 fn write(
-    name: &str,
+    work: &ClipWork,
     clips: &[&Motion],
     samples: &[Smoothed],
     (target, options, document): (&ResultTarget, MotionOptions, Option<&dyn Document>),
 ) -> Result<WrittenFile, Failure> {
+    let name = &*work.name;
     let notes = [
         (
             "kernel",
@@ -257,7 +259,7 @@ fn write(
             let name = format.name.to_uppercase();
             let message = format!("{name} cannot store this, left out: the translations");
             let left_out = Diagnostic::new(target.to_string(), Code::NoRoom, message);
-            words::note(&left_out.to_string());
+            work.warn(left_out);
         }
         let tracks = clip.set.track_count();
         let timeline = SampleTimes::at(after.times.clone())

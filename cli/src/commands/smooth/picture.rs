@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble_formats::sample::Samples;
 
-use crate::batch::target::Destination;
+use crate::batch::target::{Destination, WrittenFile};
 use crate::commands::plot::draw;
 use crate::commands::plot::figure::{
     Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,
@@ -33,8 +33,8 @@ pub(super) struct SmoothingSubject<'a> {
 pub(super) fn draw(
     subject: &SmoothingSubject<'_>,
     destination: &Destination,
-) -> Result<(), Failure> {
-    draw::write(&figure(subject), destination)
+) -> Result<WrittenFile, Failure> {
+    draw::prepare(&figure(subject), destination)
 }
 
 fn figure(subject: &SmoothingSubject<'_>) -> Figure {

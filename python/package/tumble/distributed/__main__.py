@@ -120,6 +120,12 @@ def _check_all(out: str) -> int:
     if checked.faults:
         _say(f"error: {len(checked.faults)} of {checked.results} results differ; --resume makes them again")
         return DIFFERENCE
+    if checked.unfinished:
+        _say(
+            f"error: {len(checked.unfinished)} inputs failed or have no result yet (the first: "
+            f"{checked.unfinished[0]}); --resume makes them again"
+        )
+        return DIFFERENCE
     print(f"{checked.results} results, unchanged since they were written")
     if checked.shards is None:
         return 0

@@ -22,6 +22,8 @@ class Checked:
     results: int
     faults: list[str]
     """What differs, and how."""
+    unfinished: list[str]
+    """Inputs that failed or have no result yet, a line each."""
     shards: tuple[int, int] | None
     """Where they are not merged: how many are done, of how many."""
 
@@ -51,7 +53,8 @@ def check(out: str) -> Checked:
     with ThreadPoolExecutor(_AT_ONCE) as threads:
         found = threads.map(lambda result: _fault(results, *result), listed.items())
         faults = [fault for fault in found if fault is not None]
-    return Checked(len(listed), faults, shards)
+    unfinished = _tumble.manifest_unfinished(manifest or "")
+    return Checked(len(listed), faults, unfinished, shards)
 
 
 def _fault(results: Store, name: str, sha256: str) -> str | None:

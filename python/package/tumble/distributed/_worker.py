@@ -8,6 +8,7 @@ import importlib
 import json
 import os
 import platform
+import posixpath
 import subprocess
 import tempfile
 import time
@@ -108,8 +109,19 @@ def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
             # What is not there, or not ours to read, the evaluation says of its input.
             with contextlib.suppress(FileNotFoundError, PermissionError):
                 source.fetch(below, target)
+                _fetch_referred(source, below, target)
         with _in(folder):
             yield inputs
+
+
+def _fetch_referred(source: Any, below: str, target: str) -> None:
+    """The files that an input refers to, such as the buffers of a glTF, are objects too."""
+    for name in _tumble.referred_files(target):
+        path = os.path.join(os.path.dirname(target), name)
+        if not os.path.exists(path):
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with contextlib.suppress(FileNotFoundError, PermissionError):
+                source.fetch(posixpath.join(posixpath.dirname(below), name), path)
 
 
 @contextlib.contextmanager
@@ -214,7 +226,7 @@ def _hash(path: str) -> str | None:
 
 def _hash_of_all(inputs: list[tuple[str, str]]) -> str:
     """Of the hashes of a shard's inputs, in their order."""
-    hashes = "".join(f"{_hash(path)}\n" for path, _ in inputs)
+    hashes = "".join(f"{_tumble.input_sha256(path)}\n" for path, _ in inputs)
     return hashlib.sha256(hashes.encode()).hexdigest()
 
 
@@ -232,7 +244,7 @@ def _done(
     text = read_text(out, file_name)
     if text is None:
         merged = _manifest(job.out, out.size("manifest.jsonl"))
-        lines = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
+        lines = [line for key in _keys(worker, job, task, inputs) for line in merged.get(key, [])]
         record = _tumble.Record(task.shard, job.shards, job.plan, len(inputs), lines)
     else:
         recorded = _tumble.Record.parse(text)
@@ -245,8 +257,8 @@ def _done(
         hashes = {_parquet.name_of(task.shard): _hash_of_all(inputs)}
     else:
         hashes = {
-            key: _hash(path) or ""
-            for key, (path, _) in zip(_keys(job, task, inputs), inputs, strict=True)
+            key: _tumble.input_sha256(path) or ""
+            for key, (path, _) in zip(_keys(worker, job, task, inputs), inputs, strict=True)
         }
     is_done = record.is_made_from(hashes, options) and all(
         out.size(name) == length for name, _, length in record.results()
@@ -265,11 +277,13 @@ def _done(
     }
 
 
-def _keys(job: Job, task: Task, inputs: list[tuple[str, str]]) -> list[str]:
+def _keys(
+    worker: _tumble.Worker, job: Job, task: Task, inputs: list[tuple[str, str]]
+) -> list[str]:
     """What the results of inputs are known by, without the ending, which is the format's."""
     if job.into == "parquet":
         return [_parquet.name_of(task.shard)]
-    return [os.path.splitext(below)[0] for _, below in inputs]
+    return [worker.key_of(below) for _, below in inputs]
 
 
 def _manifest(location: str, size: int | None) -> dict[str, list[str]]:
