@@ -1614,18 +1614,20 @@ TumbleResult tumble_crowd_library_new(const int32_t *parents,
 /*
  Adds a clip to a library.
 
- `set` has one track for each joint, in the same order. Rotations are interpolated by `interpolation`, or by the
- defaults if it is null. Translations and scales are interpolated by the method `vectors`: "step", "linear",
- "catmull-rom", "bessel-overhauser", "gltf-cubic", "c2" or "b-spline"; null: "linear". Joints without translations
- stay at their offsets. `before` and `after` of `interpolation` are ignored, because each layer of an instance has
- its wrap mode. The reference pose of the clip, for additive layers, is its pose at its start
+ `set` has one track for each joint, of the same name, in any order. The joints have the names of the file of
+ `tumble_crowd_library_of_file`, else those of the first set, whose tracks are then in the order of the joints. Sets
+ without names are matched by index. Rotations are interpolated by `interpolation`, or by the defaults if it is
+ null. Translations and scales are interpolated by the method `vectors`: "step", "linear", "catmull-rom",
+ "bessel-overhauser", "gltf-cubic", "c2" or "b-spline"; null: "linear". Joints without translations stay at their
+ offsets. `before` and `after` of `interpolation` are ignored, because each layer of an instance has its wrap mode.
+ The reference pose of the clip, for additive layers, is its pose at its start
  (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track cannot be interpolated as
- requested, the quantity is not the rotation, a curve rotates so fast that no polynomial fits it, the clip is too
- long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown. After any error the library
- is unchanged.
+ `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+ track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+ polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is
+ unknown. After any error the library is unchanged.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1753,7 +1755,7 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
 
 /*
  Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
- `tumble_crowd_library_of_file`.
+ `tumble_crowd_library_of_file`. A joint has the same parent in the clip as in the library.
 
  Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
  `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
