@@ -268,7 +268,7 @@ def test_source_fps_is_for_files_that_state_no_rate(tmp_path):
     with pytest.warns(tumble.InputWarning, match="says 30 frames a second, which is used"):
         library = tumble.MotionLibrary.load([stated, silent], source_fps=120)
     assert library.lengths.tolist() == [1.0, 0.25]
-    with pytest.warns(tumble.InputWarning, match="--override-fps it is read at 120"):
+    with pytest.warns(tumble.InputWarning, match="override_fps it is read at 120"):
         library = tumble.MotionLibrary.load([stated, silent], override_fps=120)
     assert library.lengths.tolist() == [0.25, 0.25]
 
