@@ -42,12 +42,6 @@ impl NodeTimes {
         let channels = [&self.translation, &self.rotation, &self.scale];
         channels.iter().all(|times| times.list.is_empty())
     }
-
-    /// Whether no curve has more than one key.
-    pub(super) fn is_pose(&self) -> bool {
-        let channels = [&self.translation, &self.rotation, &self.scale];
-        channels.iter().all(|times| times.list.len() <= 1)
-    }
 }
 
 /// The properties of the first layer that determine a node's transform.
@@ -67,6 +61,8 @@ pub(super) struct Takes {
     pub(super) span: [f64; 2],
     /// By index of the node.
     pub(super) nodes: HashMap<usize, NodeTimes>,
+    /// Whether a node has a curve, also one of a single key, which has no times.
+    pub(super) has_curves: bool,
     pub(super) properties: HashMap<usize, Properties>,
     /// Number of keys outside the span.
     pub(super) outside: usize,
@@ -126,6 +122,7 @@ impl Takes {
                 };
                 let mut times = ChannelTimes::default();
                 for curve in curves() {
+                    takes.has_curves = true;
                     takes.outside +=
                         times.add(curve, takes.span, part == TransformPart::Rotation, budget)?;
                 }
