@@ -535,16 +535,11 @@ impl FbxReader<'_> {
             });
         }
         if takes.nodes.values().all(NodeTimes::is_empty) {
-            warnings.warn(Code::FbxRests, || {
-                (inside(), "the stack moves no node; nothing moves")
-            });
-        } else if takes.nodes.values().all(NodeTimes::is_pose) {
-            warnings.warn(Code::FbxRests, || {
-                (
-                    inside(),
-                    "the stack is a pose: each of its curves has one key; nothing moves",
-                )
-            });
+            let message = match takes.has_curves {
+                true => "the stack is a pose: each of its curves has one key; nothing moves",
+                false => "the stack moves no node; nothing moves",
+            };
+            warnings.warn(Code::FbxRests, || (inside(), message));
         }
     }
 

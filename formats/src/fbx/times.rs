@@ -44,12 +44,6 @@ impl NodeTimes {
         let channels = [&self.translation, &self.rotation, &self.scale];
         channels.iter().all(|times| times.list.is_empty())
     }
-
-    /// Whether no curve has more than one key.
-    pub(super) fn is_pose(&self) -> bool {
-        let channels = [&self.translation, &self.rotation, &self.scale];
-        channels.iter().all(|times| times.list.len() <= 1)
-    }
 }
 
 /// The properties of the first layer that determine a node's transform.
@@ -69,6 +63,8 @@ pub(super) struct Takes {
     pub(super) span: [f64; 2],
     /// By index of the node.
     pub(super) nodes: HashMap<usize, NodeTimes>,
+    /// Whether a node has a curve, also one of a single key, which has no times.
+    pub(super) has_curves: bool,
     pub(super) properties: HashMap<usize, Properties>,
     /// Number of keys outside the span.
     pub(super) outside: usize,
@@ -140,6 +136,7 @@ impl Takes {
                 for curve in curves() {
                     let names = (&*property.prop_name, &*property.element.name);
                     takes.note_keys(curve, names, budget)?;
+                    takes.has_curves = true;
                     takes.outside +=
                         times.add(curve, takes.span, part == TransformPart::Rotation, budget)?;
                 }

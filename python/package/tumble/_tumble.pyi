@@ -333,7 +333,7 @@ class Engine:
         memory: int | None = None,
         threads: int | None = None,
         allow_inexact: bool = False,
-        cache: str | os.PathLike[str] | None = None,
+        cache: _Path | None = None,
     ) -> Engine: ...
     @property
     def device(self) -> str: ...
