@@ -17,6 +17,9 @@ pub(crate) struct Decimal(i128);
 /// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
 pub(crate) const OFFSET_LIMIT: u64 = 1_000_000;
 
+/// Integers above this are not seconds: it is the year 5138 as a Unix time.
+pub(crate) const MAX_SECONDS: u64 = 100_000_000_000;
+
 /// The whole second from which times count whose first one has the whole second `first`.
 pub(crate) fn offset_of(first: i64) -> i64 {
     match first.unsigned_abs() < OFFSET_LIMIT {

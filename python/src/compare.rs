@@ -14,11 +14,12 @@ use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::options::{SampleRequest, option_named, samples_of};
-use crate::run::interruptible;
+use crate::run::{interruptible, work};
+use crate::values::{Pickled, pickled, value};
 
 /// What many differences come to.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spread {
     /// The mean.
     mean: f64,
@@ -27,6 +28,8 @@ pub(crate) struct Spread {
     /// The largest.
     largest: f64,
 }
+
+value!(Spread { mean, rms, largest });
 
 impl From<differences::Spread> for Spread {
     fn from(of: differences::Spread) -> Self {
@@ -40,6 +43,11 @@ impl From<differences::Spread> for Spread {
 
 #[pymethods]
 impl Spread {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self { mean, rms, largest } = self;
         format!("Spread(mean {mean:.3e}, rms {rms:.3e}, largest {largest:.3e})")
@@ -47,7 +55,8 @@ impl Spread {
 }
 
 /// How far two arrays of one shape are apart.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ArrayDifference {
     /// How many numbers there are.
     numbers: usize,
@@ -63,8 +72,22 @@ pub(crate) struct ArrayDifference {
     largest_rotation_at: Option<Vec<usize>>,
 }
 
+value!(ArrayDifference {
+    numbers,
+    differing,
+    difference,
+    largest_at,
+    rotation,
+    largest_rotation_at,
+});
+
 #[pymethods]
 impl ArrayDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self {
             numbers, differing, ..
@@ -74,8 +97,8 @@ impl ArrayDifference {
 }
 
 /// The differences of a channel of two clips.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelDifference {
     /// The mean.
     mean: f64,
@@ -88,6 +111,14 @@ pub(crate) struct ChannelDifference {
     /// When it is, seconds.
     time: f64,
 }
+
+value!(ChannelDifference {
+    mean,
+    rms,
+    largest,
+    track,
+    time,
+});
 
 impl From<differences::ChannelDifference> for ChannelDifference {
     fn from(of: differences::ChannelDifference) -> Self {
@@ -103,6 +134,11 @@ impl From<differences::ChannelDifference> for ChannelDifference {
 
 #[pymethods]
 impl ChannelDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self {
             mean,
@@ -118,7 +154,8 @@ impl ChannelDifference {
 }
 
 /// How far two clips are apart.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ClipDifference {
     /// How many tracks both have.
     tracks: usize,
@@ -138,8 +175,24 @@ pub(crate) struct ClipDifference {
     scale: Option<ChannelDifference>,
 }
 
+value!(ClipDifference {
+    tracks,
+    missing,
+    samples,
+    span,
+    identical,
+    rotation,
+    translation,
+    scale,
+});
+
 #[pymethods]
 impl ClipDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "ClipDifference({} tracks, {} samples, largest angle {:.3e}°)",
@@ -149,8 +202,8 @@ impl ClipDifference {
 }
 
 /// What errors of one kind come to, by the names of `evo`.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathStatistics {
     /// The root of the mean square.
     rmse: f64,
@@ -165,6 +218,15 @@ pub(crate) struct PathStatistics {
     /// The largest.
     max: f64,
 }
+
+value!(PathStatistics {
+    rmse,
+    mean,
+    median,
+    std,
+    min,
+    max,
+});
 
 impl From<differences::PathStatistics> for PathStatistics {
     fn from(of: differences::PathStatistics) -> Self {
@@ -181,6 +243,11 @@ impl From<differences::PathStatistics> for PathStatistics {
 
 #[pymethods]
 impl PathStatistics {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "PathStatistics(rmse {:.6}, mean {:.6}, max {:.6})",
@@ -190,7 +257,8 @@ impl PathStatistics {
 }
 
 /// How far an estimated path is from its reference.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathErrors {
     /// Poses of the reference that have one of the estimate.
     poses: usize,
@@ -218,8 +286,28 @@ pub(crate) struct PathErrors {
     rpe_count: usize,
 }
 
+value!(PathErrors {
+    poses,
+    outside,
+    in_gaps,
+    span,
+    scale,
+    rotation,
+    translation,
+    ape_translation,
+    ape_rotation,
+    rpe_translation,
+    rpe_rotation,
+    rpe_count,
+});
+
 #[pymethods]
 impl PathErrors {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "PathErrors({} poses, rmse {:.6}, {:.6}°)",
@@ -278,7 +366,7 @@ pub(crate) fn compare<'py>(
                 "arrays are compared number by number; leave out times and `world`",
             ));
         }
-        let found = of_arrays([first, second])?;
+        let found = of_arrays(py, [first, second])?;
         return Ok(Bound::new(py, found)?.into_any());
     };
     let samples = match has_times {
@@ -288,9 +376,7 @@ pub(crate) fn compare<'py>(
     let clips = [one, other].map(|clip| Arc::clone(&clip.get().motion));
     let engine = engine_of(py, engine)?;
     let (found, warning) = interruptible(py, move || of_clips(&engine, clips, samples, world))?;
-    if let Some(warning) = warning {
-        warn_of(py, &warning)?;
-    }
+    warn_of(py, warning.as_slice())?;
     Ok(Bound::new(py, found)?.into_any())
 }
 
@@ -301,14 +387,16 @@ fn engine_of(py: Python<'_>, engine: Option<&Bound<'_, Engine>>) -> PyResult<tum
     }
 }
 
-fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
+fn of_arrays(py: Python<'_>, arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
     let read = |value: &Bound<'_, PyAny>, name: &str| {
         let ArrayValues { shape, values } = doubles(value, name)?;
         Ok::<_, PyErr>(npz::NumberArray { shape, values })
     };
     let [first, second] = [read(arrays[0], "first")?, read(arrays[1], "second")?];
-    let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
-    let found = found.map_err(of_compare)?;
+    let found = work(py, first.values.len(), move || {
+        let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
+        found.map_err(of_compare)
+    })?;
     Ok(ArrayDifference {
         numbers: found.numbers,
         differing: found.differing,

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::{ComponentType, Skeleton, WrapMode};
 
-use crate::arrays::{ArrayValues, doubles};
+use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input};
@@ -50,7 +50,7 @@ const MANY: usize = 1 << 20;
 /// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
 /// >>> crowd.evaluate().shape
 /// (3, 1, 3, 4)
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Crowd {
     crowd: Mutex<tumble::crowd::Crowd>,
     instances: usize,
@@ -100,25 +100,26 @@ impl Crowd {
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         py: Python<'_>,
-        clips: Vec<Clip>,
+        clips: ListArgument<Clip>,
         instances: usize,
         layers: usize,
         method: &str,
-        parents: Option<Vec<Option<i64>>>,
+        parents: Option<ListArgument<Option<i64>>>,
         offsets: Option<&Bound<'_, PyAny>>,
-        masks: Option<Vec<Vec<f32>>>,
+        masks: Option<ListArgument<ListArgument<f32>>>,
         inverse_bind: Option<&Bound<'_, PyAny>>,
         references: Option<&Bound<'_, PyDict>>,
         ticks_per_second: u32,
         engine: Option<&Bound<'_, Engine>>,
     ) -> PyResult<Self> {
+        let clips = clips.0;
         let Some(first) = clips.first() else {
             return Err(input("clips: give at least one"));
         };
         let method = method_named(method)?;
         let joints = first.motion.set.track_count();
         let skeleton = match parents {
-            Some(parents) => crate::samples::skeleton(&parents, offsets, joints)?,
+            Some(parents) => crate::samples::skeleton(&parents.0, offsets, joints)?,
             None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
             None if first.motion.skeleton.is_empty() => {
                 return Err(input(
@@ -152,9 +153,9 @@ impl Crowd {
                 for (index, clip) in clips.iter().enumerate() {
                     push(&mut library, index, clip, method)?;
                 }
-                for (index, mask) in masks.iter().flatten().enumerate() {
+                for (index, mask) in masks.iter().flat_map(|masks| &masks.0).enumerate() {
                     library
-                        .push_mask(mask)
+                        .push_mask(&mask.0)
                         .map_err(|error| input(format!("masks[{index}]: {error}")))?;
                 }
                 if let Some(matrices) = &inverse_bind {

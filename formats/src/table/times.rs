@@ -1,8 +1,9 @@
 //! Converts a column of times to seconds.
 
-use crate::decimal::{OFFSET_LIMIT, offset_of};
+use crate::decimal::{MAX_SECONDS, offset_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
+use crate::motion::clock_second;
 use crate::rate::Precision;
 use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
 use crate::table::plan::TablePlan;
@@ -15,9 +16,6 @@ pub(crate) struct RowTimes {
     /// The whole second from which they count.
     pub(crate) offset: i64,
 }
-
-/// Integers above this are not seconds: it is the year 5138 as a Unix time.
-const MAX_SECONDS: u64 = 100_000_000_000;
 
 /// The times of a table's rows.
 ///
@@ -99,25 +97,20 @@ pub(crate) fn times(
 /// Times in f64. Those that begin at a large distance from 0 were rounded there: 1.7e9 s to a quarter of a
 /// microsecond.
 fn doubles(mut seconds: Vec<f64>) -> RowTimes {
-    let first = seconds
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min)
-        .floor();
-    let needs_offset = first.abs() >= OFFSET_LIMIT as f64 && first.abs() <= MAX_SECONDS as f64;
-    if !needs_offset {
+    let offset = clock_second(&seconds);
+    if offset == 0 {
         return RowTimes {
             seconds,
             precision: Some(Precision::F64),
-            offset: 0,
+            offset,
         };
     }
-    let step = Precision::F64.ulp(first);
-    seconds.iter_mut().for_each(|time| *time -= first);
+    let step = Precision::F64.ulp(offset as f64);
+    seconds.iter_mut().for_each(|time| *time -= offset as f64);
     RowTimes {
         seconds,
         precision: Some(Precision::Decimals(-libm::log10(step).ceil() as u32)),
-        offset: first as i64,
+        offset,
     }
 }
 

@@ -1,7 +1,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, Literal, Protocol, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -42,6 +42,7 @@ __all__ = [
     "inputs_of",
     "kernels_sha256",
     "load",
+    "load_all",
     "load_drivers",
     "manifest_by_input",
     "manifest_results",
@@ -54,6 +55,7 @@ __all__ = [
     "run",
     "save",
     "set_probe",
+    "value_of_state",
     "walk",
 ]
 __version__: str
@@ -144,6 +146,7 @@ class Clip:
         keys: _Keys,
         *,
         order: _Order = "xyzw",
+        layout: _Layout | None = None,
         name: str | None = None,
         names: Sequence[str] | None = None,
         parents: Sequence[int | None] | None = None,
@@ -904,6 +907,8 @@ class Chunks:
 
 @final
 class Chunk:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def tracks(self) -> slice[int, int, None]: ...
     @property
@@ -913,6 +918,8 @@ class Chunk:
 
 @final
 class Verification:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def method(self) -> str: ...
     @property
@@ -936,6 +943,8 @@ class Verification:
 
 @final
 class File:
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     @property
     def clips(self) -> list[Clip]: ...
     @property
@@ -1101,10 +1110,12 @@ def save(
     bias: float | None = None,
 ) -> None: ...
 def devices() -> list[str]: ...
+def load_all(paths: Sequence[_Path], source_fps: _Rate | None = None) -> list[File]: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
     path: _Path, clips: Sequence[Clip], refused: Sequence[str]
 ) -> File: ...
+def value_of_state(name: str, state: tuple[Any, ...]) -> Any: ...
 @final
 class Motions:
     @staticmethod
@@ -1216,6 +1227,8 @@ def merge(folder: str) -> tuple[int, str]: ...
 
 @final
 class Spread:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def mean(self) -> float: ...
     @property
@@ -1225,6 +1238,8 @@ class Spread:
 
 @final
 class ArrayDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def numbers(self) -> int: ...
     @property
@@ -1240,6 +1255,8 @@ class ArrayDifference:
 
 @final
 class ChannelDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def mean(self) -> float: ...
     @property
@@ -1253,6 +1270,8 @@ class ChannelDifference:
 
 @final
 class ClipDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def tracks(self) -> int: ...
     @property
@@ -1272,6 +1291,8 @@ class ClipDifference:
 
 @final
 class PathStatistics:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def rmse(self) -> float: ...
     @property
@@ -1287,6 +1308,8 @@ class PathStatistics:
 
 @final
 class PathErrors:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def poses(self) -> int: ...
     @property
@@ -1349,6 +1372,8 @@ def path_errors(
 
 @final
 class Reduction:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def clip(self) -> Clip: ...
     @property
@@ -1455,6 +1480,8 @@ class Crowd:
 
 @final
 class Surface:
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     def __new__(
         cls, vertices: ArrayLike, faces: ArrayLike, *, weld: float = 0.0
     ) -> Surface: ...
@@ -1487,6 +1514,8 @@ class Surface:
 
 @final
 class Route:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def points(self) -> _Double: ...
     @property
@@ -1498,6 +1527,8 @@ class Route:
 
 @final
 class Walk:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def times(self) -> _Double: ...
     @property
