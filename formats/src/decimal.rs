@@ -16,7 +16,7 @@ pub(crate) struct Decimal(i128);
 
 /// If the first time is at least this many seconds from 0, times count from its whole second: the step of an f64 of
 /// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
-pub(crate) const OFFSET_LIMIT: u64 = 1_000_000;
+const OFFSET_LIMIT: u64 = 1_000_000;
 
 /// The whole second from which times count whose first one has the whole second `first`.
 pub(crate) fn offset_of(first: i64) -> i64 {

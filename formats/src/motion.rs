@@ -11,7 +11,8 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
-use crate::decimal::{Decimal, is_clock};
+use crate::decimal::{Decimal, is_clock, offset_of};
+use crate::format::LARGEST_SECONDS;
 use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
@@ -47,6 +48,17 @@ pub struct Motion {
     pub bvh: Vec<BvhJoint>,
     /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
+}
+
+/// The whole second from which times in f64 count, the [`time_offset`](Motion::time_offset) of a clip with them: 0 for
+/// most times, and the second at or before the first one where a clock counts from 1970.
+#[must_use]
+pub fn clock_second<'a>(times: impl IntoIterator<Item = &'a f64>) -> i64 {
+    let first = times.into_iter().copied().fold(f64::INFINITY, f64::min);
+    match first.abs() <= LARGEST_SECONDS {
+        true => offset_of(first.floor() as i64),
+        false => 0,
+    }
 }
 
 impl Motion {

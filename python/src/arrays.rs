@@ -8,14 +8,15 @@ use numpy::{
     PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyFloat, PyInt, PyList, PyTuple};
+use pyo3::types::{PyFloat, PyInt, PyList, PyString, PyTuple};
 use tumble_formats::quaternion::{ComponentOrder, nearest_unit};
 
-use crate::errors::input;
+use crate::errors::{expected, has_attribute, input};
 use crate::options::{SampleRequest, option_named};
 
 /// The order of a quaternion's components.
@@ -117,6 +118,7 @@ fn array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Array<'py>> {
             untyped.dtype()
         )));
     }
+    check_room::<f64>(untyped.len(), label)?;
     let converted = untyped.call_method1(intern!(value.py(), "astype"), ("float64",))?;
     borrowed(&converted)?.ok_or_else(|| input(format!("{label}: it is not an array of numbers")))
 }
@@ -157,21 +159,24 @@ fn in_order<'a, T: numpy::Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Opti
 pub(crate) fn doubles(value: &Bound<'_, PyAny>, label: &str) -> PyResult<ArrayValues<f64>> {
     let array = array(value, label)?;
     let shape = array.shape().to_vec();
-    let values = match &array {
-        Array::Single(array) => array.as_array().iter().map(|&it| f64::from(it)).collect(),
+    let mut values = room(shape.iter().product(), label)?;
+    match &array {
+        Array::Single(array) => values.extend(array.as_array().iter().map(|&it| f64::from(it))),
         Array::Double(array) => match in_order(array) {
-            Some(slice) => slice.to_vec(),
-            None => array.as_array().iter().copied().collect(),
+            Some(slice) => values.extend_from_slice(slice),
+            None => values.extend(array.as_array().iter()),
         },
-    };
+    }
     Ok(ArrayValues { shape, values })
 }
 
 /// One finite number.
 pub(crate) fn number(value: &Bound<'_, PyAny>, label: &str, unit: &str) -> PyResult<f64> {
-    let number: f64 = value
-        .extract()
-        .map_err(|_| PyTypeError::new_err(format!("{label}: give {unit}, as a number")))?;
+    let number: f64 = value.extract().map_err(|error| {
+        expected(value.py(), error, || {
+            format!("{label}: give {unit}, as a number")
+        })
+    })?;
     match number.is_finite() {
         true => Ok(number),
         false => Err(input(format!("{label}: {number} is not finite"))),
@@ -204,23 +209,79 @@ fn components(value: &Bound<'_, PyAny>, order: Order, label: &str) -> PyResult<A
     }
     let single = |of: [f32; 4]| Quat::from_array(order.xyzw(of));
     let double = |of: [f64; 4]| unit(DQuat::from_array(order.xyzw(of)));
-    let values = match &array {
+    let mut values = room(shape.iter().product(), label)?;
+    match &array {
         Array::Single(array) => match in_order(array) {
-            Some(slice) => slice.as_chunks().0.iter().copied().map(single).collect(),
-            None => fours(array.as_array().iter().copied(), single),
+            Some(slice) => values.extend(slice.as_chunks().0.iter().copied().map(single)),
+            None => values.extend(fours(array.as_array().iter().copied(), single)),
         },
-        Array::Double(array) => fours(array.as_array().iter().copied(), double),
-    };
+        Array::Double(array) => values.extend(fours(array.as_array().iter().copied(), double)),
+    }
     Ok(ArrayValues { shape, values })
 }
 
 fn fours<T: Copy + Default>(
     mut numbers: impl ExactSizeIterator<Item = T>,
     make: impl Fn([T; 4]) -> Quat,
-) -> Vec<Quat> {
+) -> impl Iterator<Item = Quat> {
     let count = numbers.len() / 4;
-    let next = |_| make([(); 4].map(|()| numbers.next().unwrap_or_default()));
-    (0..count).map(next).collect()
+    let next = move |_| make([(); 4].map(|()| numbers.next().unwrap_or_default()));
+    (0..count).map(next)
+}
+
+/// From so many bytes on it is asked whether the system has them: it may promise more.
+const LARGE: usize = 1 << 28;
+
+/// Room for so many values of an argument. An array may be larger than memory: the elements of one that was broadcast
+/// share theirs.
+fn room<T>(count: usize, label: &str) -> PyResult<Vec<T>> {
+    check_room::<T>(count, label)?;
+    let mut values = Vec::new();
+    match values.try_reserve_exact(count) {
+        Ok(()) => Ok(values),
+        Err(_) => Err(no_room::<T>(count, label)),
+    }
+}
+
+/// Refuses more values than the system has memory for.
+fn check_room<T>(count: usize, label: &str) -> PyResult<()> {
+    let bytes = count.saturating_mul(size_of::<T>());
+    let is_small = bytes < LARGE;
+    match is_small || tumble::available_memory().is_none_or(|there| bytes as u64 <= there) {
+        true => Ok(()),
+        false => Err(no_room::<T>(count, label)),
+    }
+}
+
+fn no_room<T>(count: usize, label: &str) -> PyErr {
+    let bytes = count as u128 * size_of::<T>() as u128;
+    PyMemoryError::new_err(format!(
+        "{label}: {count} values take {bytes} bytes, and there is less memory"
+    ))
+}
+
+/// A list that is an argument, of any kind of sequence.
+pub(crate) struct ListArgument<T>(pub(crate) Vec<T>);
+
+/// After so many elements Ctrl-C is looked for: taking them may call no Python code.
+const ELEMENTS: usize = 1 << 16;
+
+impl<'py, T: FromPyObjectOwned<'py>> FromPyObject<'_, 'py> for ListArgument<T> {
+    type Error = PyErr;
+
+    fn extract(list: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if list.is_instance_of::<PyString>() {
+            return Err(PyTypeError::new_err("a text is no list"));
+        }
+        let mut values = room(list.len()?, "a list")?;
+        for (index, value) in list.try_iter()?.enumerate() {
+            if index % ELEMENTS == ELEMENTS - 1 {
+                list.py().check_signals()?;
+            }
+            values.push(value?.extract().map_err(Into::into)?);
+        }
+        Ok(Self(values))
+    }
 }
 
 /// Rounded to f32, normalised before where that is a matter of rounding; what is not a rotation is
@@ -234,26 +295,36 @@ fn unit(key: DQuat) -> Quat {
 }
 
 /// The parts of a list or tuple whose parts are arrays or lists themselves.
-pub(crate) fn parts<'py>(value: &Bound<'py, PyAny>) -> Option<Vec<Bound<'py, PyAny>>> {
+pub(crate) fn parts<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<Vec<Bound<'py, PyAny>>>> {
     let parts: Vec<Bound<'py, PyAny>> = if let Ok(list) = value.cast::<PyList>() {
         list.iter().collect()
+    } else if let Ok(tuple) = value.cast::<PyTuple>() {
+        tuple.iter().collect()
     } else {
-        value.cast::<PyTuple>().ok()?.iter().collect()
+        return Ok(None);
     };
-    let is_number = |part: &Bound<'_, PyAny>| {
-        part.is_instance_of::<PyFloat>()
-            || part.is_instance_of::<PyInt>()
-            || part
-                .getattr("ndim")
-                .is_ok_and(|axes| axes.eq(0).unwrap_or(false))
+    let Some(first) = parts.first() else {
+        return Ok(None);
     };
-    let first = parts.first()?;
-    (!is_number(first)).then_some(parts)
+    let is_number = first.is_instance_of::<PyFloat>()
+        || first.is_instance_of::<PyInt>()
+        || has_attribute(first, "ndim")? && first.getattr("ndim")?.eq(0)?;
+    Ok((!is_number).then_some(parts))
+}
+
+/// Whether some parts of a list are arrays.
+pub(crate) fn has_arrays(parts: &[Bound<'_, PyAny>]) -> PyResult<bool> {
+    for part in parts {
+        if has_attribute(part, "shape")? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The times of `at`.
 pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleRequest> {
-    if let Some(parts) = parts(value) {
+    if let Some(parts) = parts(value)? {
         let mut lists = Vec::with_capacity(parts.len());
         for part in &parts {
             let ArrayValues { shape, values } = doubles(part, "at")?;

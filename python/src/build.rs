@@ -2,11 +2,12 @@
 
 use glam::{DVec3, Quat, Vec3};
 use pyo3::prelude::*;
-use tumble::{Tcb, TrackError, TrackSet};
-use tumble_formats::motion::{Joint, Motion, Transform, circle};
+use tumble::{Layout, Tcb, TrackError, TrackSet};
+use tumble_formats::motion::{Joint, Motion, Transform, circle, clock_second};
 
-use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
-use crate::errors::{input, of_track};
+use crate::arrays::{ArrayValues, Order, doubles, has_arrays, parts, quaternions};
+use crate::errors::{input, of_track, of_track_since, warn_of};
+use crate::output::shown;
 
 /// Key times: one list for all tracks, or one for each.
 enum Times {
@@ -16,7 +17,7 @@ enum Times {
 
 impl Times {
     fn new(value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Some(parts) = parts(value) {
+        if let Some(parts) = parts(value)? {
             let list = |part| match doubles(part, "times")? {
                 ArrayValues { shape, values } if shape.len() == 1 => Ok(values),
                 ArrayValues { shape, .. } => Err(input(format!(
@@ -45,55 +46,123 @@ impl Times {
     }
 }
 
-/// A clip of these keys, and whether they are one track's alone.
-pub(crate) fn clip_of(
-    times: &Bound<'_, PyAny>,
-    keys: &Bound<'_, PyAny>,
-    order: Order,
-    names: Option<&[String]>,
-) -> PyResult<(Motion, bool)> {
-    let times = Times::new(times)?;
-    let (tracks, is_one) = tracks_of(keys, order)?;
-    let count = tracks.len();
-    if let Some(names) = names
-        && names.len() != count
-    {
-        return Err(input(format!(
-            "names: there are {} for {count} tracks",
-            names.len()
-        )));
-    }
-    if let Times::Each(each) = &times
-        && each.len() != count
-    {
-        return Err(input(format!(
-            "times: there are lists for {} tracks, and keys for {count}",
-            each.len()
-        )));
-    }
-    let set = match (times, names) {
-        (Times::Shared(times), None) if tracks.are_alike(times.len()) => {
-            TrackSet::from_shared_times(times, tracks.keys).map_err(|error| of_track(&error))?
+/// How a call is told which axis of its keys is that of the tracks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum KeysLayout {
+    /// By its argument `layout`, which may have been left out. Names of tracks speak for the order of the
+    /// documentation, which is then assumed with a warning.
+    Argument {
+        layout: Option<Layout>,
+        has_names: bool,
+    },
+    /// Not at all, as its `layout` is that of the result: by making a clip first.
+    OfClip,
+}
+
+impl KeysLayout {
+    fn said(self) -> Option<Layout> {
+        match self {
+            Self::Argument { layout, .. } => layout,
+            Self::OfClip => None,
         }
-        (times, names) => {
-            let mut set = TrackSet::new();
-            for track in 0..count {
-                let times = match &times {
-                    Times::Shared(times) => times,
-                    Times::Each(each) => &each[track],
-                };
-                let name = names.map_or("", |names| &names[track]);
-                set.push(name, times, tracks.of(track))
-                    .map_err(|error| of_track(&error))?;
+    }
+
+    /// What to write for a layout.
+    fn spelling(self, layout: Layout) -> String {
+        let layout = format!("layout=\"{}\"", layout.name());
+        match self {
+            Self::Argument { .. } => layout,
+            Self::OfClip => format!("Clip(times, keys, {layout}).evaluate(…)"),
+        }
+    }
+}
+
+/// The keys of a clip as they were given.
+pub(crate) struct ClipKeys {
+    times: Times,
+    tracks: Tracks,
+    /// The keys are one track's alone.
+    pub(crate) is_one: bool,
+}
+
+impl ClipKeys {
+    /// Reads times and keys.
+    pub(crate) fn new(
+        times: &Bound<'_, PyAny>,
+        keys: &Bound<'_, PyAny>,
+        order: Order,
+        layout: KeysLayout,
+    ) -> PyResult<Self> {
+        let times = Times::new(times)?;
+        let (tracks, is_one) = tracks_of(keys, order, &times, layout)?;
+        let count = tracks.len();
+        if let Times::Each(each) = &times
+            && each.len() != count
+        {
+            return Err(input(format!(
+                "times: there are lists for {} tracks, and keys for {count}",
+                each.len()
+            )));
+        }
+        Ok(Self {
+            times,
+            tracks,
+            is_one,
+        })
+    }
+
+    pub(crate) fn track_count(&self) -> usize {
+        self.tracks.len()
+    }
+
+    pub(crate) fn key_count(&self) -> usize {
+        self.tracks.keys.len()
+    }
+
+    /// The clip. Times of a clock that counts from 1970 count from a whole second, as those of files do.
+    pub(crate) fn clip(self, names: Option<&[String]>) -> PyResult<Motion> {
+        let Self {
+            mut times, tracks, ..
+        } = self;
+        let time_offset = match &times {
+            Times::Shared(times) => clock_second(times),
+            Times::Each(each) => clock_second(each.iter().flatten()),
+        };
+        if time_offset != 0 {
+            let since = |times: &mut Vec<f64>| {
+                times
+                    .iter_mut()
+                    .for_each(|time| *time -= time_offset as f64);
+            };
+            match &mut times {
+                Times::Shared(times) => since(times),
+                Times::Each(each) => each.iter_mut().for_each(since),
             }
-            set
         }
-    };
-    let motion = Motion {
-        set,
-        ..Motion::default()
-    };
-    Ok((motion, is_one))
+        let refused = |error: TrackError| of_track_since(time_offset, &error);
+        let set = match (times, names) {
+            (Times::Shared(times), None) if tracks.are_alike(times.len()) => {
+                TrackSet::from_shared_times(times, tracks.keys).map_err(refused)?
+            }
+            (times, names) => {
+                let mut set = TrackSet::new();
+                for track in 0..tracks.len() {
+                    let times = match &times {
+                        Times::Shared(times) => times,
+                        Times::Each(each) => &each[track],
+                    };
+                    let name = names.map_or("", |names| &names[track]);
+                    set.push(name, times, tracks.of(track)).map_err(refused)?;
+                }
+                set
+            }
+        };
+        Ok(Motion {
+            set,
+            time_offset,
+            ..Motion::default()
+        })
+    }
 }
 
 /// Keys of all tracks, one behind the other.
@@ -120,8 +189,15 @@ impl Tracks {
 }
 
 /// The keys of tracks, and whether they are one track's alone.
-fn tracks_of(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Tracks, bool)> {
-    if let Some(parts) = parts(value)
+fn tracks_of(
+    value: &Bound<'_, PyAny>,
+    order: Order,
+    times: &Times,
+    layout: KeysLayout,
+) -> PyResult<(Tracks, bool)> {
+    // A list is one of tracks, unless it is said to be one of frames.
+    if layout.said() != Some(Layout::FrameMajor)
+        && let Some(parts) = parts(value)?
         && let first = quaternions(&parts[0], order, "keys[0]")
         && first.as_ref().map_or(true, |first| first.shape.len() == 1)
     {
@@ -152,23 +228,83 @@ fn tracks_of(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Tracks, bool)>
             },
             true,
         )),
-        [tracks, count] => Ok((
-            Tracks {
-                keys: values,
-                ends: (1..=tracks).map(|track| track * count).collect(),
-            },
-            false,
-        )),
+        [first, second] => {
+            let (keys, [tracks, count]) =
+                match layout_of(value.py(), [first, second], times, layout)? {
+                    Layout::TrackMajor => (values, [first, second]),
+                    Layout::FrameMajor => (swapped(&values, [first, second], 1), [second, first]),
+                };
+            let ends = (1..=tracks).map(|track| track * count).collect();
+            Ok((Tracks { keys, ends }, false))
+        }
         _ => Err(input(format!(
-            "keys: the shape is {:?}; give (keys, 4), (tracks, keys, 4), or a list with an array \
-             (keys, 4) for each track",
-            [&*shape, &[4]].concat()
+            "keys: the shape is {}; give (keys, 4), (tracks, keys, 4), or a list with an array (keys, 4) for each \
+             track; {} reads (frames, tracks, 4)",
+            shown(&[&*shape, &[4]].concat()),
+            layout.spelling(Layout::FrameMajor)
         ))),
     }
 }
 
-/// What clips may have beside rotations.
-pub(crate) struct ClipParts<'a, 'py> {
+/// What the two axes of keys are: as it was said, else tracks and keys, where nothing speaks against it.
+fn layout_of(
+    py: Python<'_>,
+    [first, second]: [usize; 2],
+    times: &Times,
+    layout: KeysLayout,
+) -> PyResult<Layout> {
+    let said = layout.said();
+    let Times::Shared(times) = times else {
+        return Ok(said.unwrap_or(Layout::TrackMajor));
+    };
+    let count = times.len();
+    let shape = shown(&[first, second, 4]);
+    let found = format!("keys: the shape is {shape}, and there are {count} times:");
+    let refused = |why: String| Err(input(format!("{found} {why}")));
+    let [by_track, by_frame] =
+        [Layout::TrackMajor, Layout::FrameMajor].map(|it| layout.spelling(it));
+    match said {
+        None if first == count && second == count && count > 1 => match layout {
+            KeysLayout::Argument {
+                has_names: true, ..
+            } => {
+                let message = format!(
+                    "{found} read as (tracks, keys, 4); say so by {by_track}, or that they are (frames, tracks, 4) \
+                     by {by_frame}"
+                );
+                warn_of(py, &[message])?;
+                Ok(Layout::TrackMajor)
+            }
+            _ => refused(format!(
+                "both axes may be that of the frames; say which it is by {by_track}, (tracks, keys, 4), or {by_frame}, \
+             (frames, tracks, 4)"
+            )),
+        },
+        None | Some(Layout::TrackMajor) if second != count && first == count => refused(format!(
+            "the axes are those of {by_frame}, (frames, tracks, 4); give that, or swap them: \
+                 np.swapaxes(keys, 0, 1)"
+        )),
+        Some(Layout::FrameMajor) if first != count && second == count => refused(format!(
+            "the axes are those of {by_track}, (tracks, keys, 4)"
+        )),
+        said => Ok(said.unwrap_or(Layout::TrackMajor)),
+    }
+}
+
+/// Rows of values, `each` of them together, as columns.
+fn swapped<T: Copy>(values: &[T], [rows, columns]: [usize; 2], each: usize) -> Vec<T> {
+    let mut found = Vec::with_capacity(values.len());
+    for column in 0..columns {
+        for row in 0..rows {
+            let start = (row * columns + column) * each;
+            found.extend_from_slice(&values[start..start + each]);
+        }
+    }
+    found
+}
+
+/// What clips may have beside rotations, as it comes in.
+pub(crate) struct ClipArguments<'a, 'py> {
     pub(crate) parents: Option<Vec<Option<i64>>>,
     pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
     pub(crate) translations: Option<&'a Bound<'py, PyAny>>,
@@ -181,58 +317,44 @@ pub(crate) struct ClipParts<'a, 'py> {
 /// Why positions of joints are unknown.
 pub(crate) const NO_OFFSETS: &str = "the joints have parents, but no offsets; give `offsets`";
 
-impl ClipParts<'_, '_> {
-    /// Sets them in a clip; the tangents have their components in `order`.
-    pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
-        self.hang(clip)?;
-        let tracks = clip.set.track_count();
-        let of_track = |error: TrackError| of_track(&error);
-        for (label, value) in [("translations", self.translations), ("scales", self.scales)] {
-            for (track, row) in rows(value, label, tracks, &[3])? {
-                let times = clip.set.track(track).times.to_vec();
-                let vectors: Vec<DVec3> = threes(&row).collect();
-                if label == "translations" {
-                    clip.set_positions(track, &times, &vectors)
-                        .map_err(of_track)?;
-                    continue;
-                }
-                let scales: Vec<Vec3> = vectors.iter().map(|scale| scale.as_vec3()).collect();
-                let scaled = clip.set.set_scales(track, &times, &scales, &[]);
-                scaled.map_err(of_track)?;
-            }
-        }
-        if self.offsets.is_none() && clip.has_unplaced_joints() {
-            clip.no_world = Some(NO_OFFSETS.to_owned());
-        }
-        let set = &mut clip.set;
-        for (track, row) in rows(self.velocities, "velocities", tracks, &[3])? {
-            let velocities: Vec<DVec3> = threes(&row).collect();
-            set.set_velocities(track, &velocities).map_err(of_track)?;
-        }
-        for (track, row) in rows(self.tcb, "tcb", tracks, &[3])? {
-            let tcb = |of: DVec3| Tcb {
-                tension: of.x,
-                continuity: of.y,
-                bias: of.z,
-            };
-            let all: Vec<Tcb> = threes(&row).map(tcb).collect();
-            set.set_tcb(track, &all).map_err(of_track)?;
-        }
-        for (track, row) in rows(self.tangents, "tangents", tracks, &[2, 4])? {
-            let one = |of: &[f64; 4]| Quat::from_array(order.xyzw(of.map(|it| it as f32)));
-            let pairs = row.as_chunks().0.as_chunks::<2>().0;
-            let tangents: Vec<[Quat; 2]> = pairs.iter().map(|[a, b]| [one(a), one(b)]).collect();
-            set.set_tangents(track, &tangents).map_err(of_track)?;
-        }
-        Ok(())
+/// The numbers of some tracks, by their indices.
+type TrackRows = Vec<(usize, Vec<f64>)>;
+
+/// What clips may have beside rotations.
+pub(crate) struct ClipParts {
+    skeleton: Vec<Joint>,
+    has_offsets: bool,
+    translations: TrackRows,
+    scales: TrackRows,
+    velocities: TrackRows,
+    tangents: TrackRows,
+    tcb: TrackRows,
+}
+
+impl ClipArguments<'_, '_> {
+    /// Reads them, for a clip of so many tracks with these names.
+    pub(crate) fn read(
+        &self,
+        tracks: usize,
+        names: Option<&[String]>,
+        layout: Layout,
+    ) -> PyResult<ClipParts> {
+        Ok(ClipParts {
+            skeleton: self.skeleton(tracks, names)?,
+            has_offsets: self.offsets.is_some(),
+            translations: rows(self.translations, "translations", tracks, &[3], layout)?,
+            scales: rows(self.scales, "scales", tracks, &[3], layout)?,
+            velocities: rows(self.velocities, "velocities", tracks, &[3], layout)?,
+            tangents: rows(self.tangents, "tangents", tracks, &[2, 4], layout)?,
+            tcb: rows(self.tcb, "tcb", tracks, &[3], layout)?,
+        })
     }
 
     /// The skeleton.
-    fn hang(&self, clip: &mut Motion) -> PyResult<()> {
+    fn skeleton(&self, tracks: usize, names: Option<&[String]>) -> PyResult<Vec<Joint>> {
         if self.parents.is_none() && self.offsets.is_none() {
-            return Ok(());
+            return Ok(Vec::new());
         }
-        let tracks = clip.set.track_count();
         let wrong = |label: &str, count: usize| {
             input(format!("{label}: there are {count} for {tracks} tracks"))
         };
@@ -257,9 +379,9 @@ impl ClipParts<'_, '_> {
             Some(parents) => return Err(wrong("parents", parents.len())),
         };
         if let Some(track) = circle(&parents) {
-            let name = clip.set.track_name(track);
+            let name = names.map_or_else(String::new, |names| format!(" (`{}`)", names[track]));
             return Err(input(format!(
-                "parents: track {track} (`{name}`) is its own ancestor; the parent of a root is None or -1"
+                "parents: track {track}{name} is its own ancestor; the parent of a root is None or -1"
             )));
         }
         let offsets = match self.offsets {
@@ -287,7 +409,50 @@ impl ClipParts<'_, '_> {
                 ..Transform::default()
             },
         };
-        clip.skeleton = parents.into_iter().zip(offsets).map(joint).collect();
+        Ok(parents.into_iter().zip(offsets).map(joint).collect())
+    }
+}
+
+impl ClipParts {
+    /// Sets them in a clip; the tangents have their components in `order`.
+    pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
+        clip.skeleton = self.skeleton;
+        let of_track = |error: TrackError| of_track(&error);
+        for (track, row) in self.translations {
+            let times = clip.set.track(track).times.to_vec();
+            let positions: Vec<DVec3> = threes(&row).collect();
+            let moved = clip.set_positions(track, &times, &positions);
+            moved.map_err(of_track)?;
+        }
+        if !self.has_offsets && clip.has_unplaced_joints() {
+            clip.no_world = Some(NO_OFFSETS.to_owned());
+        }
+        let set = &mut clip.set;
+        for (track, row) in self.scales {
+            let times = set.track(track).times.to_vec();
+            let scales: Vec<Vec3> = threes(&row).map(|scale| scale.as_vec3()).collect();
+            let scaled = set.set_scales(track, &times, &scales, &[]);
+            scaled.map_err(of_track)?;
+        }
+        for (track, row) in self.velocities {
+            let velocities: Vec<DVec3> = threes(&row).collect();
+            set.set_velocities(track, &velocities).map_err(of_track)?;
+        }
+        for (track, row) in self.tcb {
+            let tcb = |of: DVec3| Tcb {
+                tension: of.x,
+                continuity: of.y,
+                bias: of.z,
+            };
+            let all: Vec<Tcb> = threes(&row).map(tcb).collect();
+            set.set_tcb(track, &all).map_err(of_track)?;
+        }
+        for (track, row) in self.tangents {
+            let one = |of: &[f64; 4]| Quat::from_array(order.xyzw(of.map(|it| it as f32)));
+            let pairs = row.as_chunks().0.as_chunks::<2>().0;
+            let tangents: Vec<[Quat; 2]> = pairs.iter().map(|[a, b]| [one(a), one(b)]).collect();
+            set.set_tangents(track, &tangents).map_err(of_track)?;
+        }
         Ok(())
     }
 }
@@ -307,20 +472,26 @@ fn rows(
     label: &str,
     tracks: usize,
     each: &[usize],
-) -> PyResult<Vec<(usize, Vec<f64>)>> {
+    layout: Layout,
+) -> PyResult<TrackRows> {
     let Some(value) = value else {
         return Ok(Vec::new());
     };
     let wrong = |shape: &[usize]| {
+        let axes = match layout {
+            Layout::TrackMajor => format!("{tracks}, keys"),
+            Layout::FrameMajor => format!("frames, {tracks}"),
+        };
+        let numbers: Vec<String> = each.iter().map(usize::to_string).collect();
         input(format!(
-            "{label}: the shape is {shape:?}; give (tracks, keys, …) with {each:?} numbers for each \
-             key of {tracks} tracks, or a list with an array or None for each track"
+            "{label}: the shape is {}; give ({axes}, {}), or a list with an array or None for each of the {tracks} \
+             tracks",
+            shown(shape),
+            numbers.join(", ")
         ))
     };
-    if let Some(parts) = parts(value)
-        && parts
-            .iter()
-            .any(|part| part.is_none() || part.hasattr("shape").unwrap_or(false))
+    if let Some(parts) = parts(value)?
+        && (parts.iter().any(Bound::is_none) || has_arrays(&parts)?)
     {
         if parts.len() != tracks {
             return Err(wrong(&[parts.len()]));
@@ -335,9 +506,17 @@ fn rows(
         }
         return Ok(rows);
     }
-    let ArrayValues { shape, values } = doubles(value, label)?;
+    let ArrayValues { shape, mut values } = doubles(value, label)?;
     let size: usize = match &*shape {
         [_, rest @ ..] if rest == each && tracks == 1 => values.len(),
+        [keys, count, rest @ ..]
+            if layout == Layout::FrameMajor && rest == each && *count == tracks =>
+        {
+            let together = each.iter().product();
+            values = swapped(&values, [*keys, *count], together);
+            keys * together
+        }
+        [_, _, ..] if layout == Layout::FrameMajor => return Err(wrong(&shape)),
         [count, keys, rest @ ..] if rest == each && *count == tracks => {
             keys * each.iter().product::<usize>()
         }

@@ -6,30 +6,35 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
+use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use tumble::Channel;
+use tumble::{Channel, Layout};
 use tumble_formats::Diagnostic;
 use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 
-use crate::arrays::Order;
-use crate::build::{ClipParts, clip_of};
-use crate::engine::default_engine;
-use crate::errors::guarded;
+use crate::arrays::{ListArgument, Order};
+use crate::build::{ClipArguments, ClipKeys, KeysLayout};
+use crate::engine::{default_engine, layout_named};
+use crate::errors::{expected, guarded, input};
 use crate::options::frame_rate;
 use crate::pickle::{is_same, state};
+use crate::run::work;
 
 /// Tracks of rotation keys, with names, a skeleton, translations and scales where there are any.
 ///
-/// `Clip(times, keys, *, order="xyzw", name=None, names=None, parents=None, offsets=None,
+/// `Clip(times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
 /// translations=None, scales=None, velocities=None, tangents=None, tcb=None)`
 ///
 /// `times` are seconds, increasing: `(keys,)` for all tracks, `(tracks, keys)`, or a list with an
 /// array for each track. `keys` are unit quaternions: `(keys, 4)` for one track,
 /// `(tracks, keys, 4)`, or a list with an array `(keys, 4)` for each track; a `Rotation` of SciPy's,
-/// or a list of them, will do. `order` says what the four components of `keys` are.
+/// or a list of them, will do. `order` says what the four components of `keys` are. `layout`: "frame" for arrays of
+/// shape `(frames, tracks, …)`, "track" for `(tracks, keys, …)`; it is needed only if there are as many tracks as keys.
+///
+/// Times of a clock that counts from 1970 count from the whole second before the first key, the clip's `time_offset`,
+/// as those of files do. `at`, `start` and `end` accept both.
 ///
 /// For each track: `names`, text; `parents`, the index of its parent track (`None` or -1 for a root);
 /// `offsets`, `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists
@@ -44,7 +49,7 @@ use crate::pickle::{is_same, state};
 /// Clip(1 track, 2 keys, 0 to 1 s)
 /// >>> clip.evaluate(fps=2, method="slerp").shape
 /// (1, 3, 4)
-#[pyclass(frozen, from_py_object, module = "tumble")]
+#[pyclass(frozen, eq, weakref, from_py_object, module = "tumble")]
 #[derive(Clone)]
 pub(crate) struct Clip {
     pub(crate) motion: Arc<Motion>,
@@ -65,6 +70,13 @@ pub(crate) struct Source {
     pub(crate) is_adjusted: bool,
     /// The clip has other keys than the file.
     pub(crate) is_changed: bool,
+}
+
+impl PartialEq for Clip {
+    /// Whether both have the same tracks, keys and skeleton, whatever files they come from.
+    fn eq(&self, other: &Self) -> bool {
+        is_same(&self.motion, &other.motion)
+    }
 }
 
 impl Clip {
@@ -92,7 +104,7 @@ impl Clip {
 impl Clip {
     #[new]
     #[pyo3(signature = (
-        times, keys, *, order="xyzw", name=None, names=None, parents=None, offsets=None,
+        times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
         translations=None, scales=None, velocities=None, tangents=None, tcb=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -100,9 +112,10 @@ impl Clip {
         times: &Bound<'_, PyAny>,
         keys: &Bound<'_, PyAny>,
         order: &str,
+        layout: Option<&str>,
         name: Option<String>,
-        names: Option<Vec<String>>,
-        parents: Option<Vec<Option<i64>>>,
+        names: Option<ListArgument<String>>,
+        parents: Option<ListArgument<Option<i64>>>,
         offsets: Option<&Bound<'_, PyAny>>,
         translations: Option<&Bound<'_, PyAny>>,
         scales: Option<&Bound<'_, PyAny>>,
@@ -111,9 +124,27 @@ impl Clip {
         tcb: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         guarded(|| {
-            let (mut motion, _) = clip_of(times, keys, Order::named(order)?, names.as_deref())?;
-            let parts = ClipParts {
-                parents,
+            let names = names.map(|names| names.0);
+            let order = Order::named(order)?;
+            let layout = layout.map(layout_named).transpose()?;
+            let arrays = ClipKeys::new(
+                times,
+                keys,
+                order,
+                KeysLayout::Argument {
+                    layout,
+                    has_names: names.is_some(),
+                },
+            )?;
+            let tracks = arrays.track_count();
+            if let Some(names) = names.as_ref().filter(|names| names.len() != tracks) {
+                return Err(input(format!(
+                    "names: there are {} for {tracks} tracks",
+                    names.len()
+                )));
+            }
+            let arguments = ClipArguments {
+                parents: parents.map(|parents| parents.0),
                 offsets,
                 translations,
                 scales,
@@ -121,8 +152,14 @@ impl Clip {
                 tangents,
                 tcb,
             };
-            parts.put_into(&mut motion, Order::named(order)?)?;
-            motion.name = name;
+            let layout = layout.unwrap_or(Layout::TrackMajor);
+            let parts = arguments.read(tracks, names.as_deref(), layout)?;
+            let motion = work(times.py(), arrays.key_count(), move || {
+                let mut motion = arrays.clip(names.as_deref())?;
+                parts.put_into(&mut motion, order)?;
+                motion.name = name;
+                Ok(motion)
+            })?;
             Ok(Self {
                 motion: Arc::new(motion),
                 source: None,
@@ -226,12 +263,6 @@ impl Clip {
     #[getter]
     fn path(&self) -> Option<PathBuf> {
         Some(self.source.as_ref()?.path.clone())
-    }
-
-    /// Whether the other clip has the same tracks, keys and skeleton, whatever files they come from.
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        let other = other.cast::<Self>();
-        other.is_ok_and(|other| is_same(&self.motion, &other.get().motion))
     }
 
     /// That of clips that are the same is the same.
@@ -467,9 +498,11 @@ impl Clip {
             let found = (0..tracks).find(|&index| set.track_name(index) == *name);
             return found.ok_or_else(|| PyKeyError::new_err(format!("there is no track `{name}`")));
         }
-        let index: isize = track
-            .extract()
-            .map_err(|_| PyTypeError::new_err("give a track as its index, from 0, or its name"))?;
+        let index: isize = track.extract().map_err(|error| {
+            expected(track.py(), error, || {
+                "give a track as its index, from 0, or its name".to_owned()
+            })
+        })?;
         let from_end = if index < 0 { tracks as isize } else { 0 };
         usize::try_from(index + from_end)
             .ok()

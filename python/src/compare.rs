@@ -13,11 +13,12 @@ use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::options::{SampleRequest, option_named, samples_of};
-use crate::run::interruptible;
+use crate::run::{interruptible, work};
+use crate::values::{Pickled, pickled, value};
 
 /// What many differences come to.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spread {
     /// The mean.
     mean: f64,
@@ -26,6 +27,8 @@ pub(crate) struct Spread {
     /// The largest.
     largest: f64,
 }
+
+value!(Spread { mean, rms, largest });
 
 impl From<differences::Spread> for Spread {
     fn from(of: differences::Spread) -> Self {
@@ -39,6 +42,11 @@ impl From<differences::Spread> for Spread {
 
 #[pymethods]
 impl Spread {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self { mean, rms, largest } = self;
         format!("Spread(mean {mean:.3e}, rms {rms:.3e}, largest {largest:.3e})")
@@ -46,7 +54,8 @@ impl Spread {
 }
 
 /// How far two arrays of one shape are apart.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ArrayDifference {
     /// How many numbers there are.
     numbers: usize,
@@ -62,8 +71,22 @@ pub(crate) struct ArrayDifference {
     largest_rotation_at: Option<Vec<usize>>,
 }
 
+value!(ArrayDifference {
+    numbers,
+    differing,
+    difference,
+    largest_at,
+    rotation,
+    largest_rotation_at,
+});
+
 #[pymethods]
 impl ArrayDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self {
             numbers, differing, ..
@@ -73,8 +96,8 @@ impl ArrayDifference {
 }
 
 /// The differences of a channel of two clips.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelDifference {
     /// The mean.
     mean: f64,
@@ -89,6 +112,15 @@ pub(crate) struct ChannelDifference {
     /// The same in frames of the first clip, from 0 at its first key; None where it has no rate.
     frame: Option<f64>,
 }
+
+value!(ChannelDifference {
+    mean,
+    rms,
+    largest,
+    track,
+    time,
+    frame,
+});
 
 impl From<differences::ChannelDifference> for ChannelDifference {
     fn from(of: differences::ChannelDifference) -> Self {
@@ -118,8 +150,8 @@ impl ChannelDifference {
 }
 
 /// The differences of one track of two clips.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointDifference {
     /// Its name.
     track: String,
@@ -130,6 +162,13 @@ pub(crate) struct JointDifference {
     /// Lengths of the differences of scales; None where neither clip scales.
     scale: Option<ChannelDifference>,
 }
+
+value!(JointDifference {
+    track,
+    rotation,
+    translation,
+    scale,
+});
 
 impl From<differences::JointDifference> for JointDifference {
     fn from(of: differences::JointDifference) -> Self {
@@ -145,6 +184,11 @@ impl From<differences::JointDifference> for JointDifference {
 
 #[pymethods]
 impl JointDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self {
             track, rotation, ..
@@ -158,6 +202,11 @@ impl JointDifference {
 
 #[pymethods]
 impl ChannelDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let Self {
             mean,
@@ -174,7 +223,8 @@ impl ChannelDifference {
 }
 
 /// How far two clips are apart.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ClipDifference {
     /// How many tracks both have.
     tracks: usize,
@@ -196,8 +246,25 @@ pub(crate) struct ClipDifference {
     joints: Vec<JointDifference>,
 }
 
+value!(ClipDifference {
+    tracks,
+    missing,
+    samples,
+    span,
+    identical,
+    rotation,
+    translation,
+    scale,
+    joints,
+});
+
 #[pymethods]
 impl ClipDifference {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "ClipDifference({} tracks, {} samples, largest angle {:.3e}°)",
@@ -207,8 +274,8 @@ impl ClipDifference {
 }
 
 /// What errors of one kind come to, by the names of `evo`.
-#[pyclass(frozen, get_all, module = "tumble")]
-#[derive(Debug, Clone)]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathStatistics {
     /// The root of the mean square.
     rmse: f64,
@@ -223,6 +290,15 @@ pub(crate) struct PathStatistics {
     /// The largest.
     max: f64,
 }
+
+value!(PathStatistics {
+    rmse,
+    mean,
+    median,
+    std,
+    min,
+    max,
+});
 
 impl From<differences::PathStatistics> for PathStatistics {
     fn from(of: differences::PathStatistics) -> Self {
@@ -239,6 +315,11 @@ impl From<differences::PathStatistics> for PathStatistics {
 
 #[pymethods]
 impl PathStatistics {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "PathStatistics(rmse {:.6}, mean {:.6}, max {:.6})",
@@ -248,7 +329,8 @@ impl PathStatistics {
 }
 
 /// How far an estimated path is from its reference.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathErrors {
     /// Which clip's poses are compared, 0 or 1: the one with fewer.
     times_of: usize,
@@ -278,8 +360,29 @@ pub(crate) struct PathErrors {
     rpe_count: usize,
 }
 
+value!(PathErrors {
+    times_of,
+    poses,
+    outside,
+    in_gaps,
+    span,
+    scale,
+    rotation,
+    translation,
+    ape_translation,
+    ape_rotation,
+    rpe_translation,
+    rpe_rotation,
+    rpe_count,
+});
+
 #[pymethods]
 impl PathErrors {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "PathErrors({} poses, rmse {:.6}, {:.6}°)",
@@ -338,7 +441,7 @@ pub(crate) fn compare<'py>(
                 "arrays are compared number by number; leave out times and `world`",
             ));
         }
-        let found = of_arrays([first, second])?;
+        let found = of_arrays(py, [first, second])?;
         return Ok(Bound::new(py, found)?.into_any());
     };
     let samples = match has_times {
@@ -348,9 +451,7 @@ pub(crate) fn compare<'py>(
     let clips = [one, other].map(|clip| Arc::clone(&clip.get().motion));
     let engine = engine_of(py, engine)?;
     let (found, warnings) = interruptible(py, move || of_clips(&engine, clips, samples, world))?;
-    for warning in warnings {
-        warn_of(py, &warning)?;
-    }
+    warn_of(py, &warnings)?;
     Ok(Bound::new(py, found)?.into_any())
 }
 
@@ -361,14 +462,16 @@ fn engine_of(py: Python<'_>, engine: Option<&Bound<'_, Engine>>) -> PyResult<tum
     }
 }
 
-fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
+fn of_arrays(py: Python<'_>, arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
     let read = |value: &Bound<'_, PyAny>, name: &str| {
         let ArrayValues { shape, values } = doubles(value, name)?;
         Ok::<_, PyErr>(npz::NumberArray { shape, values })
     };
     let [first, second] = [read(arrays[0], "first")?, read(arrays[1], "second")?];
-    let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
-    let found = found.map_err(of_compare)?;
+    let found = work(py, first.values.len(), move || {
+        let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
+        found.map_err(of_compare)
+    })?;
     Ok(ArrayDifference {
         numbers: found.numbers,
         differing: found.differing,
@@ -514,7 +617,7 @@ pub(crate) fn path_errors(
         found.map_err(of_compare)
     })?;
     for warning in &found.warnings {
-        warn_of(py, &in_python(warning))?;
+        warn_of(py, &[in_python(warning)])?;
     }
     let Some(absolute) = found.ape else {
         return Err(input("there is no pose to compare"));

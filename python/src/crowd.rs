@@ -7,7 +7,7 @@ use pyo3::types::PyDict;
 use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::{ComponentType, WrapMode};
 
-use crate::arrays::{ArrayValues, doubles};
+use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input};
@@ -50,7 +50,7 @@ const MANY: usize = 1 << 20;
 /// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
 /// >>> crowd.evaluate().shape
 /// (3, 1, 3, 4)
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Crowd {
     crowd: Mutex<tumble::crowd::Crowd>,
     instances: usize,
@@ -102,18 +102,19 @@ impl Crowd {
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         py: Python<'_>,
-        clips: Vec<Clip>,
+        clips: ListArgument<Clip>,
         instances: usize,
         layers: usize,
         method: &str,
-        parents: Option<Vec<Option<i64>>>,
+        parents: Option<ListArgument<Option<i64>>>,
         offsets: Option<&Bound<'_, PyAny>>,
-        masks: Option<Vec<Vec<f32>>>,
+        masks: Option<ListArgument<ListArgument<f32>>>,
         inverse_bind: Option<&Bound<'_, PyAny>>,
         references: Option<&Bound<'_, PyDict>>,
         ticks_per_second: u32,
         engine: Option<&Bound<'_, Engine>>,
     ) -> PyResult<Self> {
+        let clips = clips.0;
         let Some(first) = clips.first() else {
             return Err(input("clips: give at least one"));
         };
@@ -121,9 +122,9 @@ impl Crowd {
         let joints = first.motion.set.track_count();
         let chosen = match parents {
             Some(parents) => {
-                skeleton(&parents, offsets, joints)?;
+                skeleton(&parents.0, offsets, joints)?;
                 let offsets = offsets.map(|value| joint_offsets(value, joints));
-                ChosenSkeleton::Arrays(joint_parents(&parents, joints)?, offsets.transpose()?)
+                ChosenSkeleton::Arrays(joint_parents(&parents.0, joints)?, offsets.transpose()?)
             }
             None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
             None => ChosenSkeleton::First,
@@ -155,9 +156,9 @@ impl Crowd {
                 for clip in clips.iter().enumerate() {
                     push(&mut library, &shared, clip, method, |_| Ok(()))?;
                 }
-                for (index, mask) in masks.iter().flatten().enumerate() {
+                for (index, mask) in masks.iter().flat_map(|masks| &masks.0).enumerate() {
                     library
-                        .push_mask(mask)
+                        .push_mask(&mask.0)
                         .map_err(|error| input(format!("masks[{index}]: {error}")))?;
                 }
                 if let Some(matrices) = &inverse_bind {

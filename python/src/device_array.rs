@@ -24,7 +24,7 @@ use crate::output::{array_of, filled_bytes, type_name};
 /// >>> q = tumble.Engine("vulkan").evaluate(clip, fps=24, device_array=True)  # doctest: +SKIP
 /// >>> q, torch.from_dlpack(q).device  # doctest: +SKIP
 /// (DeviceArray(shape=(1, 25, 4), dtype=float32, device='cuda:0'), device(type='cuda', index=0))
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct DeviceArray {
     mapping: Arc<Mapping>,
     shape: Vec<usize>,

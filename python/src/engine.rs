@@ -13,7 +13,7 @@ use tumble::{
 };
 use tumble_cli::host;
 
-use crate::arrays::Order;
+use crate::arrays::{ListArgument, Order};
 use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::OutputRequest;
@@ -48,7 +48,7 @@ pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 /// >>> engine = tumble.Engine("cpu")
 /// >>> engine
 /// Engine('CPU')
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Engine {
     engine: tumble::Engine,
     /// For large calls, where the choice is by cost.
@@ -139,20 +139,22 @@ impl Engine {
             cache,
         };
         let options = arguments.options();
-        py.detach(|| {
-            guarded(|| {
-                let engine = match is_auto {
-                    true => tumble::Engine::with_options(Device::Cpu, &options)
-                        .map_err(|error| of_engine(&error))?,
-                    false => host::open(&name, &options).map_err(|failure| of_host(&failure))?,
-                };
-                let by_cost = is_auto.then(OnceLock::new);
-                Ok(Self {
-                    engine,
-                    by_cost,
-                    arguments,
+        let engine = match is_auto {
+            true => py.detach(|| {
+                guarded(|| {
+                    let engine = tumble::Engine::with_options(Device::Cpu, &options);
+                    engine.map_err(|error| of_engine(&error))
                 })
-            })
+            })?,
+            // Drivers may take seconds.
+            false => interruptible(py, move || {
+                host::open(&name, &options).map_err(|failure| of_host(&failure))
+            })?,
+        };
+        Ok(Self {
+            engine,
+            by_cost: is_auto.then(OnceLock::new),
+            arguments,
         })
     }
 
@@ -659,7 +661,7 @@ impl Engine {
     fn local_to_model<'py>(
         &self,
         rotations: &Bound<'py, PyAny>,
-        parents: Vec<Option<i64>>,
+        parents: ListArgument<Option<i64>>,
         offsets: Option<&Bound<'py, PyAny>>,
         translations: Option<&Bound<'py, PyAny>>,
         scales: Option<&Bound<'py, PyAny>>,
@@ -669,7 +671,7 @@ impl Engine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let poses = samples::ModelPoses {
             rotations,
-            parents,
+            parents: parents.0,
             offsets,
             translations,
             scales,
@@ -869,18 +871,16 @@ impl Engine {
                 false => self.engine.clone(),
             });
         }
-        Python::attach(|py| {
-            py.detach(|| {
-                guarded(|| {
-                    let chosen = host::auto(rotations, &self.arguments.options())
-                        .map_err(|failure| of_host(&failure))?;
-                    // Two threads may have chosen at once: both have the same bits.
-                    let chosen = chosen.unwrap_or_else(|| self.engine.clone());
-                    let chosen = large.get_or_init(|| (std::process::id(), chosen));
-                    Ok(chosen.1.clone())
-                })
+        let options = self.arguments.options();
+        let chosen = Python::attach(|py| {
+            interruptible(py, move || {
+                host::auto(rotations, &options).map_err(|failure| of_host(&failure))
             })
-        })
+        })?;
+        // Two threads may have chosen at once: both have the same bits.
+        let chosen = chosen.unwrap_or_else(|| self.engine.clone());
+        let chosen = large.get_or_init(|| (std::process::id(), chosen));
+        Ok(chosen.1.clone())
     }
 
     fn result<'py>(

@@ -5,11 +5,15 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
+use pyo3::exceptions::{
+    PyException, PyKeyboardInterrupt, PyMemoryError, PyOverflowError, PyRuntimeError, PyTypeError,
+    PyValueError,
+};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
-use tumble::{Error, InterpolationError, SampleTimesError, TrackError};
+use tumble::crowd::CrowdError;
+use tumble::{Error, InterpolationError, METHODS, SampleTimesError, TrackError};
 use tumble_formats::diagnostic::{Code, Diagnostic, Location, Severity};
 use tumble_formats::format::WriteError;
 use tumble_formats::output::OutputError;
@@ -37,20 +41,31 @@ impl Class {
         CLASSES[self as usize].import(py, "tumble._errors", name)
     }
 
-    /// An exception with this message; `found` are the details of a diagnostic.
+    /// An object of this class with this message; `found` are the details of a diagnostic. The class is Python
+    /// code, which Ctrl-C interrupts: then the error is that interrupt.
+    fn object<'py>(
+        self,
+        py: Python<'py>,
+        message: &str,
+        found: &FaultDetails,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let fields = PyDict::new(py);
+        fields.set_item("code", found.code)?;
+        fields.set_item("file", &found.file)?;
+        fields.set_item("line", found.line)?;
+        fields.set_item("column", found.column)?;
+        fields.set_item("pointer", &found.pointer)?;
+        self.of(py)?.call((message,), Some(&fields))
+    }
+
+    /// An exception with this message, or the interrupt that came while it was made.
     pub(crate) fn error(self, message: &str, found: &FaultDetails) -> PyErr {
-        Python::attach(|py| {
-            let made = self.of(py).and_then(|class| {
-                let fields = PyDict::new(py);
-                fields.set_item("code", found.code)?;
-                fields.set_item("file", &found.file)?;
-                fields.set_item("line", found.line)?;
-                fields.set_item("column", found.column)?;
-                fields.set_item("pointer", &found.pointer)?;
-                class.call((message,), Some(&fields))
-            });
-            made.map_or_else(|error| error, PyErr::from_value)
-        })
+        let made = Python::try_attach(|py| {
+            let object = self.object(py, message, found);
+            object.map_or_else(|error| error, PyErr::from_value)
+        });
+        // The interpreter has ended, and nobody reads the error of work that was left behind.
+        made.unwrap_or_else(|| PyRuntimeError::new_err(message.to_owned()))
     }
 }
 
@@ -101,7 +116,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 12] = [
+    const WORDS: [(&str, &str); 13] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -123,6 +138,7 @@ pub(crate) fn in_python(message: &str) -> String {
             "use -m bessel-overhauser",
             r#"use method="bessel-overhauser""#,
         ),
+        ("pass -m slerp", r#"pass method="slerp""#),
         ("`tumble eval --fps`", "`fps`"),
         ("--animation", "its name or index"),
         ("; --tracks chooses some", ""),
@@ -142,6 +158,10 @@ pub(crate) fn in_python(message: &str) -> String {
         .fold(message.to_owned(), |message, (program, python)| {
             message.replace(program, python)
         });
+    let message = METHODS.iter().fold(message, |message, method| {
+        let name = method.name;
+        message.replace(&format!("`-m {name}`"), &format!("method=\"{name}\""))
+    });
     let mut parts = message.split("--");
     let mut spoken = parts.next().unwrap_or_default().to_owned();
     for part in parts {
@@ -183,26 +203,83 @@ pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
     class.error(&in_python(&diagnostic.to_string()), &diagnostic.into())
 }
 
-/// What is remarkable about a file.
-pub(crate) fn warn(py: Python<'_>, diagnostic: &Diagnostic) -> PyResult<()> {
-    let message = in_python(&diagnostic.to_string());
-    let warning = Class::Warning.error(&message, &diagnostic.into());
-    py.import("warnings")?
-        .call_method1("warn", (warning.value(py),))?;
+/// Warns of what is remarkable about files: once for each code, at the line that called the package.
+pub(crate) fn warn<'a>(
+    py: Python<'_>,
+    diagnostics: impl IntoIterator<Item = &'a Diagnostic>,
+) -> PyResult<()> {
+    let mut kinds: Vec<Vec<&Diagnostic>> = Vec::new();
+    for diagnostic in diagnostics {
+        let known = kinds
+            .iter_mut()
+            .find(|kind| kind[0].code == diagnostic.code);
+        match known {
+            Some(kind) => kind.push(diagnostic),
+            None => kinds.push(vec![diagnostic]),
+        }
+    }
+    for kind in kinds {
+        let messages: Vec<String> = kind.iter().map(ToString::to_string).collect();
+        warn_once(py, &messages, &kind[0].into())?;
+    }
     Ok(())
 }
 
-/// What is remarkable about arguments.
-pub(crate) fn warn_of(py: Python<'_>, message: &str) -> PyResult<()> {
-    let warning = Class::Warning.error(message, &FaultDetails::default());
-    py.import("warnings")?
-        .call_method1("warn", (warning.value(py),))?;
+/// Warns of what is remarkable about arguments: one warning with all `messages`, which are of one kind.
+pub(crate) fn warn_of(py: Python<'_>, messages: &[String]) -> PyResult<()> {
+    match messages.is_empty() {
+        true => Ok(()),
+        false => warn_once(py, messages, &FaultDetails::default()),
+    }
+}
+
+/// The largest number of messages in a warning.
+const MAX_MESSAGES: usize = 8;
+
+fn warn_once(py: Python<'_>, messages: &[String], details: &FaultDetails) -> PyResult<()> {
+    let shown = &messages[..messages.len().min(MAX_MESSAGES)];
+    let mut message = shown.join("\n");
+    match messages.len() - shown.len() {
+        0 => {}
+        more => message.push_str(&format!("\nand {more} more of this kind")),
+    }
+    let warning = Class::Warning.object(py, &in_python(&message), details)?;
+    py.import("tumble._errors")?
+        .call_method1("warn", (warning,))?;
     Ok(())
+}
+
+/// Replaces the error of a conversion by one that says what is expected. Other errors stay as they are: Ctrl-C, for
+/// example, interrupts conversions that run Python code.
+pub(crate) fn expected(py: Python<'_>, error: PyErr, message: impl FnOnce() -> String) -> PyErr {
+    let is_conversion = error.is_instance_of::<PyTypeError>(py)
+        || error.is_instance_of::<PyValueError>(py)
+        || error.is_instance_of::<PyOverflowError>(py);
+    match is_conversion {
+        true => PyTypeError::new_err(message()),
+        false => error,
+    }
+}
+
+/// Whether an object has an attribute. Objects that refuse to say have none; Ctrl-C stays an error.
+pub(crate) fn has_attribute(of: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
+    match of.hasattr(name) {
+        Err(error) if error.is_instance_of::<PyException>(of.py()) => Ok(false),
+        found => found,
+    }
 }
 
 /// Keys that were refused.
 pub(crate) fn of_track(error: &TrackError) -> PyErr {
-    let message = error.to_string();
+    of_track_since(0, error)
+}
+
+/// As [`of_track`], of times that are counted from a second.
+pub(crate) fn of_track_since(second: i64, error: &TrackError) -> PyErr {
+    let mut message = error.to_string();
+    if second != 0 && matches!(error, TrackError::TimeNotIncreasing { .. }) {
+        message.push_str(&format!(" (times are counted from second {second})"));
+    }
     let at = |name: &str, track: usize, key: usize| format!("{name}[{track}][{key}]");
     match *error {
         TrackError::TimeNotFinite { track, key, .. } => {
@@ -241,6 +318,9 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
     match error {
         Error::Vulkan(_) | Error::Threads(_) | Error::ExportOnCpu => device(&message),
         Error::Stopped(_) => PyKeyboardInterrupt::new_err(message),
+        Error::OutOfMemory(_) | Error::Crowd(CrowdError::OutOfMemory(_)) => {
+            PyMemoryError::new_err(message)
+        }
         Error::SampleTimes(SampleTimesError::TimeNotFinite { index, .. }) => {
             input_at(&message, Code::NotFinite, format!("at[{index}]"))
         }

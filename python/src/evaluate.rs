@@ -156,9 +156,10 @@ impl OutputRequest {
                 count,
             };
             let array = self.card_array(py, work, shape)?;
-            for diagnostic in curve_warnings(py, clip, request, self.quantity, count)? {
-                warn(py, &diagnostic)?;
-            }
+            warn(
+                py,
+                &curve_warnings(py, clip, request, self.quantity, count)?,
+            )?;
             return Ok(array.into_any());
         }
         let array = array_of(py, self.encoding.component_type(), &shape, out, inputs)?;
@@ -180,9 +181,10 @@ impl OutputRequest {
                 Ok(())
             })
         })?;
-        for diagnostic in curve_warnings(py, clip, request, self.quantity, count)? {
-            warn(py, &diagnostic)?;
-        }
+        warn(
+            py,
+            &curve_warnings(py, clip, request, self.quantity, count)?,
+        )?;
         match self.as_rotation {
             true => self.rotation(&array, self.is_one_track),
             false => Ok(array),
@@ -389,6 +391,9 @@ impl OutputRequest {
         // A rotation in the world, and its velocity where accelerations are asked for.
         let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
         for sample in 0..count {
+            if sample % 256 == 255 {
+                check_signals()?;
+            }
             for &track in &order {
                 let index = self.layout.index(track, sample, tracks, count).unwrap_or(0);
                 let three = |of: &[f32]| {

@@ -1,9 +1,10 @@
 //! `tumble.load` and `tumble.File`: what a file holds.
 
-use std::path::PathBuf;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
+use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
@@ -11,11 +12,11 @@ use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
 use tumble_formats::npz::body_offsets;
-use tumble_formats::{Format, Limits, Loaded, ReadOptions};
+use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
-use crate::arrays::doubles;
+use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
-use crate::errors::{input, of_diagnostic, of_track, warn};
+use crate::errors::{expected, input, of_diagnostic, of_track, warn};
 use crate::options::{frame_rate, one_of, option_of, unknown_name};
 use crate::run::interruptible;
 
@@ -27,7 +28,8 @@ use crate::run::interruptible;
 /// >>> file = tumble.load(path)
 /// >>> len(file), file.clip
 /// (1, Clip(1 track, 2 keys, 0 to 1 s, 1 fps))
-#[pyclass(frozen, module = "tumble", mapping)]
+#[pyclass(frozen, eq, weakref, module = "tumble", mapping)]
+#[derive(PartialEq)]
 pub(crate) struct File {
     clips: Vec<Clip>,
     path: PathBuf,
@@ -86,6 +88,13 @@ impl File {
         self.refused.clone()
     }
 
+    /// That of files that are the same is the same.
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (&self.path, self.clips.len()).hash(&mut hasher);
+        hasher.finish()
+    }
+
     /// Its clips, each as it is pickled: see `Clip`.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, file) = (slf.py(), slf.get());
@@ -127,9 +136,11 @@ impl File {
                 PyKeyError::new_err(unknown_name(&refusal, &name, &names))
             });
         }
-        let index: isize = key
-            .extract()
-            .map_err(|_| PyTypeError::new_err("give a clip as its index, from 0, or its name"))?;
+        let index: isize = key.extract().map_err(|error| {
+            expected(key.py(), error, || {
+                "give a clip as its index, from 0, or its name".to_owned()
+            })
+        })?;
         let from_end = if index < 0 {
             self.clips.len() as isize
         } else {
@@ -239,10 +250,6 @@ pub(crate) fn load(
         || keyframes
         || offsets.is_some()
         || body_model.is_some();
-    let frame_times = source_times.map(|file| open_frame_times(&file, Limits::default()));
-    let frame_times = frame_times
-        .transpose()
-        .map_err(|diagnostic| of_diagnostic(&diagnostic))?;
     let options = ReadOptions {
         limits: Limits::default(),
         pipes: false,
@@ -261,7 +268,7 @@ pub(crate) fn load(
         },
         source_rate: source_fps.map(frame_rate).transpose()?,
         override_rate: override_fps.map(frame_rate).transpose()?,
-        frame_times: frame_times.map(Arc::new),
+        frame_times: None,
         map,
         time_unit: time_unit
             .map(|unit| option_of(unit, "time_unit"))
@@ -291,25 +298,100 @@ pub(crate) fn load(
             offsets.shape
         )));
     }
-    let file = path.clone();
-    let mut loaded = interruptible(py, move || {
-        let format = format.unwrap_or_else(|| Format::detected(&file));
-        if options.override_rate.is_some() && !format.takes(FormatOption::OverrideRate) {
+    let request = ReadRequest {
+        format,
+        options,
+        source_times,
+        offsets,
+        body_model,
+        scale,
+        up,
+        is_changed,
+    };
+    let (file, warnings) = request.read(py, path)?;
+    warn(py, &warnings)?;
+    Ok(file)
+}
+
+/// Reads files of any format, as `load` does, and warns once for each code: what `MotionLibrary.load` does.
+#[pyfunction]
+#[pyo3(signature = (paths, source_fps=None, override_fps=None))]
+pub(crate) fn load_all(
+    py: Python<'_>,
+    paths: ListArgument<PathBuf>,
+    source_fps: Option<&Bound<'_, PyAny>>,
+    override_fps: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<File>> {
+    let request = ReadRequest {
+        options: ReadOptions {
+            source_rate: source_fps.map(frame_rate).transpose()?,
+            override_rate: override_fps.map(frame_rate).transpose()?,
+            ..ReadOptions::default()
+        },
+        is_changed: source_fps.is_some() || override_fps.is_some(),
+        ..ReadRequest::default()
+    };
+    let mut files = Vec::with_capacity(paths.0.len());
+    let mut warnings = Vec::new();
+    for path in paths.0 {
+        let (file, of_file) = request.clone().read(py, path)?;
+        files.push(file);
+        warnings.extend(of_file);
+    }
+    warn(py, &warnings)?;
+    Ok(files)
+}
+
+/// How a file is read.
+#[derive(Clone, Default)]
+struct ReadRequest {
+    format: Option<&'static Format>,
+    options: ReadOptions,
+    source_times: Option<PathBuf>,
+    offsets: Option<ArrayValues<f64>>,
+    body_model: Option<PathBuf>,
+    scale: Option<Scale>,
+    up: Option<UpAxis>,
+    /// Other keys are read than the file says itself.
+    is_changed: bool,
+}
+
+impl ReadRequest {
+    /// Reads a file; returns what to warn of, too.
+    fn read(mut self, py: Python<'_>, path: PathBuf) -> PyResult<(File, Vec<Diagnostic>)> {
+        let (file, is_changed) = (path.clone(), self.is_changed);
+        let mut loaded = interruptible(py, move || self.loaded(&file))?;
+        if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
+            return Err(of_diagnostic(first));
+        }
+        let warnings = loaded.warnings.iter().chain(&loaded.refused);
+        let warnings = warnings.cloned().collect();
+        Ok((File::new(path, &mut loaded, is_changed), warnings))
+    }
+
+    fn loaded(&mut self, file: &Path) -> PyResult<Loaded> {
+        if let Some(times) = &self.source_times {
+            let times = open_frame_times(times, Limits::default());
+            let times = times.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+            self.options.frame_times = Some(Arc::new(times));
+        }
+        let format = self.format.unwrap_or_else(|| Format::detected(file));
+        if self.options.override_rate.is_some() && !format.takes(FormatOption::OverrideRate) {
             return Err(input(format!(
                 "override_fps has no effect on {}; it is for {}; leave it out",
                 format.name,
                 Format::names_taking(FormatOption::OverrideRate)
             )));
         }
-        let read = format.open(&file, &options);
+        let read = format.open(file, &self.options);
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
-        if let Some(offsets) = &offsets {
+        if let Some(offsets) = &self.offsets {
             for clip in &mut loaded.clips {
                 let placed = set_offsets(clip, &offsets.values);
                 placed.map_err(|error| input(format!("offsets: {}: {error}", file.display())))?;
             }
         }
-        if let Some(model) = &body_model {
+        if let Some(model) = &self.body_model {
             for clip in &mut loaded.clips {
                 let offsets = body_offsets(model, clip, Limits::default());
                 let offsets = offsets.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
@@ -318,8 +400,8 @@ pub(crate) fn load(
                     .map_err(|error| input(format!("body_model: {}: {error}", file.display())))?;
             }
         }
-        if scale.is_some() || up.is_some() {
-            let factor = match (scale, loaded.space) {
+        if self.scale.is_some() || self.up.is_some() {
+            let factor = match (self.scale, loaded.space) {
                 (None, _) => 1.0,
                 (Some(Scale::Factor(factor)), _) => factor,
                 (Some(Scale::Metres), Some(space)) => space.metres,
@@ -328,17 +410,10 @@ pub(crate) fn load(
                     return Err(input(message));
                 }
             };
-            adjust_all(&mut loaded, factor, up).map_err(|error| of_track(&error))?;
+            adjust_all(&mut loaded, factor, self.up).map_err(|error| of_track(&error))?;
         }
         Ok(loaded)
-    })?;
-    if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
-        return Err(of_diagnostic(first));
     }
-    for diagnostic in loaded.warnings.iter().chain(&loaded.refused) {
-        warn(py, diagnostic)?;
-    }
-    Ok(File::new(path, &mut loaded, is_changed))
 }
 
 /// By how much translations are multiplied.

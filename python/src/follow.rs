@@ -9,7 +9,7 @@ use tumble::paths::{BodyAxis, Direction, Follow, FollowError, PathSpeed};
 use tumble::{Layout, VectorMethod};
 use tumble_formats::path::{Pace, PathPoints, paths_of};
 
-use crate::arrays::{ArrayValues, Order, doubles, parts};
+use crate::arrays::{ArrayValues, Order, doubles, has_arrays, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::options::{SampleRequest, ends, one_of, option_named, option_of};
@@ -123,8 +123,8 @@ fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bo
              (points, 3) for each track"
         ))
     };
-    let is_array = |part: &Bound<'_, PyAny>| part.hasattr("shape").unwrap_or(false);
-    if let Some(parts) = parts(value).filter(|parts| parts.iter().any(is_array))
+    if let Some(parts) = parts(value)?
+        && has_arrays(&parts)?
         && doubles(&parts[0], name)?.shape.len() == 2
     {
         let one = |part: &Bound<'_, PyAny>| match doubles(part, name)? {
@@ -147,7 +147,7 @@ fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bo
 
 /// Times in seconds: one list for all paths or one for each.
 fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
-    let lists: Vec<Vec<f64>> = match parts(value) {
+    let lists: Vec<Vec<f64>> = match parts(value)? {
         Some(parts) => {
             let one = |part: &Bound<'_, PyAny>| Ok(doubles(part, "times")?.values);
             parts.iter().map(one).collect::<PyResult<_>>()?
@@ -254,9 +254,8 @@ pub(crate) fn follow<'py>(
             error => of_engine(&error),
         })
     })?;
-    for warning in &found.warnings {
-        warn_of(py, &warning.to_string())?;
-    }
+    let warnings: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+    warn_of(py, &warnings)?;
     let positions = match origin == DVec3::ZERO {
         true => of_values(py, &found.positions, |[x, y, z, _]| [x, y, z])?,
         false => {

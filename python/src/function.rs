@@ -5,12 +5,13 @@ use pyo3::types::PyDict;
 use tumble::Encoding;
 
 use crate::arrays::Order;
-use crate::build::clip_of;
+use crate::build::{ClipKeys, KeysLayout};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::guarded;
 use crate::evaluate::OutputRequest;
 use crate::options::{Request, request_arrays};
 use crate::output::quaternions_of;
+use crate::run::work;
 
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///
@@ -45,7 +46,9 @@ pub(crate) fn evaluate<'py>(
         let py = times.py();
         let request = Request::new(options)?;
         let order = Order::named(order)?;
-        let (motion, is_one_track) = clip_of(times, keys, order, None)?;
+        let arrays = ClipKeys::new(times, keys, order, KeysLayout::OfClip)?;
+        let is_one_track = arrays.is_one;
+        let motion = work(py, arrays.key_count(), move || arrays.clip(None))?;
         let result = OutputRequest {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             // Rotations of SciPy's have an order of their own.

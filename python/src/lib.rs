@@ -32,6 +32,7 @@ mod samples;
 mod save;
 mod shards;
 mod stream;
+mod values;
 mod verify;
 
 use pyo3::pymodule;
@@ -55,7 +56,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::file::file_of_state;
     #[pymodule_export]
-    use crate::file::{File, load};
+    use crate::file::{File, load, load_all};
     #[pymodule_export]
     use crate::function::evaluate;
     #[pymodule_export]
@@ -77,6 +78,8 @@ mod _tumble {
     };
     #[pymodule_export]
     use crate::stream::{Chunk, Chunks};
+    #[pymodule_export]
+    use crate::values::value_of_state;
     #[pymodule_export]
     use crate::verify::Verification;
 

@@ -35,7 +35,7 @@ const LONGEST: f64 = 2.1e9;
 const MANY: usize = 1 << 21;
 
 /// The clips of a motion library, prepared: what is sampled, and its arrays for files.
-#[pyclass(frozen, module = "tumble._tumble")]
+#[pyclass(frozen, weakref, module = "tumble._tumble")]
 pub(crate) struct Motions {
     tables: MotionTables,
     spans: Py<PyArray2<u32>>,
@@ -292,7 +292,8 @@ impl Motions {
             if !(parts.0.1.is_empty() && parts.1.1.is_empty()) {
                 return Err(of_crowd(CrowdError::BrokenTables));
             }
-            guarded(|| MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd))?
+            let tables = || MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd);
+            spans.py().detach(|| stoppable(tables))?
         };
         let texts = |name: &str| match arrays.get_item(name)? {
             Some(array) => array.call_method0("tolist")?.extract::<Vec<String>>(),

@@ -2,7 +2,7 @@
 
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods};
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyException, PyTypeError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -110,8 +110,12 @@ pub(crate) fn array_of<'py>(
     }
     for &other in inputs {
         let shares = numpy(py)?.call_method1(intern!(py, "shares_memory"), (out, other));
-        // What is no array shares nothing.
-        if shares.is_ok_and(|shares| shares.is_truthy().unwrap_or(false)) {
+        let shares = match shares {
+            // What is no array shares nothing.
+            Err(error) if error.is_instance_of::<PyException>(py) => false,
+            shares => shares?.is_truthy()?,
+        };
+        if shares {
             return Err(input(
                 "out: its memory is an input's, which would be overwritten; give other memory",
             ));
@@ -143,7 +147,7 @@ fn fresh<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDy
 }
 
 /// `(3, 61, 4)`, as Python writes it.
-fn shown(shape: &[usize]) -> String {
+pub(crate) fn shown(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),
         _ => {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec3, Quat, Vec3};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
@@ -15,6 +15,7 @@ use tumble_formats::motion::{
 
 use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
+use crate::values::{chunks, list, rows};
 
 /// The kinds of vectors, as they are numbered in a pickle.
 const VECTORS: [Channel; 2] = [Channel::Translation, Channel::Scale];
@@ -25,16 +26,6 @@ const SAMPLERS: [ChannelInterpolation; 3] = [
     ChannelInterpolation::Linear,
     ChannelInterpolation::Cubic,
 ];
-
-/// An array of rows with so many numbers each.
-fn rows<T: numpy::Element>(
-    py: Python<'_>,
-    numbers: Vec<T>,
-    each: usize,
-) -> PyResult<Bound<'_, PyArray2<T>>> {
-    let count = numbers.len() / each;
-    PyArray1::from_vec(py, numbers).reshape([count, each])
-}
 
 /// Everything that a clip is, but what is kept of its file beside.
 pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, PyDict>> {
@@ -57,6 +48,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     state.set_item("times_of", PyArray1::from_vec(py, times_of))?;
     let mut keys = Vec::with_capacity(4 * motion.set.key_count());
     for track in &tracks {
+        py.check_signals()?;
         keys.extend(track.keys.iter().flat_map(Quat::to_array));
     }
     state.set_item("keys", rows(py, keys, 4)?)?;
@@ -169,26 +161,6 @@ fn entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyA
     })
 }
 
-/// Rows of so many numbers, of an array of a state.
-fn chunks<T: numpy::Element + Copy, const N: usize>(
-    of: &Bound<'_, PyAny>,
-) -> PyResult<Vec<[T; N]>> {
-    let array: PyReadonlyArray2<'_, T> = of.extract()?;
-    let array = array.as_array();
-    let row = |row: numpy::ndarray::ArrayView1<'_, T>| -> PyResult<[T; N]> {
-        let numbers: Vec<T> = row.iter().copied().collect();
-        numbers
-            .try_into()
-            .map_err(|_| input("the pickle of a clip has an array of another shape"))
-    };
-    array.outer_iter().map(row).collect()
-}
-
-fn list<T: numpy::Element + Copy>(of: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
-    let array: PyReadonlyArray1<'_, T> = of.extract()?;
-    Ok(array.as_array().iter().copied().collect())
-}
-
 /// The clip of a state.
 #[pyfunction]
 pub(crate) fn clip_of_state(state: &Bound<'_, PyDict>) -> PyResult<Clip> {
@@ -226,6 +198,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     set.reserve(names.len(), keys.len());
     let mut left = &keys[..];
     for (track, name) in names.iter().enumerate() {
+        state.py().check_signals()?;
         let times = times_of
             .get(track)
             .and_then(|&index| times.get(usize::try_from(index).ok()?));

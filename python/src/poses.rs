@@ -28,34 +28,30 @@ pub(crate) fn local<'py>(
     let py = clip.py();
     let (samples, tracks) = samples(engine, clip, options)?;
     let count = samples.times.len();
-    let or_rest = |list: &[Vec3], rest: Vec3| match list.is_empty() {
-        true => vec![rest; tracks * count],
-        false => list.to_vec(),
-    };
-    let rotations = samples.rotations.iter().flat_map(Quat::to_array);
     let three = (tracks, count, 3);
-    let motion = &clip.get().motion;
-    let translations = or_rest(&samples.translations, Vec3::ZERO);
-    let moved = translations.iter().enumerate();
-    let moved = moved.map(|(index, point)| motion.origin(index % tracks) + point.as_dvec3());
-    let translations = positions(py, motion, moved, three, layout)?;
-    let scales = or_rest(&samples.scales, Vec3::ONE);
+    let motion = Arc::clone(&clip.get().motion);
+    let (translations, rotations, scales) = interruptible(py, move || {
+        let or_rest = |list: Vec<Vec3>, rest: Vec3| match list.is_empty() {
+            true => vec![rest; tracks * count],
+            false => list,
+        };
+        let translations = or_rest(samples.translations, Vec3::ZERO);
+        let moved = translations.iter().enumerate();
+        let moved = moved.map(|(index, point)| motion.origin(index % tracks) + point.as_dvec3());
+        let rotations = samples.rotations.iter().flat_map(Quat::to_array);
+        let scales = or_rest(samples.scales, Vec3::ONE);
+        Ok((
+            Positions::of(&motion, moved),
+            rotations.collect::<Vec<f32>>(),
+            scales.iter().flat_map(Vec3::to_array).collect::<Vec<f32>>(),
+        ))
+    })?;
     PyTuple::new(
         py,
         [
-            translations,
-            shaped(
-                py,
-                rotations.collect::<Vec<f32>>(),
-                (tracks, count, 4),
-                layout,
-            )?,
-            shaped(
-                py,
-                scales.iter().flat_map(Vec3::to_array).collect::<Vec<f32>>(),
-                three,
-                layout,
-            )?,
+            translations.array(py, three, layout)?,
+            shaped(py, rotations, (tracks, count, 4), layout)?,
+            shaped(py, scales, three, layout)?,
         ],
     )
 }
@@ -69,24 +65,23 @@ pub(crate) fn in_world<'py>(
 ) -> PyResult<Bound<'py, PyTuple>> {
     let py = clip.py();
     let (samples, tracks) = samples(engine, clip, options)?;
-    let motion = &clip.get().motion;
-    let (count, motion) = (samples.times.len(), Arc::clone(motion));
-    let poses = interruptible(py, move || {
-        world(&motion, &samples).map_err(|error| input(in_python(&error.to_string())))
+    let motion = Arc::clone(&clip.get().motion);
+    let count = samples.times.len();
+    let (positions, rotations) = interruptible(py, move || {
+        let poses =
+            world(&motion, &samples).map_err(|error| input(in_python(&error.to_string())))?;
+        let points = poses.iter().map(|pose| pose.position);
+        let rotations = poses.iter().flat_map(|pose| pose.rotation.to_array());
+        Ok((
+            Positions::of(&motion, points),
+            rotations.collect::<Vec<f32>>(),
+        ))
     })?;
-    let points = poses.iter().map(|pose| pose.position);
-    let positions = positions(py, &clip.get().motion, points, (tracks, count, 3), layout)?;
-    let rotations = poses.iter().flat_map(|pose| pose.rotation.to_array());
     PyTuple::new(
         py,
         [
-            positions,
-            shaped(
-                py,
-                rotations.collect::<Vec<f32>>(),
-                (tracks, count, 4),
-                layout,
-            )?,
+            positions.array(py, (tracks, count, 3), layout)?,
+            shaped(py, rotations, (tracks, count, 4), layout)?,
         ],
     )
 }
@@ -122,22 +117,33 @@ fn samples(
     Ok((samples, tracks))
 }
 
-/// Positions as an array, in f64 where any track has an origin and in f32 where they are f32.
-fn positions<'py>(
-    py: Python<'py>,
-    motion: &Motion,
-    points: impl Iterator<Item = DVec3>,
-    shape: (usize, usize, usize),
-    layout: Layout,
-) -> PyResult<Bound<'py, PyAny>> {
-    match motion.origins.is_empty() {
-        true => {
-            let rounded = points.flat_map(|point| point.as_vec3().to_array());
-            shaped(py, rounded.collect::<Vec<f32>>(), shape, layout)
+/// The coordinates of positions: f64 where any track has an origin, and f32 where they are f32.
+enum Positions {
+    Single(Vec<f32>),
+    Double(Vec<f64>),
+}
+
+impl Positions {
+    fn of(motion: &Motion, points: impl Iterator<Item = DVec3>) -> Self {
+        match motion.origins.is_empty() {
+            true => Self::Single(
+                points
+                    .flat_map(|point| point.as_vec3().to_array())
+                    .collect(),
+            ),
+            false => Self::Double(points.flat_map(|point| point.to_array()).collect()),
         }
-        false => {
-            let exact = points.flat_map(|point| point.to_array());
-            shaped(py, exact.collect::<Vec<f64>>(), shape, layout)
+    }
+
+    fn array(
+        self,
+        py: Python<'_>,
+        shape: (usize, usize, usize),
+        layout: Layout,
+    ) -> PyResult<Bound<'_, PyAny>> {
+        match self {
+            Self::Single(numbers) => shaped(py, numbers, shape, layout),
+            Self::Double(numbers) => shaped(py, numbers, shape, layout),
         }
     }
 }

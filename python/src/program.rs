@@ -8,8 +8,9 @@ use pyo3::types::PyDict;
 use tumble::METHODS;
 use tumble_cli::host;
 
-use crate::errors::{device, guarded, input};
+use crate::errors::{device, guarded, in_python, input};
 use crate::output::rotation_encodings;
+use crate::run::interruptible;
 use crate::save::clips_of;
 
 /// Runs the program `tumble` with these arguments, the first of which is its name; gives its exit
@@ -39,11 +40,13 @@ pub(crate) fn load_drivers(py: Python<'_>) {
 /// True
 #[pyfunction]
 pub(crate) fn devices(py: Python<'_>) -> PyResult<Vec<String>> {
-    let devices = py.detach(|| guarded(|| Ok(host::devices().unwrap_or_default())))?;
-    Ok(devices
-        .iter()
-        .map(|device| device.name().to_owned())
-        .collect())
+    interruptible(py, || {
+        let devices = host::devices().unwrap_or_default();
+        Ok(devices
+            .iter()
+            .map(|device| device.name().to_owned())
+            .collect())
+    })
 }
 
 /// What each method is: its name, and a few words.
@@ -88,11 +91,12 @@ pub(crate) fn page(
         .map_or(PathBuf::from("clip"), |source| source.path.clone());
     let motions = clips.iter().map(|clip| (*clip.motion).clone()).collect();
     let box_length = source.and_then(|source| source.box_length);
-    let made =
-        py.detach(|| guarded(|| Ok(host::page(Path::new(&path), motions, box_length, &options))))?;
-    made.map_err(|refused| match refused.is_usage {
-        true => input(refused.message),
-        false => device(&refused.message),
+    interruptible(py, move || {
+        let made = host::page(Path::new(&path), motions, box_length, &options);
+        made.map_err(|refused| match refused.is_usage {
+            true => input(in_python(&refused.message)),
+            false => device(&refused.message),
+        })
     })
 }
 

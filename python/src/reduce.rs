@@ -6,20 +6,33 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use tumble::reduce::ReducedCurve;
 use tumble_formats::motion::ChannelInterpolation;
-use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce as reduced};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, reduce as reduced};
 
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{input, of_engine};
 use crate::options::{frame_rate, option_of};
 use crate::run::interruptible;
+use crate::values::{Pickled, pickled, value};
 
 /// A clip with few keys, and how far it is from its samples.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Reduction {
-    found: Reduced,
     clip: Clip,
+    keys: [usize; 2],
+    bounds: [f64; 2],
+    times: Vec<f64>,
+    errors: Vec<[f64; 2]>,
 }
+
+value!(Reduction {
+    clip,
+    keys,
+    bounds,
+    times,
+    errors,
+});
 
 #[pymethods]
 impl Reduction {
@@ -32,46 +45,48 @@ impl Reduction {
     /// Keys of all channels before.
     #[getter]
     fn keys_before(&self) -> usize {
-        self.found.keys[0]
+        self.keys[0]
     }
 
     /// Keys of all channels that are left.
     #[getter]
     fn keys_after(&self) -> usize {
-        self.found.keys[1]
+        self.keys[1]
     }
 
     /// The times of the samples, seconds, (samples,).
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.found.times)
+        PyArray1::from_slice(py, &self.times)
     }
 
     /// The largest angle of all joints at each sample, degrees, (samples,).
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let angles = self.found.errors.iter().map(|error| error[0].to_degrees());
+        let angles = self.errors.iter().map(|error| error[0].to_degrees());
         PyArray1::from_iter(py, angles)
     }
 
     /// The largest distance of all joints at each sample, (samples,).
     #[getter]
     fn distances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.found.errors.iter().map(|error| error[1]))
+        PyArray1::from_iter(py, self.errors.iter().map(|error| error[1]))
     }
 
     /// The bounds that hold: an angle in degrees, and a distance.
     #[getter]
     fn bounds(&self) -> (f64, f64) {
-        let [angle, distance] = self.found.bounds;
+        let [angle, distance] = self.bounds;
         (angle.to_degrees(), distance)
     }
 
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
-        format!(
-            "Reduction({} of {} keys)",
-            self.found.keys[1], self.found.keys[0]
-        )
+        format!("Reduction({} of {} keys)", self.keys[1], self.keys[0])
     }
 }
 
@@ -153,7 +168,10 @@ pub(crate) fn reduce(
         })
     })?;
     Ok(Reduction {
-        clip: clip.get().with_keys(found.clip.clone()),
-        found,
+        clip: clip.get().with_keys(found.clip),
+        keys: found.keys,
+        bounds: found.bounds,
+        times: found.times,
+        errors: found.errors,
     })
 }

@@ -1,11 +1,12 @@
 //! `tumble.Surface`: routes over meshes and Bézier surfaces, and walkers on them.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use glam::DVec3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyTuple, PyType};
 use tumble::{Error, Stop, StoppedError};
 use tumble_routes::ground::{Clear, Ground};
 use tumble_routes::mesh::Mesh;
@@ -13,10 +14,11 @@ use tumble_routes::net::{Net, NetBy};
 use tumble_routes::route::By;
 use tumble_routes::walkers::{self, Mover, Walker};
 
-use crate::arrays::{ArrayValues, doubles, parts};
+use crate::arrays::{ArrayValues, ListArgument, doubles, parts};
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::options::unknown_name;
 use crate::run::interruptible;
+use crate::values::{Pickled, Value, broken, chunks, list as list_of, pickled, rows};
 
 /// A surface, on which routes are found: a mesh, or a net of Bézier control points.
 ///
@@ -31,7 +33,8 @@ use crate::run::interruptible;
 /// >>> plane = tumble.Surface(corners, [[0, 1, 2, 3]])
 /// >>> plane.route([0.1, 0.2, 0.0], [0.9, 0.8, 0.0]).length
 /// 1.0
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, eq, weakref, module = "tumble")]
+#[derive(PartialEq)]
 pub(crate) struct Surface {
     shape: Shape,
 }
@@ -39,22 +42,143 @@ pub(crate) struct Surface {
 #[derive(Clone)]
 enum Shape {
     Mesh(Arc<Mesh>),
-    Net(Arc<Net>),
+    Net(Arc<ControlNet>),
+}
+
+/// A net and what it was made of.
+struct ControlNet {
+    net: Net,
+    rows: usize,
+    columns: usize,
+    points: Vec<DVec3>,
+}
+
+impl ControlNet {
+    fn new(rows: usize, columns: usize, points: Vec<DVec3>) -> PyResult<Self> {
+        let net = Net::new(rows, columns, points.clone()).map_err(|error| refused(&error))?;
+        Ok(Self {
+            net,
+            rows,
+            columns,
+            points,
+        })
+    }
+}
+
+impl PartialEq for Shape {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Mesh(one), Self::Mesh(other)) => {
+                one.positions() == other.positions() && one.triangles() == other.triangles()
+            }
+            (Self::Net(one), Self::Net(other)) => {
+                (one.rows, one.columns, &one.points) == (other.rows, other.columns, &other.points)
+            }
+            _ => false,
+        }
+    }
+}
+
+fn points_of(state: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
+    let points: Vec<[f64; 3]> = chunks(state)?;
+    Ok(points.into_iter().map(DVec3::from_array).collect())
+}
+
+impl Value for Surface {
+    /// The triangles, or the size of the net, and the points.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        match &self.shape {
+            Shape::Mesh(mesh) => {
+                let triangles = rows(py, mesh.triangles().as_flattened().to_vec(), 3)?;
+                (triangles, array(py, mesh.positions())?).into_pyobject(py)
+            }
+            Shape::Net(net) => ((net.rows, net.columns), array(py, &net.points)?).into_pyobject(py),
+        }
+    }
+
+    fn of_state(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let (first, points): (Bound<'_, PyAny>, Bound<'_, PyAny>) = state.extract()?;
+        let points = points_of(&points)?;
+        let shape = match first.is_instance_of::<PyTuple>() {
+            true => {
+                let (rows, columns) = first.extract()?;
+                Shape::Net(Arc::new(ControlNet::new(rows, columns, points)?))
+            }
+            false => {
+                let triangles: Vec<[u32; 3]> = chunks(&first)?;
+                let mesh = Mesh::new(&points, &triangles).map_err(|error| refused(&error))?;
+                Shape::Mesh(Arc::new(mesh))
+            }
+        };
+        Ok(Self { shape })
+    }
 }
 
 /// A route over a surface: straight from each point to the next.
-#[pyclass(frozen, module = "tumble", from_py_object)]
-#[derive(Clone)]
+#[pyclass(frozen, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Route {
     found: Arc<tumble_routes::route::Route>,
 }
 
 /// The positions of a walker at times: straight from each point to the next.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, eq, weakref, module = "tumble")]
+#[derive(PartialEq)]
 pub(crate) struct Walk {
     times: Vec<f64>,
     points: Vec<DVec3>,
     ups: Option<Vec<DVec3>>,
+}
+
+impl Value for Route {
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let found = &self.found;
+        let normals = found.normals.as_ref();
+        let normals = normals.map(|normals| array(py, normals)).transpose()?;
+        (array(py, &found.points)?, normals, found.length, found.off).into_pyobject(py)
+    }
+
+    fn of_state(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        type State<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, f64, [f64; 2]);
+        let (points, normals, length, off): State<'_> = state.extract()?;
+        let points = points_of(&points)?;
+        let normals = normals.map(|normals| points_of(&normals)).transpose()?;
+        let is_broken = |normals: &Vec<DVec3>| normals.len() != points.len();
+        if points.is_empty() || normals.as_ref().is_some_and(is_broken) {
+            return Err(broken());
+        }
+        let found = tumble_routes::route::Route {
+            points,
+            normals,
+            length,
+            off,
+        };
+        Ok(Self {
+            found: Arc::new(found),
+        })
+    }
+}
+
+impl Value for Walk {
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let ups = self.ups.as_ref().map(|ups| array(py, ups)).transpose()?;
+        let times = PyArray1::from_slice(py, &self.times);
+        (times, array(py, &self.points)?, ups).into_pyobject(py)
+    }
+
+    fn of_state(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        type State<'py> = (
+            Bound<'py, PyAny>,
+            Bound<'py, PyAny>,
+            Option<Bound<'py, PyAny>>,
+        );
+        let (times, points, ups): State<'_> = state.extract()?;
+        Ok(Self {
+            times: list_of(&times)?,
+            points: points_of(&points)?,
+            ups: ups.map(|ups| points_of(&ups)).transpose()?,
+        })
+    }
 }
 
 fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<DVec3>)> {
@@ -108,7 +232,7 @@ fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
             ))),
         };
     let face = |numbers: &[f64]| numbers.iter().map(index).collect::<PyResult<Vec<u32>>>();
-    if let Some(parts) = parts(value) {
+    if let Some(parts) = parts(value)? {
         let one = |part: &Bound<'_, PyAny>| match doubles(part, "faces")? {
             ArrayValues { shape, values } if shape.len() == 1 => face(&values),
             ArrayValues { shape, .. } => Err(input(format!(
@@ -182,7 +306,7 @@ impl RouteOptions {
                     }
                 };
                 in_pieces(pairs, |pairs| {
-                    let routes = pairs.iter().map(|&[from, to]| net.route(from, to, by));
+                    let routes = pairs.iter().map(|&[from, to]| net.net.route(from, to, by));
                     in_words(routes.collect())
                 })
             }
@@ -221,7 +345,7 @@ impl Surface {
     fn size(&self) -> f64 {
         match &self.shape {
             Shape::Mesh(mesh) => mesh.size(),
-            Shape::Net(net) => net.size(),
+            Shape::Net(net) => net.net.size(),
         }
     }
 
@@ -253,26 +377,23 @@ impl Surface {
         })
     }
 
-    /// A route, with a warning where its ends were moved onto the surface.
+    /// A route, with messages where its ends were moved onto the surface.
     fn route_of(
         &self,
-        py: Python<'_>,
         name: &str,
         found: tumble_routes::route::Route,
-    ) -> PyResult<Route> {
+        messages: &mut Vec<String>,
+    ) -> Route {
         for (end, off) in ["start", "goal"].into_iter().zip(found.off) {
             if off > 1e-6 * self.size() {
-                warn_of(
-                    py,
-                    &format!(
-                        "{name}{end}: it is {off} away from the surface; the nearest point of the surface is used"
-                    ),
-                )?;
+                messages.push(format!(
+                    "{name}{end}: it is {off} away from the surface; the nearest point of the surface is used"
+                ));
             }
         }
-        Ok(Route {
+        Route {
             found: Arc::new(found),
-        })
+        }
     }
 }
 
@@ -293,9 +414,8 @@ impl Surface {
             let mesh = Mesh::welded(&positions, polygons, weld);
             mesh.map_err(|error| refused(&error))
         })?;
-        for warning in mesh.warnings() {
-            warn_of(py, &in_python(&warning.to_string()))?;
-        }
+        let warnings = mesh.warnings().iter().map(ToString::to_string);
+        warn_of(py, &warnings.collect::<Vec<_>>())?;
         Ok(Self {
             shape: Shape::Mesh(Arc::new(mesh)),
         })
@@ -309,7 +429,11 @@ impl Surface {
     /// >>> round(net.route([0, 0, 0], [1, 0, 1], by="line").length, 6)
     /// 1.414214
     #[classmethod]
-    fn net(_class: &Bound<'_, PyType>, points: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn net(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
         let (shape, points) = vectors(points, "points")?;
         let [rows, columns] = shape[..] else {
             return Err(input(format!(
@@ -317,7 +441,7 @@ impl Surface {
                 [&shape[..], &[3]].concat()
             )));
         };
-        let net = Net::new(rows, columns, points).map_err(|error| refused(&error))?;
+        let net = interruptible(py, move || ControlNet::new(rows, columns, points))?;
         Ok(Self {
             shape: Shape::Net(Arc::new(net)),
         })
@@ -361,7 +485,10 @@ impl Surface {
                 .unwrap_or_else(|| Err("no route was computed".to_owned()))
                 .map_err(input)
         })?;
-        self.route_of(py, "", found)
+        let mut moved = Vec::new();
+        let route = self.route_of("", found, &mut moved);
+        warn_of(py, &moved)?;
+        Ok(route)
     }
 
     /// The routes of many pairs, `starts` and `goals` (n, 3), on all cores: a list with a `Route` for each, and
@@ -400,16 +527,35 @@ impl Surface {
         let options = self.options(by, avoid, (clearance, finest, max_slope), up)?;
         let found = interruptible(py, move || options.routes(&pairs))?;
         let mut routes = Vec::with_capacity(found.len());
+        let (mut moved, mut missing) = (Vec::new(), Vec::new());
         for (index, route) in found.into_iter().enumerate() {
             routes.push(match route {
-                Ok(route) => Some(self.route_of(py, &format!("route {index}: "), route)?),
+                Ok(route) => Some(self.route_of(&format!("route {index}: "), route, &mut moved)),
                 Err(error) => {
-                    warn_of(py, &format!("route {index}: {error}"))?;
+                    missing.push(format!("route {index}: {error}"));
                     None
                 }
             });
         }
+        warn_of(py, &moved)?;
+        warn_of(py, &missing)?;
         Ok(routes)
+    }
+
+    /// That of surfaces that are the same is the same.
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        let size = match &self.shape {
+            Shape::Mesh(mesh) => (mesh.positions().len(), mesh.triangles().len()),
+            Shape::Net(net) => (net.rows, net.columns),
+        };
+        size.hash(&mut hasher);
+        hasher.finish()
+    }
+
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
     }
 
     fn __repr__(&self) -> String {
@@ -453,6 +599,11 @@ impl Route {
         (start, goal)
     }
 
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "Route({} points, length {})",
@@ -483,6 +634,11 @@ impl Walk {
         normals.map(|normals| array(py, normals)).transpose()
     }
 
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         let arrival = self.times.last().copied().unwrap_or(0.0);
         format!("Walk({} points, arrives at {arrival} s)", self.times.len())
@@ -504,15 +660,16 @@ impl Walk {
 /// >>> [float(walk.times[-1]) > 4.1 for walk in tumble.walk(routes, speed=1.0, radius=0.3)]
 /// [False, True]
 #[pyfunction]
-#[pyo3(signature = (routes, *, speed, radius, start=None, movers=vec![]), text_signature = "(routes, *, speed, radius, start=0.0, movers=())")]
+#[pyo3(signature = (routes, *, speed, radius, start=None, movers=None), text_signature = "(routes, *, speed, radius, start=0.0, movers=())")]
 pub(crate) fn walk(
     py: Python<'_>,
-    routes: Vec<Route>,
+    routes: ListArgument<Route>,
     speed: &Bound<'_, PyAny>,
     radius: &Bound<'_, PyAny>,
     start: Option<&Bound<'_, PyAny>>,
-    movers: Vec<Bound<'_, PyAny>>,
+    movers: Option<ListArgument<Bound<'_, PyAny>>>,
 ) -> PyResult<Vec<Option<Walk>>> {
+    let routes = routes.0;
     let count = routes.len();
     let numbers = |value: &Bound<'_, PyAny>, name: &str| match doubles(value, name)? {
         ArrayValues { shape, values } if shape.is_empty() => Ok(vec![values[0]; count]),
@@ -558,11 +715,13 @@ pub(crate) fn walk(
     };
     let movers: Vec<Mover> = movers
         .iter()
+        .flat_map(|movers| &movers.0)
         .enumerate()
         .map(mover)
         .collect::<PyResult<_>>()?;
     let plans = interruptible(py, move || Ok(walkers::plan(&walkers, &movers)))?;
     let mut found = Vec::with_capacity(count);
+    let mut missing = Vec::new();
     for (index, (plan, route)) in plans.into_iter().zip(&routes).enumerate() {
         found.push(match plan {
             Ok(plan) => {
@@ -574,10 +733,11 @@ pub(crate) fn walk(
                 })
             }
             Err(error) => {
-                warn_of(py, &format!("routes[{index}]: {error}"))?;
+                missing.push(format!("routes[{index}]: {error}"));
                 None
             }
         });
     }
+    warn_of(py, &missing)?;
     Ok(found)
 }

@@ -46,12 +46,16 @@ pub(crate) fn check_signals() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }
 
-/// Waits for the result of another thread, and for Ctrl-C, which stops its work.
+/// Waits for the result of another thread, and for Ctrl-C, which stops its work. Ctrl-C that came while the last
+/// of it was done is noticed, too: it would interrupt the first Python code that is called with the result.
 fn wait<T>(receiver: &Receiver<PyResult<T>>, stop: &Stop) -> PyResult<T> {
     let early = || PyRuntimeError::new_err("internal error: a thread ended early");
     loop {
         match receiver.recv_timeout(PATIENCE) {
-            Ok(found) => return found,
+            Ok(found) => {
+                check_signals()?;
+                return found;
+            }
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(interrupted) = check_signals() {
                     stop.stop();

@@ -446,7 +446,7 @@ fn channel(
     let Some(value) = value else {
         return Ok((made(&vec![rest; count])?, vec![false; tracks]));
     };
-    let lists = parts(value).filter(|parts| parts.iter().any(Bound::is_none));
+    let lists = parts(value)?.filter(|parts| parts.iter().any(Bound::is_none));
     let Some(lists) = lists else {
         let (other, values) = vectors(value, name)?;
         if other != shape {

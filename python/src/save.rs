@@ -22,10 +22,10 @@ use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{Diagnostic, Feature};
 
-use crate::arrays::Order;
+use crate::arrays::{ListArgument, Order};
 use crate::clip::{Clip, Source};
 use crate::engine::{default_engine, layout_named};
-use crate::errors::{input, of_engine, of_output, of_write, warn};
+use crate::errors::{expected, input, of_engine, of_output, of_write, warn};
 use crate::evaluate::uniform;
 use crate::file::{File, format_named};
 use crate::options::{Request, SampleRequest, option_named};
@@ -62,7 +62,7 @@ const CHUNK: usize = 1 << 20;
 /// (1, 31, 4)
 #[pyfunction]
 #[pyo3(signature = (
-    path, clips, /, *, format=None, sequence=None, linear=vec![], order=None, layout="track",
+    path, clips, /, *, format=None, sequence=None, linear=None, order=None, layout="track",
     end_frame=None, times_out=None, quantize=false, meshopt=false, overwrite=true, engine=None, **options
 ), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -72,7 +72,7 @@ pub(crate) fn save(
     clips: &Bound<'_, PyAny>,
     format: Option<&str>,
     sequence: Option<&str>,
-    linear: Vec<String>,
+    linear: Option<ListArgument<String>>,
     order: Option<&str>,
     layout: &str,
     end_frame: Option<&str>,
@@ -121,7 +121,7 @@ pub(crate) fn save(
             name: path.display().to_string(),
             format: name.to_lowercase(),
             sequence,
-            linear,
+            linear: linear.map_or_else(Vec::new, |linear| linear.0),
             order,
             box_length: clips.first().and_then(Clip::box_length),
             times_apart: times_out.is_some(),
@@ -170,9 +170,7 @@ pub(crate) fn save(
         }
         Ok(warnings)
     })?;
-    warnings
-        .iter()
-        .try_for_each(|diagnostic| warn(py, diagnostic))
+    warn(py, &warnings)
 }
 
 /// A clip, the clips of a file, or a list of them.
@@ -183,15 +181,15 @@ pub(crate) fn clips_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Clip>> {
     if let Ok(file) = value.cast::<File>() {
         return file.as_any().getattr("clips")?.extract();
     }
-    let clips: Vec<Clip> = value.extract().map_err(|_| {
-        let kind = value.get_type().to_string();
-        pyo3::exceptions::PyTypeError::new_err(format!(
-            "{kind}: give a Clip, a File or a list of clips"
-        ))
+    let clips: ListArgument<Clip> = value.extract().map_err(|error| {
+        expected(value.py(), error, || {
+            let kind = value.get_type();
+            format!("clips: a {kind}; give a Clip, a File or a list of clips")
+        })
     })?;
-    match clips.is_empty() {
-        true => Err(input("there is no clip to write")),
-        false => Ok(clips),
+    match clips.0.is_empty() {
+        true => Err(input("clips: there is none to write")),
+        false => Ok(clips.0),
     }
 }
 

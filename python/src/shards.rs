@@ -4,13 +4,14 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
 use tumble_cli::host::Refused;
 use tumble_cli::shards;
 
 use crate::errors::guarded;
+use crate::run::interruptible;
 
 /// The outcome of a call, as the program would end: JSON, or an exit code and a message.
 type Outcome = (u8, String);
@@ -29,9 +30,11 @@ fn refuse(refused: Refused) -> PyErr {
 
 /// The inputs that a command line of `tumble eval` names.
 #[pyfunction]
-pub(crate) fn inputs_of(line: Vec<OsString>) -> PyResult<Vec<OsString>> {
-    let inputs = shards::inputs(&line).map_err(refuse)?;
-    Ok(inputs.into_iter().map(PathBuf::into_os_string).collect())
+pub(crate) fn inputs_of(py: Python<'_>, line: Vec<OsString>) -> PyResult<Vec<OsString>> {
+    interruptible(py, move || {
+        let inputs = shards::inputs(&line).map_err(refuse)?;
+        Ok(inputs.into_iter().map(PathBuf::into_os_string).collect())
+    })
 }
 
 /// The files that an input refers to, relative to its folder.
@@ -62,11 +65,13 @@ pub(crate) fn kernels_sha256() -> &'static str {
 /// Makes one manifest of a directory's shards; gives an exit code, and JSON or a message.
 #[pyfunction]
 pub(crate) fn merge(py: Python<'_>, folder: PathBuf) -> PyResult<Outcome> {
-    py.detach(|| guarded(|| Ok(ended(shards::merge(&folder).map(|merged| merged.to_json())))))
+    interruptible(py, move || {
+        Ok(ended(shards::merge(&folder).map(|merged| merged.to_json())))
+    })
 }
 
 /// A library, cut into shards.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Plan {
     plan: shards::LibraryPlan,
 }
@@ -80,16 +85,14 @@ impl Plan {
         library: PathBuf,
         listed: Option<Vec<(String, u64)>>,
         folder: PathBuf,
-        shard_bytes: &str,
-        into: &str,
+        shard_bytes: String,
+        into: String,
     ) -> PyResult<Self> {
-        py.detach(|| {
-            guarded(|| {
-                let plan =
-                    shards::LibraryPlan::new(&line, &library, listed, &folder, shard_bytes, into);
-                Ok(Self {
-                    plan: plan.map_err(refuse)?,
-                })
+        interruptible(py, move || {
+            let plan =
+                shards::LibraryPlan::new(&line, &library, listed, &folder, &shard_bytes, &into);
+            Ok(Self {
+                plan: plan.map_err(refuse)?,
             })
         })
     }
@@ -136,9 +139,9 @@ impl Plan {
 }
 
 /// Evaluates shards on a device that stays open.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Worker {
-    worker: Mutex<shards::Worker>,
+    worker: Arc<Mutex<shards::Worker>>,
     device: String,
     options: String,
 }
@@ -153,14 +156,12 @@ impl Worker {
 
     #[new]
     fn new(py: Python<'_>, line: Vec<OsString>, threads: Option<usize>) -> PyResult<Self> {
-        py.detach(|| {
-            guarded(|| {
-                let worker = shards::Worker::new(&line, threads).map_err(refuse)?;
-                Ok(Self {
-                    device: worker.device().to_owned(),
-                    options: worker.options().to_owned(),
-                    worker: Mutex::new(worker),
-                })
+        interruptible(py, move || {
+            let worker = shards::Worker::new(&line, threads).map_err(refuse)?;
+            Ok(Self {
+                device: worker.device().to_owned(),
+                options: worker.options().to_owned(),
+                worker: Arc::new(Mutex::new(worker)),
             })
         })
     }
@@ -198,18 +199,18 @@ impl Worker {
             inputs,
             record,
         };
-        py.detach(|| {
-            guarded(|| {
-                let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
-                let outcome = worker.run(&task, &folder);
-                Ok(ended(outcome.map(|outcome| outcome.to_json())))
-            })
+        let worker = Arc::clone(&self.worker);
+        // Where Ctrl-C ends it, the evaluation of an input fails, and no record of the shard is written.
+        interruptible(py, move || {
+            let mut worker = worker.lock().unwrap_or_else(PoisonError::into_inner);
+            let outcome = worker.run(&task, &folder);
+            Ok(ended(outcome.map(|outcome| outcome.to_json())))
         })
     }
 }
 
 /// A shard's file, for results that the program cannot write itself.
-#[pyclass(module = "tumble")]
+#[pyclass(weakref, module = "tumble")]
 pub(crate) struct Record {
     record: shards::ShardRecord,
 }

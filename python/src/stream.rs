@@ -4,20 +4,22 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PySlice;
+use pyo3::types::{PySlice, PyTuple};
 use tumble::{Encoding, Engine, Interpolation, Layout, Quantity, SampleTimes};
 use tumble_formats::motion::Motion;
 
-use crate::arrays::Order;
+use crate::arrays::{Order, numpy};
 use crate::errors::{input, of_engine};
 use crate::evaluate::{MethodTracks, sets, uniform};
 use crate::options::Request;
 use crate::output::{array, filled};
 use crate::run::{Job, stoppable};
+use crate::values::{Pickled, Value, pickled};
 
 /// An iterator of `Chunk`s; see `Engine.stream`.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Chunks {
     engine: Engine,
     motion: Arc<Motion>,
@@ -48,11 +50,28 @@ struct PreparedTracks {
 }
 
 /// A part of a result, contiguous in the whole.
-#[pyclass(frozen, module = "tumble")]
+#[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Chunk {
     tracks: Range<usize>,
     frames: Range<usize>,
     rotations: Py<PyArrayDyn<f32>>,
+}
+
+impl Value for Chunk {
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let ranges = [&self.tracks, &self.frames].map(|range| (range.start, range.end));
+        let [tracks, frames] = ranges;
+        (tracks, frames, &self.rotations).into_pyobject(py)
+    }
+
+    fn of_state(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let (tracks, frames, rotations): ((usize, usize), (usize, usize), _) = state.extract()?;
+        Ok(Self {
+            tracks: tracks.0..tracks.1,
+            frames: frames.0..frames.1,
+            rotations,
+        })
+    }
 }
 
 impl Chunks {
@@ -244,6 +263,25 @@ impl Chunk {
     #[getter]
     fn rotations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
         self.rotations.bind(py).clone()
+    }
+
+    /// Whether the other has the same rotations of the same tracks and frames.
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let Ok(other) = other.cast::<Self>() else {
+            return Ok(false);
+        };
+        let other = other.get();
+        let is_place = (&self.tracks, &self.frames) == (&other.tracks, &other.frames);
+        let equal = intern!(py, "array_equal");
+        Ok(is_place
+            && numpy(py)?
+                .call_method1(equal, (&self.rotations, &other.rotations))?
+                .is_truthy()?)
+    }
+
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
     }
 
     fn __repr__(&self) -> String {

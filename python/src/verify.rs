@@ -8,12 +8,14 @@ use tumble_formats::motion::Motion;
 use crate::errors::of_engine;
 use crate::evaluate::sets;
 use crate::options::Request;
+use crate::values::{Pickled, pickled, value};
 
 /// What `Engine.verify` found.
-#[pyclass(frozen, get_all, module = "tumble")]
+#[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Verification {
     /// The method; "authored" where tracks have different methods.
-    method: &'static str,
+    method: String,
     /// The Vulkan device; None on the CPU, where nothing is compared between devices.
     device: Option<String>,
     /// Rotations compared.
@@ -33,14 +35,27 @@ pub(crate) struct Verification {
     passes: bool,
     /// "passed", "reference-only" (the CPU is near the reference, and no device took part), "nothing"
     /// (there was no sample) or "failed".
-    verdict: &'static str,
+    verdict: String,
 }
+
+value!(Verification {
+    method,
+    device,
+    rotations,
+    differing,
+    max_error,
+    rms_error,
+    max_norm_error,
+    error_bound,
+    passes,
+    verdict,
+});
 
 impl Verification {
     /// Verifies the tracks of each method, and puts together what was found.
     pub(crate) fn of(engine: &Engine, clip: &Motion, request: &Request) -> PyResult<Self> {
         let mut all = Self {
-            method: request.method_name(),
+            method: request.method_name().to_owned(),
             device: None,
             rotations: 0,
             differing: 0,
@@ -49,7 +64,7 @@ impl Verification {
             max_norm_error: 0.0,
             error_bound: 0.0,
             passes: false,
-            verdict: Verdict::Nothing.name(),
+            verdict: Verdict::Nothing.name().to_owned(),
         };
         let mut verdict: Option<Verdict> = None;
         let with = request.with(Quantity::Rotation);
@@ -60,7 +75,7 @@ impl Verification {
             let found = verify(engine, &set, with(method), &frames);
             let found = found.map_err(|error| of_engine(&error))?;
             if is_one {
-                all.method = found.method;
+                all.method = found.method.to_owned();
             }
             verdict = verdict.max(Some(found.verdict()));
             all.device = found.device;
@@ -75,13 +90,18 @@ impl Verification {
             all.error_bound = all.error_bound.max(found.error_bound);
         }
         let verdict = verdict.unwrap_or(Verdict::Nothing);
-        (all.passes, all.verdict) = (verdict == Verdict::Passed, verdict.name());
+        (all.passes, all.verdict) = (verdict == Verdict::Passed, verdict.name().to_owned());
         Ok(all)
     }
 }
 
 #[pymethods]
 impl Verification {
+    /// By its fields.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
+        pickled(slf)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "Verification({} by {} on {}: {}, {} differ, error {:.1e} of {:.0e} rad)",

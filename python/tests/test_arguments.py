@@ -152,7 +152,7 @@ REFUSED = {
     "None as keys": (dict(keys=None), None, None, "object"),
     "a masked array": (dict(keys=np.ma.masked_less(KEYS, 0)), None, None, "masked"),
     "lists that are not even": (dict(keys=[[[0, 0, 0, 1]], [[0, 0, 1]]]), None, None, "keys[1]"),
-    "fewer times than keys": (dict(times=TIMES[:3]), None, None, "4 keys but 3 times"),
+    "fewer times than keys": (dict(times=TIMES[:3]), None, None, "(frames, tracks, 4)"),
     "times for other tracks": (dict(times=np.stack([TIMES] * 2)), None, None, "2 tracks"),
     "times with three axes": (dict(times=np.zeros((1, 1, 4))), None, None, "times: the shape"),
     "one time for all keys": (dict(times=0.5), None, None, "times: the shape"),
@@ -318,3 +318,104 @@ def test_devices_that_are_not_there():
 
 def test_the_tables_are_as_long_as_promised():
     assert len(SAME) + len(EMPTY) + len(REFUSED) + len(OTHERS) >= 100
+
+
+def test_keys_of_frames_are_read_by_their_layout():
+    """(frames, tracks, 4), as engines of physics and of machine learning hold poses."""
+    by_frame = np.swapaxes(KEYS, 0, 1)
+    moves = np.arange(36.0).reshape(3, 4, 3)
+    expected = tumble.Clip(TIMES, KEYS, translations=moves, velocities=moves)
+    found = tumble.Clip(
+        TIMES, by_frame, layout="frame", translations=np.swapaxes(moves, 0, 1), velocities=list(moves)
+    )
+    assert found == expected
+    assert tumble.Clip(TIMES, list(by_frame), layout="frame") == CLIP
+    for call_of_it in (tumble.Clip, lambda *of: tumble.evaluate(*of, fps=10)):
+        with pytest.raises(tumble.InputError, match=r'layout="frame".*swapaxes\(keys, 0, 1\)'):
+            call_of_it(TIMES, by_frame)
+    with pytest.raises(tumble.InputError, match=r'of layout="track", \(tracks, keys, 4\)'):
+        tumble.Clip(TIMES, KEYS, layout="frame")
+    with pytest.raises(tumble.InputError, match=r"translations: the shape is \(3, 4, 3\); give \(frames, 3, 3\)"):
+        tumble.Clip(TIMES, by_frame, layout="frame", translations=moves)
+
+
+def test_as_many_tracks_as_keys_need_a_layout(rng):
+    keys, times = unit(rng, 5, 5), np.arange(5.0)
+    both = r'both axes may be that of the frames; say which it is by {}layout="track"'
+    with pytest.raises(tumble.InputError, match=both.format("")):
+        tumble.Clip(times, keys)
+    with pytest.raises(tumble.InputError, match=both.format(r"Clip\(times, keys, ")):
+        tumble.evaluate(times, keys, fps=2)
+    track = tumble.Clip(times, keys, layout="track")
+    with pytest.warns(tumble.InputWarning, match=r"read as \(tracks, keys, 4\); say so by layout="):
+        named = tumble.Clip(times, keys, names=list("abcde"))
+    assert np.array_equal(named.keys("b"), keys[1])
+    assert np.array_equal(track.keys(1), keys[1])
+    assert np.array_equal(tumble.Clip(times, keys, layout="frame").keys(1), keys[:, 1])
+    # Times of each track, and lists of tracks, say what the axes are.
+    assert tumble.Clip([times] * 5, keys) == tumble.Clip(times, list(keys)) == track
+
+
+def test_times_of_a_clock_count_from_a_whole_second(tmp_path):
+    """As those of files; the exact values are those of the turn by 180 degrees."""
+    times = 1.7e9 + np.array([0.25, 0.75, 1.25])
+    keys = [[0, 0, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]]
+    clip = tumble.Clip(times, keys)
+    assert (clip.time_offset, clip.span) == (1_700_000_000, (0.25, 1.25))
+    for at in (0.75, 1_700_000_000.75):
+        assert clip.evaluate(at=at, method="slerp").tolist() == [[0, 0, 1, 0]]
+        assert tumble.evaluate(times, keys, at=at, method="slerp").tolist() == [0, 0, 1, 0]
+    assert tumble.Clip([times, times + 1], [keys, keys]).time_offset == 1_700_000_000
+    assert tumble.Clip(times - 1.7e9, keys).time_offset == 0
+    path = tmp_path / "clock.tum"
+    tumble.save(path, clip)
+    loaded = tumble.load(path).clip
+    assert (loaded.time_offset, loaded.times(0).tolist()) == (clip.time_offset, clip.times(0).tolist())
+    with pytest.raises(tumble.InputError, match=r"0.25 s.*\(times are counted from second 1700000000\)"):
+        tumble.Clip(times[[0, 0, 1]], keys)
+
+
+LARGE = {
+    "times": lambda of: tumble.Clip(of(0.0), KEYS[0]),
+    "keys": lambda of: tumble.Clip(TIMES, of([0.0, 0.0, 0.0, 1.0])),
+    "keys in float32": lambda of: tumble.Clip(TIMES, of(np.float32([0.0, 0.0, 0.0, 1.0]))),
+    "whole numbers": lambda of: tumble.Clip(of(0), KEYS[0]),
+    "parents": lambda of: tumble.Clip(TIMES, KEYS[0], parents=of(0)),
+    "names": lambda of: tumble.Clip(TIMES, KEYS[0], names=of("a")),
+    "offsets": lambda of: tumble.Clip(TIMES, KEYS[0], parents=[None], offsets=of([0.0] * 3)),
+    "translations": lambda of: tumble.Clip(TIMES, KEYS[0], translations=of([0.0] * 3)),
+    "at": lambda of: CLIP.evaluate(at=of(0.5)),
+    "evaluate": lambda of: tumble.evaluate(of(0.0), KEYS[0], fps=1),
+    "poses": lambda of: tumble.Engine("cpu").poses(CLIP, at=of(0.5)),
+    "smooth": lambda of: tumble.Engine("cpu").smooth(of([0.0, 0.0, 0.0, 1.0])),
+    "vectors": lambda of: tumble.Engine("cpu").smooth(of([0.0, 0.0, 0.0])),
+    "blend": lambda of: tumble.Engine("cpu").blend([of([0.0, 0.0, 0.0, 1.0])]),
+    "weights": lambda of: tumble.Engine("cpu").blend([KEYS], of(1.0)),
+    "mix": lambda of: tumble.Engine("cpu").mix(KEYS, of([0.0, 0.0, 0.0, 1.0]), 0.5),
+    "add": lambda of: tumble.Engine("cpu").add(of([0.0, 0.0, 0.0, 1.0]), KEYS),
+    "local_to_model": lambda of: tumble.Engine("cpu").local_to_model(KEYS[:, 0], of(-1)),
+    "follow": lambda of: tumble.Engine("cpu").follow(None, of([0.0] * 3), duration=1, fps=1),
+    "compare": lambda of: tumble.compare(of(0.0), of(0.0)),
+    "surface": lambda of: tumble.Surface(of([0.0] * 3), [[0, 1, 2]]),
+    "faces": lambda of: tumble.Surface(np.eye(3), of([0, 1, 2])),
+    "net": lambda of: tumble.Surface.net(np.broadcast_to(0.0, (2**20, 2**20, 3))),
+    "library": lambda of: LIBRARY.sample(of(0), of(0.0)),
+    "crowd": lambda of: CROWD.set(of(0), 0),
+    "masks": lambda of: tumble.Crowd([BODY], 1, masks=[of(1.0)]),
+    "linear": lambda of: tumble.save("x.npz", CLIP, linear=of("a")),
+}
+BODY = tumble.Clip(TIMES, KEYS, parents=[None, 0, 1], offsets=np.ones((3, 3)))
+LIBRARY = tumble.MotionLibrary([BODY])
+CROWD = tumble.Crowd([BODY], 3)
+
+
+@pytest.mark.parametrize("case", LARGE)
+def test_an_array_that_is_larger_than_memory_is_a_memory_error(case):
+    """The elements of an array that is broadcast share memory; a copy of it has no room."""
+
+    def of(row):
+        row = np.asarray(row)
+        return np.broadcast_to(row, (2**40, *row.shape))
+
+    with pytest.raises(MemoryError):
+        LARGE[case](of)

@@ -69,7 +69,7 @@ def test_ten_thousand_poses_leave_nothing(rng):
 
 
 def test_results_are_arrays_for_everyone(rng):
-    found = tumble.evaluate([0.0, 1.0], unit(rng, 2, 2), fps=10)
+    found = tumble.evaluate([0.0, 1.0], list(unit(rng, 2, 2)), fps=10)
     assert type(found) is np.ndarray
     assert np.shares_memory(np.from_dlpack(found), found)
     assert memoryview(found).nbytes == found.nbytes == 2 * 11 * 16

@@ -36,6 +36,7 @@ def clips(rng):
         return tumble.Clip(
             3.0 + np.arange(frames) / rate,
             keys,
+            layout="track",
             name=f"{frames} at {rate}",
             parents=PARENTS,
             offsets=OFFSETS,
@@ -134,7 +135,7 @@ def test_wrong_arguments_are_refused(clips, rng):
         library.sample([0], [0.0], out=read_only)
     with pytest.raises(tumble.InputError, match="give at least one"):
         tumble.MotionLibrary([])
-    other = tumble.Clip([0.0, 1.0], unit(rng, 2, 2))
+    other = tumble.Clip([0.0, 1.0], unit(rng, 2, 2), layout="track")
     with pytest.raises(tumble.InputError, match="2 tracks; the skeleton has 7"):
         tumble.MotionLibrary([clips[0], other])
     with pytest.raises(tumble.InputError, match="no skeleton"):

@@ -52,6 +52,31 @@ const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "f
 /// The array with the duration in seconds, in files of AMASS.
 const LENGTH: &str = "mocap_time_length";
 
+/// What files of AMASS and SMPL-X usually have besides the motion: the shape of the body, the motion of soft tissue,
+/// and the markers that the motion was computed from.
+const BESIDE: [&str; 20] = [
+    "betas",
+    "dmpls",
+    "expression",
+    "gender",
+    "id",
+    "labels",
+    "labels_obs",
+    "latent_labels",
+    "marker_data",
+    "marker_labels",
+    "markers",
+    "markers_latent",
+    "markers_latent_vids",
+    "markers_obs",
+    "markers_sim",
+    "model",
+    "num_betas",
+    "smpl_scaling",
+    "surface_model_type",
+    "v_template_fname",
+];
+
 /// Names and parents of joints.
 struct Skeleton {
     names: Vec<String>,
@@ -203,6 +228,7 @@ pub(crate) fn plan(
     if let Some(skeleton) = skeleton {
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
         plan.is_body = true;
+        plan.usual = &BESIDE;
         plan.no_world = Some(
             "where a body's joints are depends on its shape; give a model of it with --body-model, or their places with --offsets"
                 .to_owned(),

@@ -8,6 +8,15 @@ use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::quaternion::ComponentOrder;
 
+/// What these files usually have besides the bodies' poses: their rates, and the same motion as angles of joints.
+const BESIDE: [&str; 5] = [
+    "body_angular_velocities",
+    "body_linear_velocities",
+    "dof_names",
+    "dof_positions",
+    "dof_velocities",
+];
+
 /// The plan of a file in this layout; `None` for other files.
 pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::FrameMajor);
@@ -17,6 +26,7 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
     };
     let mut plan = ArchivePlan {
         is_world: true,
+        usual: &BESIDE,
         ..ArchivePlan::default()
     };
     plan.add(archive, rotations)?;

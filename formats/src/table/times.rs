@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::decimal::{OFFSET_LIMIT, offset_of};
+use crate::decimal::offset_of;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{LARGEST_SECONDS, ReadOptions, TimeUnit};
+use crate::motion::clock_second;
 use crate::rate::Precision;
 use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
 use crate::table::plan::{TablePlan, TimeSource};
@@ -139,25 +140,20 @@ pub(crate) fn times(
 /// Times in f64. Those that begin at a large distance from 0 were rounded there: 1.7e9 s to a quarter of a
 /// microsecond.
 fn doubles(mut seconds: Vec<f64>) -> RowTimes {
-    let first = seconds
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min)
-        .floor();
-    let needs_offset = first.abs() >= OFFSET_LIMIT as f64 && first.abs() <= LARGEST_SECONDS;
-    if !needs_offset {
+    let offset = clock_second(&seconds);
+    if offset == 0 {
         return RowTimes {
             seconds,
             precision: Some(Precision::F64),
-            offset: 0,
+            offset,
         };
     }
-    let step = Precision::F64.ulp(first);
-    seconds.iter_mut().for_each(|time| *time -= first);
+    let step = Precision::F64.ulp(offset as f64);
+    seconds.iter_mut().for_each(|time| *time -= offset as f64);
     RowTimes {
         seconds,
         precision: Some(Precision::Decimals(-libm::log10(step).ceil() as u32)),
-        offset: first as i64,
+        offset,
     }
 }
 

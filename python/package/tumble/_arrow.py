@@ -106,7 +106,7 @@ def _evaluated(
         )
         raise InputError(message, pointer=f"column keys, row {row}")
     try:
-        clip = Clip(times, keys.reshape(-1, len(times), 4), order=order)
+        clip = Clip(times, keys.reshape(-1, len(times), 4), order=order, layout="track")
     except InputError as error:
         pointer = error.pointer or "keys"
         raise InputError(str(error), code=error.code, pointer=f"row {row}, {pointer}") from error

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+from types import FrameType
+
 
 class _Located(Exception):
     """The code and the position of the fault; None where there is none."""
@@ -92,3 +96,16 @@ class InputWarning(_Located, UserWarning):
     >>> issubclass(tumble.InputWarning, UserWarning)
     True
     """
+
+
+def warn(warning: InputWarning) -> None:
+    """Warns at the line that called the package, in whichever of its functions the warning arises."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and _is_inside(frame):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)
+
+
+def _is_inside(frame: FrameType) -> bool:
+    name: str = frame.f_globals.get("__name__", "")
+    return name.partition(".")[0] == __name__.partition(".")[0]

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tumble._errors import InputError
-from tumble._tumble import Clip, Engine, File, Motions, load
+from tumble._files import whole
+from tumble._tumble import Clip, Engine, File, Motions, load, load_all
 
 if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
@@ -36,8 +37,12 @@ _VERSION = 1
 _STORED = ("version", "method", "names", "lengths", "rates")
 
 
-@dataclass(slots=True)
-class MotionState:
+class _WithWeakReferences:
+    __slots__ = ("__weakref__",)
+
+
+@dataclass(slots=True, eq=False)
+class MotionState(_WithWeakReferences):
     """What `MotionLibrary.sample` found; an array that was left out is None.
 
     float32, x y z w, seconds and radians:
@@ -58,6 +63,15 @@ class MotionState:
     world_rotations: NDArray[np.float32] | None = None
     velocities: NDArray[np.float32] | None = None
     angular_velocities: NDArray[np.float32] | None = None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, MotionState):
+            return NotImplemented
+        pairs = [(getattr(self, name), getattr(other, name)) for name in _NAMES]
+        return all(
+            first is second or first is not None and second is not None and np.array_equal(first, second)
+            for first, second in pairs
+        )
 
 
 class MotionLibrary:
@@ -143,9 +157,7 @@ class MotionLibrary:
             if not found:
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
-        clips: list[Clip] = []
-        for path in paths:
-            clips += load(path, source_fps=source_fps, override_fps=override_fps).clips
+        clips = [clip for file in load_all(paths, source_fps, override_fps) for clip in file.clips]
         return cls(clips, method=method, skeleton=skeleton, engine=engine)
 
     def sample(
@@ -247,17 +259,9 @@ class MotionLibrary:
         >>> tumble.MotionLibrary.open(path).names
         ['door']
         """
-        final = os.fspath(path)
-        partial = f"{final}.{os.getpid()}.partial"
-        try:
-            with zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
-                for name, array in self._arrays().items():
-                    _write(archive, name, array)
-            os.replace(partial, final)
-        except BaseException:
-            if os.path.exists(partial):
-                os.unlink(partial)
-            raise
+        with whole(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
+            for name, array in self._arrays().items():
+                _write(archive, name, array)
 
     @classmethod
     def open(
@@ -273,7 +277,7 @@ class MotionLibrary:
         """
         file = os.path.abspath(os.fspath(path))
         try:
-            arrays = _mapped(file) if mmap else dict(np.load(os.fspath(path)))
+            arrays = _mapped(file) if mmap else _read(file)
         except FileNotFoundError:
             raise FileNotFoundError(2, os.strerror(2), os.fspath(path)) from None
         except (zipfile.BadZipFile, ValueError, KeyError, EOFError) as error:
@@ -399,13 +403,20 @@ def _write(archive: zipfile.ZipFile, name: str, array: Any) -> None:
         np.lib.format.write_array(member, array, allow_pickle=False)
 
 
+def _read(path: str) -> dict[str, Any]:
+    """The arrays of a file."""
+    with np.load(path, allow_pickle=False) as archive:
+        return dict(archive)
+
+
 def _mapped(path: str) -> dict[str, Any]:
-    """The arrays of a file that `_write` wrote, mapped where they are large."""
+    """The arrays of a file that `_write` wrote, mapped where they are large. What NumPy has written again is read:
+    its arrays may be compressed, and start anywhere."""
     found: dict[str, Any] = {}
     with zipfile.ZipFile(path) as archive, open(path, "rb") as file:
         for info in archive.infolist():
             name = info.filename.removesuffix(".npy")
-            if name not in ("spans", "cells"):
+            if name not in ("spans", "cells") or info.compress_type != zipfile.ZIP_STORED:
                 with archive.open(info) as member:
                     found[name] = np.lib.format.read_array(member, allow_pickle=False)
                 continue
@@ -413,13 +424,14 @@ def _mapped(path: str) -> dict[str, Any]:
             header = file.read(30)
             lengths = [int.from_bytes(header[at : at + 2], "little") for at in (26, 28)]
             file.seek(info.header_offset + 30 + sum(lengths))
-            if info.compress_type != zipfile.ZIP_STORED:
-                raise ValueError("its arrays are compressed")
             version = np.lib.format.read_magic(file)
             if version != (1, 0):
                 raise ValueError("its arrays are of another version")
             shape, fortran, kind = np.lib.format.read_array_header_1_0(file)
             if fortran or kind not in (np.dtype("<u4"), np.dtype("<f4")):
                 raise ValueError("its arrays are of another type")
-            found[name] = np.memmap(path, kind, "r", file.tell(), shape)
+            if file.tell() % kind.itemsize:
+                found[name] = np.fromfile(file, kind, int(np.prod(shape))).reshape(shape)
+            else:
+                found[name] = np.memmap(path, kind, "r", file.tell(), shape)
     return found

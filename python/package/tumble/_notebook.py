@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from tumble import _tumble
+from tumble._files import whole
 
 
 def plot(clip: Any, track: Any, fps: Any, axes: Any, **options: Any) -> Any:
@@ -55,7 +56,7 @@ class View:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the page to a file."""
-        with open(path, "w", encoding="utf-8") as file:
+        with whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
             file.write(self.html)
 
     def _repr_html_(self) -> str:
@@ -64,6 +65,14 @@ class View:
             f'<iframe srcdoc="{page}" width="100%" height="{self.height}" '
             'style="border: 0" title="tumble view" allowfullscreen></iframe>'
         )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, View):
+            return NotImplemented
+        return (self.html, self.height) == (other.html, other.height)
+
+    def __hash__(self) -> int:
+        return hash((self.html, self.height))
 
     def __repr__(self) -> str:
         return f"View({len(self.html) / 1e6:.1f} MB of HTML)"

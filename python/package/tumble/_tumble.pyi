@@ -1,7 +1,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, Literal, Protocol, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -44,6 +44,7 @@ __all__ = [
     "inputs_of",
     "kernels_sha256",
     "load",
+    "load_all",
     "load_drivers",
     "manifest_by_input",
     "manifest_results",
@@ -58,6 +59,7 @@ __all__ = [
     "run",
     "save",
     "set_probe",
+    "value_of_state",
     "walk",
 ]
 __version__: str
@@ -149,6 +151,7 @@ class Clip:
         keys: _Keys,
         *,
         order: _Order = "xyzw",
+        layout: _Layout | None = None,
         name: str | None = None,
         names: Sequence[str] | None = None,
         parents: Sequence[int | None] | None = None,
@@ -910,6 +913,8 @@ class Chunks:
 
 @final
 class Chunk:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def tracks(self) -> slice[int, int, None]: ...
     @property
@@ -919,6 +924,8 @@ class Chunk:
 
 @final
 class Verification:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def method(self) -> str: ...
     @property
@@ -942,6 +949,8 @@ class Verification:
 
 @final
 class File:
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     @property
     def clips(self) -> list[Clip]: ...
     @property
@@ -1110,10 +1119,14 @@ def save(
     bias: float | None = None,
 ) -> None: ...
 def devices() -> list[str]: ...
+def load_all(
+    paths: Sequence[_Path], source_fps: _Rate | None = None, override_fps: _Rate | None = None
+) -> list[File]: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
     path: _Path, clips: Sequence[Clip], refused: Sequence[str]
 ) -> File: ...
+def value_of_state(name: str, state: tuple[Any, ...]) -> Any: ...
 @final
 class Motions:
     @staticmethod
@@ -1233,6 +1246,8 @@ def merge(folder: str) -> tuple[int, str]: ...
 
 @final
 class Spread:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def mean(self) -> float: ...
     @property
@@ -1242,6 +1257,8 @@ class Spread:
 
 @final
 class ArrayDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def numbers(self) -> int: ...
     @property
@@ -1257,6 +1274,8 @@ class ArrayDifference:
 
 @final
 class ChannelDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def mean(self) -> float: ...
     @property
@@ -1272,6 +1291,8 @@ class ChannelDifference:
 
 @final
 class JointDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def track(self) -> str: ...
     @property
@@ -1283,6 +1304,8 @@ class JointDifference:
 
 @final
 class ClipDifference:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def tracks(self) -> int: ...
     @property
@@ -1304,6 +1327,8 @@ class ClipDifference:
 
 @final
 class PathStatistics:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def rmse(self) -> float: ...
     @property
@@ -1319,6 +1344,8 @@ class PathStatistics:
 
 @final
 class PathErrors:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def times_of(self) -> int: ...
     @property
@@ -1384,6 +1411,8 @@ def path_errors(
 
 @final
 class Reduction:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def clip(self) -> Clip: ...
     @property
@@ -1490,6 +1519,8 @@ class Crowd:
 
 @final
 class Surface:
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     def __new__(
         cls, vertices: ArrayLike, faces: ArrayLike, *, weld: float = 0.0
     ) -> Surface: ...
@@ -1522,6 +1553,8 @@ class Surface:
 
 @final
 class Route:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def points(self) -> _Double: ...
     @property
@@ -1533,6 +1566,8 @@ class Route:
 
 @final
 class Walk:
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
     def times(self) -> _Double: ...
     @property

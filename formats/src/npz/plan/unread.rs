@@ -44,17 +44,13 @@ impl ArchivePlan {
         warnings: &mut Warnings,
     ) {
         let name = |index: usize| &*archive.members[index].name;
-        let others = self.not_read(archive, options);
-        let quoted = others.iter().map(|&index| format!("`{}`", name(index)));
+        let others = self.not_read(archive, options).into_iter();
+        let unusual = others.filter(|&index| !self.usual.contains(&name(index)));
+        let quoted = unusual.map(|index| format!("`{}`", name(index)));
         if let Some(names) = listed(quoted.collect()) {
-            let has_shape = others.iter().any(|&index| SHAPE.contains(&name(index)));
-            let hint = match self.is_body && has_shape {
-                true => "; --body-model uses the shape of the body",
-                false => "",
-            };
             let message = format!(
                 "not read: {names}; this is no error, the rotations are in other arrays; to read \
-                 these too, name all arrays of the motion with --map{hint}"
+                 these too, name all arrays of the motion with --map"
             );
             warnings.warn(Code::ArraysNotRead, || (None, message));
         }

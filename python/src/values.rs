@@ -1,0 +1,133 @@
+//! Pickles of results: each is a tuple of its fields.
+
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::PyClass;
+use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::True;
+use pyo3::types::{PyString, PyTuple};
+
+use crate::compare::{
+    ArrayDifference, ChannelDifference, ClipDifference, JointDifference, PathErrors,
+    PathStatistics, Spread,
+};
+use crate::errors::{guarded, input};
+use crate::reduce::Reduction;
+use crate::route::{Route, Surface, Walk};
+use crate::stream::Chunk;
+use crate::verify::Verification;
+
+/// A result that can be pickled.
+pub(crate) trait Value:
+    PyClass<Frozen = True> + Sync + Into<PyClassInitializer<Self>>
+{
+    /// Its fields.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>>;
+
+    /// The value with these fields.
+    fn of_state(state: &Bound<'_, PyTuple>) -> PyResult<Self>;
+}
+
+/// Implements [`Value`] for a class by its fields.
+macro_rules! value {
+    ($type:ident { $($field:ident),+ $(,)? }) => {
+        impl $crate::values::Value for $type {
+            fn state<'py>(
+                &self,
+                py: pyo3::Python<'py>,
+            ) -> pyo3::PyResult<pyo3::Bound<'py, pyo3::types::PyTuple>> {
+                use pyo3::IntoPyObjectExt;
+                pyo3::types::PyTuple::new(py, [$(self.$field.clone().into_bound_py_any(py)?),+])
+            }
+
+            fn of_state(state: &pyo3::Bound<'_, pyo3::types::PyTuple>) -> pyo3::PyResult<Self> {
+                use pyo3::types::{PyAnyMethods, PyTupleMethods};
+                let mut fields = state.iter();
+                let mut field = || fields.next().ok_or_else($crate::values::broken);
+                Ok(Self { $($field: field()?.extract()?),+ })
+            }
+        }
+    };
+}
+pub(crate) use value;
+
+/// A pickle that this version has not written.
+pub(crate) fn broken() -> PyErr {
+    input("the pickle of a result is broken, or of another version of tumble")
+}
+
+/// What `__reduce__` gives: the function that makes a value again, and its arguments.
+pub(crate) type Pickled<'py> = (
+    Bound<'py, PyAny>,
+    (Bound<'py, PyString>, Bound<'py, PyTuple>),
+);
+
+/// How a value is pickled.
+pub(crate) fn pickled<'py, T: Value>(value: &Bound<'py, T>) -> PyResult<Pickled<'py>> {
+    let py = value.py();
+    let again = py.import("tumble._tumble")?.getattr("value_of_state")?;
+    let name = value.as_any().get_type().name()?;
+    Ok((again, (name, value.get().state(py)?)))
+}
+
+type Maker = for<'py> fn(&Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>>;
+
+fn made<'py, T: Value>(state: &Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
+    let value = guarded(|| T::of_state(state))?;
+    Ok(Bound::new(state.py(), value)?.into_any())
+}
+
+/// The classes by their names.
+const MAKERS: [(&str, Maker); 13] = [
+    ("ArrayDifference", made::<ArrayDifference>),
+    ("ChannelDifference", made::<ChannelDifference>),
+    ("Chunk", made::<Chunk>),
+    ("ClipDifference", made::<ClipDifference>),
+    ("JointDifference", made::<JointDifference>),
+    ("PathErrors", made::<PathErrors>),
+    ("PathStatistics", made::<PathStatistics>),
+    ("Reduction", made::<Reduction>),
+    ("Route", made::<Route>),
+    ("Spread", made::<Spread>),
+    ("Surface", made::<Surface>),
+    ("Verification", made::<Verification>),
+    ("Walk", made::<Walk>),
+];
+
+/// The value of a pickle.
+#[pyfunction]
+pub(crate) fn value_of_state<'py>(
+    name: &str,
+    state: &Bound<'py, PyTuple>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let maker = MAKERS.iter().find(|(known, _)| *known == name);
+    maker.ok_or_else(broken)?.1(state)
+}
+
+/// Rows of so many numbers as an array.
+pub(crate) fn rows<T: Element>(
+    py: Python<'_>,
+    numbers: Vec<T>,
+    each: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let count = numbers.len() / each;
+    PyArray1::from_vec(py, numbers).reshape([count, each])
+}
+
+/// Rows of so many numbers, of an array.
+pub(crate) fn chunks<T: Element + Copy, const N: usize>(
+    of: &Bound<'_, PyAny>,
+) -> PyResult<Vec<[T; N]>> {
+    let array: PyReadonlyArray2<'_, T> = of.extract()?;
+    let array = array.as_array();
+    let row = |row: numpy::ndarray::ArrayView1<'_, T>| -> PyResult<[T; N]> {
+        let numbers: Vec<T> = row.iter().copied().collect();
+        numbers.try_into().map_err(|_| broken())
+    };
+    array.outer_iter().map(row).collect()
+}
+
+/// The numbers of an array of one axis.
+pub(crate) fn list<T: Element + Copy>(of: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    let array: PyReadonlyArray1<'_, T> = of.extract()?;
+    Ok(array.as_array().iter().copied().collect())
+}
