@@ -180,17 +180,20 @@ impl CrowdLibrary {
     ) -> Result<usize, CrowdError> {
         let (tracks, joints) = (set.track_count(), self.joint_count());
         let named = Joints::of(set);
-        let order = match &self.joints {
-            Some(known) if known.is_named() || named.is_named() => {
-                Some(known.order_of(&named, ["the library", "the clip"])?)
-            }
-            _ => None,
-        };
-        if tracks != joints {
+        let known = self.joints.as_ref();
+        let has_names = |known: &&Joints| known.is_named() || named.is_named();
+        let both_have_names = known.is_some_and(Joints::is_named) && named.is_named();
+        // With names, the joint that is missing is named.
+        if tracks != joints && !both_have_names {
             return Err(CrowdError::Tracks { tracks, joints });
         }
-        let in_order = |order: &Vec<usize>| !order.iter().copied().eq(0..joints);
-        let selected = order.filter(in_order).map(|order| set.select(order));
+        let order = known
+            .filter(has_names)
+            .map(|known| known.order_of(&named, ["the library", "the clip"]))
+            .transpose()?;
+        let is_shuffled = |order: &Vec<usize>| !order.iter().copied().eq(0..joints);
+        let selected = order.filter(is_shuffled).map(|order| set.select(order));
+        // Only an index that is out of range is an error.
         let selected = selected
             .transpose()
             .map_err(|_| CrowdError::Tracks { tracks, joints })?;

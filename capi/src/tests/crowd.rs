@@ -70,7 +70,7 @@ fn set(number: u32) -> TrackSet {
 }
 
 /// The same set, made by C's functions.
-pub(super) fn c_set(tracks: &TrackSet) -> *mut TumbleSet {
+fn c_set(tracks: &TrackSet) -> *mut TumbleSet {
     let mut set = null_mut();
     // SAFETY: pointers to as many numbers as stated, and room for handles.
     unsafe {

@@ -21,7 +21,6 @@ use crate::engine::*;
 use crate::file::*;
 use crate::interpolation::*;
 use crate::result::*;
-use crate::set::*;
 
 fn load(path: &Path) -> *mut TumbleFile {
     let path = CString::new(path.to_str().unwrap()).unwrap();
@@ -273,7 +272,7 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     done(tumble_file_free(other));
 }
 
-/// A file whose joints are in another order, and a set of the same names, are the same motion; other parents are refused.
+/// A file whose joints are in another order is the same motion; other parents are refused.
 #[test]
 fn joints_of_other_files_are_matched_by_name_and_parent() {
     let folder = tempfile::tempdir().unwrap();
@@ -315,26 +314,9 @@ fn joints_of_other_files_are_matched_by_name_and_parent() {
     let refused = push_clip(library, chain, 0, null(), None);
     let text = "`right` has the parent `hip` in the library, but has the parent `left` in clip 0";
     fails(refused, TumbleResult::InvalidInput, text);
-    // A set of the same names, in another order.
-    let path = folder.path().join("one.bvh");
-    let loaded = Format::open_detected(&path, &ReadOptions::default()).unwrap();
-    let mut set = loaded.clips[0].set.select([2, 0, 1]).unwrap();
-    let pushed = c_set(&set);
-    done(push(library, pushed, None));
-    done(tumble_set_free(pushed));
-    set.set_name(1, "pelvis").unwrap();
-    let pushed = c_set(&set);
-    let refused = push(library, pushed, None);
-    fails(
-        refused,
-        TumbleResult::InvalidInput,
-        "the library has a joint `hip`, the clip has none",
-    );
-    done(tumble_set_free(pushed));
-
     let engine = cpu();
-    let crowd = c_crowd(engine, library, (3, 1));
-    for clip in 0..3 {
+    let crowd = c_crowd(engine, library, (2, 1));
+    for clip in 0..2 {
         let layer = TumbleCrowdLayer {
             instance: clip,
             clip,
@@ -344,9 +326,8 @@ fn joints_of_other_files_are_matched_by_name_and_parent() {
         done(set_layers(crowd, &[layer]));
     }
     let found = bits(crowd, CrowdOutput::from(CrowdValues::Model), false);
-    let each: Vec<_> = found.chunks_exact(found.len() / 3).collect();
-    assert_eq!(each[0], each[1]);
-    assert_eq!(each[0], each[2]);
+    let (first, second) = found.split_at(found.len() / 2);
+    assert_eq!(first, second);
     done(tumble_crowd_free(crowd));
     done(tumble_engine_free(engine));
     done(tumble_crowd_library_free(library));
