@@ -616,9 +616,8 @@ pub(crate) fn path_errors(
         let found = differences::PathDifference::of(&engine, clips, &measure);
         found.map_err(of_compare)
     })?;
-    for warning in &found.warnings {
-        warn_of(py, &[in_python(warning)])?;
-    }
+    let warnings = found.warnings.iter().map(|warning| in_python(warning));
+    warn_of(py, &warnings.collect::<Vec<_>>())?;
     let Some(absolute) = found.ape else {
         return Err(input("there is no pose to compare"));
     };
