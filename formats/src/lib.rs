@@ -122,4 +122,9 @@ pub static SURFACES: &[&SurfaceFormat] = &[
 ];
 
 /// All formats of paths. A file's format is recognised by its first bytes; the first format is the default.
-pub static PATHS: &[&PathFormat] = &[&path::csv::FORMAT, &path::npy::FORMAT];
+pub static PATHS: &[&PathFormat] = &[
+    &path::csv::FORMAT,
+    &path::npy::FORMAT,
+    #[cfg(feature = "mcap")]
+    &mcap::PATH_FORMAT,
+];

@@ -351,3 +351,31 @@ proptest! {
         }
     }
 }
+
+/// Each clip has the names of its tracks, and a name may be as long as the file: what all of them take is counted.
+#[test]
+fn a_long_name_counts_in_every_animation() {
+    let animation = r#"{"samplers":[{"input":0,"output":1}],"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}}]}"#;
+    let file = |name: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":20,"uri":"data:;base64,AAAAAAAAAAAAAAAAAAAAAAAAgD8="}}],
+            "bufferViews":[{{"buffer":0,"byteLength":20}}],"accessors":[
+            {{"bufferView":0,"componentType":5126,"count":1,"type":"SCALAR"}},
+            {{"bufferView":0,"byteOffset":4,"componentType":5126,"count":1,"type":"VEC4"}}],
+            "nodes":[{{"name":"{name}"}}],"animations":[{}]}}"#,
+            vec![animation; 20].join(",")
+        )
+    };
+    let options = ReadOptions {
+        limits: Limits {
+            memory: Some(1 << 20),
+            ..Limits::default()
+        },
+        ..ReadOptions::default()
+    };
+    let read = |name: &str| read_gltf("t.gltf", file(name).into_bytes(), None, &options);
+    let loaded = read("hip").unwrap();
+    assert_eq!((loaded.clips.len(), loaded.refused.len()), (20, 0));
+    let refused = read(&"hip".repeat(40_000)).unwrap_err();
+    assert_eq!(refused.code, Code::Memory, "{refused}");
+}

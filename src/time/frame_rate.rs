@@ -113,7 +113,8 @@ impl fmt::Display for FrameRate {
 impl FromStr for FrameRate {
     type Err = SampleTimesError;
 
-    /// Parses `25`, `12.5`, `1e-3` or `30000/1001`. Decimals are exact.
+    /// Parses `25`, `12.5`, `1e-3` or `30000/1001`. Decimals are exact; one with more digits than a ratio holds, as of
+    /// `0.1 + 0.2` in f64, is rounded to 15 significant digits.
     fn from_str(text: &str) -> Result<Self, SampleTimesError> {
         let refuse = || SampleTimesError::Rate {
             text: text.to_owned(),
@@ -123,10 +124,24 @@ impl FromStr for FrameRate {
                 frames.parse().map_err(|_| refuse())?,
                 seconds.parse().map_err(|_| refuse())?,
             ),
-            None => decimal_ratio(text).ok_or_else(refuse)?,
+            None => {
+                let rate = |(frames, seconds)| Self::new(frames, seconds).ok();
+                let exact = decimal_ratio(text).and_then(rate);
+                return exact
+                    .or_else(|| rounded_ratio(text).and_then(rate))
+                    .ok_or_else(refuse);
+            }
         };
         Self::new(frames, seconds).map_err(|_| refuse())
     }
+}
+
+/// The ratio of a decimal rounded to 15 significant digits, which is what f64 holds of any.
+fn rounded_ratio(text: &str) -> Option<(u64, u64)> {
+    let is_part = |byte: u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'e' | b'E' | b'-');
+    let number: f64 = text.bytes().all(is_part).then(|| text.parse().ok())??;
+    let is_rate = number.is_finite() && number > 0.0;
+    is_rate.then(|| decimal_ratio(&format!("{number:.14e}")))?
 }
 
 /// The exact ratio of a decimal such as `12.5e1`: its digits over a power of ten.
@@ -163,6 +178,8 @@ mod tests {
             ("1e-9", 1, 1_000_000_000),
             ("50/2", 25, 1),
             ("12.50", 25, 2),
+            ("0.30000000000000004", 3, 10),
+            ("59.99999999999999999999", 60, 1),
         ] {
             assert_eq!(text.parse(), FrameRate::new(frames, seconds), "{text}");
         }

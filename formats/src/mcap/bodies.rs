@@ -366,8 +366,8 @@ fn keys(
     let stamps: Vec<i64> = body.poses.iter().map(|pose| pose.time).collect();
     if body.kind == BodyKind::Path && stamps.len() > 1 && stamps.iter().all(|at| *at == stamps[0]) {
         let message = format!(
-            "the path `{name}` of {} poses has no times: all have the stamp {} s, as planners write routes; tumble \
-             follow moves a body along a route: write its positions as CSV with the header x,y,z",
+            "the path `{name}` of {} poses has no times: all have the stamp {} s, as planners write routes; move a body \
+             along it by tumble follow with --seconds or --rate",
             stamps.len(),
             stamps[0] as f64 / SECOND as f64
         );

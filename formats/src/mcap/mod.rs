@@ -21,7 +21,9 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::mcap::bodies::{Body, BodyKind, TimedPose, into_loaded};
 use crate::mcap::cdr::Cdr;
 use crate::mcap::records::{MAGIC, McapChannel, Record, Records};
+use crate::path::{PathFormat, PathPoints};
 use crate::source::Source;
+use crate::text::lines::Limits;
 use crate::warnings::{Warnings, listed};
 
 /// The MCAP format: poses in a log.
@@ -84,20 +86,42 @@ pub fn open_mcap(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnosti
 /// As [`open_mcap`].
 pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let budget = Budget::of(bytes.len(), options.limits);
-    let mut log = Log {
-        name,
-        budget: &budget,
-        topics: Vec::new(),
-        topic_of: HashMap::new(),
-        bodies: Vec::new(),
-        refused: Vec::new(),
-        warnings: Warnings::new(name),
-    };
-    let mut records = Records::new(name, bytes, &budget)?;
-    while let Some(record) = records.next(&mut log.warnings)? {
-        log.message(&record)?;
+    Log::read(name, bytes, &budget)?.into_loaded(options)
+}
+
+/// The paths in logs, each the last one of its topic.
+pub static PATH_FORMAT: PathFormat = PathFormat {
+    name: "mcap",
+    summary: "the paths (nav_msgs/Path) of a log of ROS 2; those of planners have no times",
+    probe: |start| (FORMAT.probe)(start),
+    // A log is first of all one of poses.
+    is_of_paths: |_| false,
+    read_bytes: read_paths,
+};
+
+fn read_paths(name: &str, bytes: &[u8]) -> Result<Vec<PathPoints>, Diagnostic> {
+    let budget = Budget::of(bytes.len(), Limits::default());
+    let log = Log::read(name, bytes, &budget)?;
+    let of_paths = |body: &&Body<'_>| body.kind == BodyKind::Path && !body.poses.is_empty();
+    let paths = log.bodies.iter().filter(of_paths).map(|body| {
+        let first = body.poses[0].time;
+        let is_route = body.poses.iter().all(|pose| pose.time == first);
+        let seconds = |pose: &TimedPose| pose.time.saturating_sub(first) as f64 * 1e-9;
+        PathPoints {
+            times: match is_route {
+                true => Vec::new(),
+                false => body.poses.iter().map(seconds).collect(),
+            },
+            points: body.poses.iter().map(|pose| pose.position).collect(),
+            ups: Vec::new(),
+        }
+    });
+    let paths: Vec<PathPoints> = paths.collect();
+    if paths.is_empty() {
+        let message = "the log has no messages of the type nav_msgs/Path in CDR";
+        return Err(Diagnostic::new(name, Code::McapEmpty, message));
     }
-    log.into_loaded(options)
+    Ok(paths)
 }
 
 /// The content of a message of a known type.
@@ -163,6 +187,23 @@ struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
+    fn read(name: &'a str, bytes: &[u8], budget: &'a Budget) -> Result<Self, Diagnostic> {
+        let mut log = Self {
+            name,
+            budget,
+            topics: Vec::new(),
+            topic_of: HashMap::new(),
+            bodies: Vec::new(),
+            refused: Vec::new(),
+            warnings: Warnings::new(name),
+        };
+        let mut records = Records::new(name, bytes, budget)?;
+        while let Some(record) = records.next(&mut log.warnings)? {
+            log.message(&record)?;
+        }
+        Ok(log)
+    }
+
     fn over(&self, error: &OverBudget) -> Diagnostic {
         Diagnostic::new(self.name, Code::Memory, error.to_string())
     }

@@ -7,6 +7,7 @@ use glam::Quat;
 use tumble::{Channel, FrameRate};
 use tumble_formats::mcap::read_mcap;
 use tumble_formats::motion::{ChannelInterpolation, Motion};
+use tumble_formats::path::{Pace, read_paths};
 use tumble_formats::{Code, Diagnostic, Limits, Loaded, ReadOptions};
 
 use crate::mcap::log::{LogBuilder, Message, transform};
@@ -351,9 +352,15 @@ fn a_route_of_a_planner_has_no_times() {
         let mut log = LogBuilder::new();
         let topic = log.topic("/plan", "nav_msgs/msg/Path", "cdr");
         log.message(topic, NOW, &path([stamp; 6].into_iter()));
-        let fault = try_read(&log.finish()).unwrap_err();
+        let bytes = log.finish();
+        let fault = try_read(&bytes).unwrap_err();
         assert_eq!(fault.code, Code::McapRoute);
         assert!(fault.message.contains("6 poses has no times"), "{fault}");
+        // It is a path to follow.
+        let route = read_paths("t", "route", &bytes, Some(Pace::Seconds(10.0))).unwrap();
+        let route = route.set.vector_keys(Channel::Translation, 0).unwrap();
+        assert_eq!(route.times, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        assert_eq!(route.keys[5].x, 5.0);
     }
 }
 
