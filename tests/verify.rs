@@ -128,9 +128,9 @@ fn half_turns_there_and_back_are_within_their_bounds() {
 fn rates_between_uneven_keys_are_within_their_bounds() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let mut set = TrackSet::new();
-    let far = [[0.1, -0.7, 0.4, 0.6], [0.5, 0.5, -0.5, 0.5]].map(Quat::from_array);
-    let near = [[-0.3, 0.2, 0.9, 0.1], [0.6, 0.3, 0.1, -0.7]].map(Quat::from_array);
-    let keys = [far[0], near[0], near[1], far[1]].map(Quat::normalize);
+    let outer = [[0.1, -0.7, 0.4, 0.6], [0.5, 0.5, -0.5, 0.5]].map(Quat::from_array);
+    let inner = [[-0.3, 0.2, 0.9, 0.1], [0.6, 0.3, 0.1, -0.7]].map(Quat::from_array);
+    let keys = [outer[0], inner[0], inner[1], outer[1]].map(Quat::normalize);
     set.push("far", &[0.0, 0.5, 0.501, 1.0], &keys).unwrap();
     let angles = [0.0, 0.8, 0.801, 0.2].map(Quat::from_rotation_y);
     set.push("near", &[0.0, 0.5, 0.501, 1.0], &angles).unwrap();

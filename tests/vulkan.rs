@@ -294,12 +294,12 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 "{method}, {encoding:?}"
             );
             let refused = [
-                write(stretch(offset + 1, size)),
-                write(stretch(offset, size - 1)),
+                (stretch(offset + 1, size), "ends beyond the buffer"),
+                (stretch(offset, size - 1), "does not fit"),
             ];
-            for result in refused {
-                let error = result.unwrap_err();
-                assert!(error.to_string().contains("does not fit"), "{error}");
+            for (stretch, expected) in refused {
+                let error = write(stretch).unwrap_err();
+                assert!(error.to_string().contains(expected), "{error}");
             }
             // SAFETY: the device has written all that it will.
             unsafe {

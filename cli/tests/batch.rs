@@ -295,13 +295,13 @@ fn results_without_inputs_are_told_and_pruned() {
     fs::copy(folder.join("bad.dat"), folder.join("walks/bad.dat")).unwrap();
     let batch = ["eval", "walks", "-o", "out", "--resume", "--device", "cpu"];
     assert_eq!(run(folder, &batch).code, 3);
-    let gone = ["bad.dat", "deep/b.dat", "deep/c.dat"];
-    for name in gone {
+    let removed = ["bad.dat", "deep/b.dat", "deep/c.dat"];
+    for name in removed {
         fs::remove_file(folder.join("walks").join(name)).unwrap();
     }
     let again = succeed(folder, &batch);
-    let told = "2 results have no input any more (--prune removes what has none)";
-    assert!(again.words.contains(told), "{}", again.words);
+    let expected = "2 results have no input any more (--prune removes what has none)";
+    assert!(again.words.contains(expected), "{}", again.words);
     let check = succeed(folder, &["check", "out"]);
     assert!(
         check.words.contains("2 results have no input"),
@@ -409,13 +409,13 @@ fn directories_may_have_anything() {
         "cpu",
     ];
     let made = succeed(folder, &line);
-    for told in [
+    for expected in [
         "walks/old/up: is a link to walks, a directory that it is in; not followed",
         "walks/round.dat: is a link in a circle of links; not followed",
         "walks/pipe.dat: is a named pipe; skipped (--pipes reads it)",
         "walks/s.dat: is a socket; skipped",
     ] {
-        assert!(made.words.contains(told), "{}", made.words);
+        assert!(made.words.contains(expected), "{}", made.words);
     }
     assert_eq!(
         names(&folder.join("out")),
@@ -432,8 +432,8 @@ fn directories_may_have_anything() {
 
     let empty = run(folder, &["eval", "empty", "walks/old", "-o", "partly"]);
     assert_eq!(empty.code, 3, "{}", empty.words);
-    let told = "empty: error[E002]: is a directory without a file of a format that is read";
-    assert!(empty.words.contains(told), "{}", empty.words);
+    let expected = "empty: error[E002]: is a directory without a file of a format that is read";
+    assert!(empty.words.contains(expected), "{}", empty.words);
     let none = run(folder, &["eval", "a.dat", "-o", "none", "--exclude", "*"]);
     assert_eq!(none.code, 2, "{}", none.words);
     assert!(

@@ -471,9 +471,9 @@ fn an_estimate_of_few_poses_is_not_interpolated() {
         )
     };
     let all: String = (0..101).map(pose).collect();
-    let few: String = (0..11).map(|i| pose(10 * i)).collect();
+    let sparse: String = (0..11).map(|i| pose(10 * i)).collect();
     std::fs::write(folder.join("truth.tum"), all).unwrap();
-    std::fs::write(folder.join("few.tum"), few).unwrap();
+    std::fs::write(folder.join("few.tum"), sparse).unwrap();
     for (first, second, times_of) in [("truth.tum", "few.tum", 1), ("few.tum", "truth.tum", 0)] {
         for how in ["interpolated", "nearest:0.01"] {
             let line = [

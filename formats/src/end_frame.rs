@@ -191,11 +191,11 @@ mod tests {
         let end = 139.0 / 120.0;
         let key = EndSample { at: end, time: end };
         assert_eq!(sample(EndFrame::Key, 0.0, end), Some(key));
-        let hold = EndSample {
+        let held = EndSample {
             at: end,
             time: 35.0 / 30.0,
         };
-        assert_eq!(sample(EndFrame::Hold, 0.0, end), Some(hold));
+        assert_eq!(sample(EndFrame::Hold, 0.0, end), Some(held));
         assert_eq!(sample(EndFrame::LeaveOut, 0.0, end), None);
     }
 

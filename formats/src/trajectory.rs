@@ -687,16 +687,16 @@ mod tests {
                 .collect()
         };
         let direction = DVec3::new(0.6, 0.0, 0.8);
-        let turned = DQuat::from_rotation_y(0.4) * direction;
+        let rotated = DQuat::from_rotation_y(0.4) * direction;
         for align in [Align::Se3, Align::Sim3] {
-            let found = Alignment::of(&along(turned), &along(direction), align);
+            let found = Alignment::of(&along(rotated), &along(direction), align);
             assert_eq!(found.undetermined, Some(Undetermined::Line));
             assert!((found.angle() - 0.4).abs() < 1e-9, "{}", found.angle());
             let same = Alignment::of(&along(direction), &along(direction), align);
             assert!(same.angle() < 1e-9, "{}", same.angle());
         }
         // A turn about z alone is determined, and so is the turn of a path with a bend.
-        let found = Alignment::of(&along(turned), &along(direction), Align::Yaw);
+        let found = Alignment::of(&along(rotated), &along(direction), Align::Yaw);
         assert_eq!(found.undetermined, None);
         let mut bent = along(direction);
         bent[3].position.y += 0.1;

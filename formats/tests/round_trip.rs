@@ -559,9 +559,9 @@ fn files_with_any_names_are_read_again() {
         let set = &loaded.clips[0].set;
         assert_eq!(set.track_count(), names.len(), "{}", format.name);
         let is_changed = set.track_name(0) != names[0] && format.supports(Feature::TrackNames);
-        let is_told = warnings
+        let has_warning = warnings
             .iter()
             .any(|warning| warning.code == Code::NameChanged);
-        assert!(!is_changed || is_told, "{}: {warnings:?}", format.name);
+        assert!(!is_changed || has_warning, "{}: {warnings:?}", format.name);
     }
 }

@@ -453,9 +453,10 @@ fn nanoseconds_of_a_clock_come_back() {
         let warnings = written
             .write_clips(&sampled, &MotionOptions::default(), &mut bytes)
             .unwrap();
-        let told = |it: &&Diagnostic| it.message.contains("nanoseconds of times since 1970");
+        let names_the_loss =
+            |it: &&Diagnostic| it.message.contains("nanoseconds of times since 1970");
         assert_eq!(
-            warnings.iter().filter(told).count(),
+            warnings.iter().filter(names_the_loss).count(),
             left_out,
             "{format}: {warnings:?}"
         );

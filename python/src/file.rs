@@ -228,13 +228,13 @@ pub(crate) fn load(
     scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
-    let given = [
+    let options = [
         ("source_fps", source_fps.is_some()),
         ("override_fps", override_fps.is_some()),
         ("source_times", source_times.is_some()),
     ];
-    let mut given = given.iter().filter(|(_, is_given)| *is_given);
-    if let (Some((first, _)), Some((second, _))) = (given.next(), given.next()) {
+    let mut named = options.iter().filter(|(_, is_named)| *is_named);
+    if let (Some((first, _)), Some((second, _))) = (named.next(), named.next()) {
         return Err(input(format!(
             "{first} and {second} both say when the keys are; give one"
         )));

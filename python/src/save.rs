@@ -470,7 +470,7 @@ impl Save {
                     "its arrays are frames of a rate, without times; give end_frame=\"hold\" or \"leave-out\"",
                 ));
             }
-            (usual, asked) => asked.or(usual).unwrap_or(EndFrame::Key),
+            (of_document, asked) => asked.or(of_document).unwrap_or(EndFrame::Key),
         };
         let times = |clip: &&Motion| {
             let times = document.times(clip.index, rate);

@@ -271,9 +271,9 @@ impl Chunk {
             return Ok(false);
         };
         let other = other.get();
-        let is_place = (&self.tracks, &self.frames) == (&other.tracks, &other.frames);
+        let has_same_samples = (&self.tracks, &self.frames) == (&other.tracks, &other.frames);
         let equal = intern!(py, "array_equal");
-        Ok(is_place
+        Ok(has_same_samples
             && numpy(py)?
                 .call_method1(equal, (&self.rotations, &other.rotations))?
                 .is_truthy()?)

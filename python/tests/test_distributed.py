@@ -352,7 +352,7 @@ def test_inputs_that_fail_are_named(machines, library, tmp_path):
     assert sorted(tree(tmp_path / "out")) == sorted(
         [f"{path.parent.name}/{path.stem}.npy" for path in clips.rglob("0*.dat")] + ["manifest.jsonl"]
     )
-    tumble_program("check", tmp_path / "out")
+    tumble_program("check", tmp_path / "out", code=8)
 
 
 def test_an_output_that_is_refused(machines, library, tmp_path):

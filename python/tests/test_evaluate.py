@@ -315,11 +315,12 @@ def test_keys_without_a_smooth_curve_are_told_once():
 
 
 def test_an_engine_keeps_files_where_it_is_told(tmp_path, monkeypatch):
+    has_devices = bool(tumble.devices())  # what drivers say is remembered where the user's files are
     user, given = tmp_path / "user", tmp_path / "given"
     monkeypatch.setenv("TUMBLE_CACHE_DIR", str(user))
     for engine in (tumble.Engine("cpu", cache="off"), pickle.loads(pickle.dumps(tumble.Engine("cpu", cache=given)))):
         assert engine.device == "CPU"
-    if not tumble.devices():
+    if not has_devices:
         return
     tumble.Engine(0, cache="off").warm(method="slerp")
     assert not user.exists() and not given.exists()

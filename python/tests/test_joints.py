@@ -135,7 +135,7 @@ def test_other_joints_are_refused(keys):
     positions, _ = states([unnamed, made(keys, names=None)], TIMES)
     assert np.array_equal(positions[0], positions[1])
     with pytest.raises(tumble.InputError, match=re.escape("clips[1]: 4 tracks; the skeleton has 5 joints")):
-        tumble.MotionLibrary([unnamed, tumble.Clip(TIMES, keys[:4], parents=[None, 0, 0, 1], offsets=OFFSETS[:4])])
+        tumble.MotionLibrary([unnamed, tumble.Clip(TIMES, keys[:4], parents=[None, 0, 0, 1], offsets=OFFSETS[:4], layout="track")])
     # Rotations relative to other parents are compared in the world.
     other = made(keys, parents=[None, 0, 0, 1, 0])
     with pytest.raises(tumble.InputError, match="compare them in the world with world=True"):

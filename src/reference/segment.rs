@@ -218,10 +218,10 @@ fn product_rates(w: [DVec3; 3], basis: Basis, t: f64) -> (DVec3, DVec3) {
     (0..3).fold((DVec3::ZERO, DVec3::ZERO), |(velocity, bend), j| {
         let back = invert(exponential(w[j] * values[j]));
         let (velocity, bend) = (rotated(velocity, back), rotated(bend, back));
-        let turn = 2.0 * w[j] * slopes[j];
+        let added = 2.0 * w[j] * slopes[j];
         (
-            velocity + turn,
-            bend - turn.cross(velocity) + 2.0 * w[j] * bends[j],
+            velocity + added,
+            bend - added.cross(velocity) + 2.0 * w[j] * bends[j],
         )
     })
 }

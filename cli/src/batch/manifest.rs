@@ -191,7 +191,7 @@ impl Manifest {
             let whole = entry.whole().0;
             match self.planned.contains(whole) {
                 true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
-                false => is_gone(&entry.input),
+                false => is_removed(&entry.input),
             }
         };
         let results = self.results().into_values();
@@ -216,12 +216,12 @@ impl Manifest {
             match whole {
                 Ok(true) => {
                     let parent = parent_beneath(&self.folder, Path::new(output));
-                    let gone = parent.and_then(|parent| {
+                    let removal = parent.and_then(|parent| {
                         std::fs::remove_file(&path)?;
                         Ok(parent)
                     });
                     let mut parent =
-                        gone.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
+                        removal.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
                     // The first that is not empty stays, and those above it.
                     while parent != self.folder && std::fs::remove_dir(&parent).is_ok() {
                         parent.pop();
@@ -275,7 +275,7 @@ impl Manifest {
 
 /// Whether an input does not exist any more. If no folder of its path exists, nothing is known of it: the path may be
 /// one of another machine, or relative to another folder.
-pub(crate) fn is_gone(input: &str) -> bool {
+pub(crate) fn is_removed(input: &str) -> bool {
     let path = Path::new(input);
     let is_missing = |path: &Path| {
         let found = std::fs::symlink_metadata(path);
@@ -311,7 +311,7 @@ impl ResultRecorder for Manifest {
         // An input that is gone has not failed any more; pruned is all that this batch does not have.
         let prune = self.prune;
         self.inputs.retain(|_, entry| {
-            entry.state != InputState::Skipped && !prune && !is_gone(&entry.input)
+            entry.state != InputState::Skipped && !prune && !is_removed(&entry.input)
         });
         let skipped = start.skipped.into_iter();
         self.inputs

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::batch::digest::{self, InputFile};
 use crate::batch::entry::{self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME};
-use crate::batch::manifest::is_gone;
+use crate::batch::manifest::is_removed;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
@@ -228,8 +228,14 @@ impl<'a> InputHashes<'a> {
             .filter_map(|(input, hash)| hash.is_none().then_some(*input))
             .filter(|input| !Path::new(input).exists())
             .collect();
-        let gone: BTreeSet<&str> = missing.iter().copied().filter(|it| is_gone(it)).collect();
-        let orphans = entries.iter().filter(|entry| gone.contains(&*entry.input));
+        let removed: BTreeSet<&str> = missing
+            .iter()
+            .copied()
+            .filter(|it| is_removed(it))
+            .collect();
+        let orphans = entries
+            .iter()
+            .filter(|entry| removed.contains(&*entry.input));
         let orphans: Vec<&ManifestEntry> = orphans.collect();
         if let Some(first) = orphans.first() {
             let results = words::count(orphans.len(), "result");
@@ -240,7 +246,7 @@ impl<'a> InputHashes<'a> {
                 first.output
             ));
         }
-        let elsewhere = missing.len() - gone.len();
+        let elsewhere = missing.len() - removed.len();
         if elsewhere > 0 {
             let inputs = words::count(elsewhere, "input");
             words::note(&format!(

@@ -311,10 +311,10 @@ fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
 struct PathGap {
     start: f64,
     seconds: f64,
-    usual: f64,
+    median: f64,
 }
 
-/// An interval this many times as long as the usual one is a gap.
+/// An interval this many times as long as the median one is a gap.
 const GAP: f64 = 5.0;
 
 /// The longest interval in `span`, if it is a gap.
@@ -325,11 +325,11 @@ fn longest_gap(times: &[f64], [start, end]: [f64; 2]) -> Option<PathGap> {
         .collect();
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (seconds, from) = *steps.last()?;
-    let usual = steps[steps.len() / 2].0;
-    (seconds >= GAP * usual).then_some(PathGap {
+    let median = steps[steps.len() / 2].0;
+    (seconds >= GAP * median).then_some(PathGap {
         start: from,
         seconds,
-        usual,
+        median,
     })
 }
 
@@ -344,7 +344,7 @@ impl PathGap {
         let Self {
             start,
             seconds,
-            usual,
+            median,
         } = self;
         let done = match max_gap {
             _ if !is_interpolated => "no pose in it is compared",
@@ -352,7 +352,7 @@ impl PathGap {
             _ => "poses in it are compared with a straight line; --max-gap leaves them out",
         };
         format!(
-            "{name}: has no pose for {seconds:.3} s from {:.3} s on, where its poses are mostly {usual:.3} s apart; \
+            "{name}: has no pose for {seconds:.3} s from {:.3} s on, where its poses are mostly {median:.3} s apart; \
              {done}",
             start + clock
         )
@@ -401,7 +401,7 @@ mod tests {
     fn a_gap_is_five_times_as_long_as_the_usual_interval() {
         let times = [0.0, 1.0, 2.0, 3.0, 8.0, 9.0];
         let gap = longest_gap(&times, [0.0, 9.0]).unwrap();
-        assert_eq!((gap.start, gap.seconds, gap.usual), (3.0, 5.0, 1.0));
+        assert_eq!((gap.start, gap.seconds, gap.median), (3.0, 5.0, 1.0));
         assert!(longest_gap(&times, [0.0, 3.0]).is_none());
         assert!(longest_gap(&times[..1], [0.0, 0.0]).is_none());
     }

@@ -246,8 +246,8 @@ impl<'a> Log<'a> {
         if let Some(&topic) = self.topic_of.get(name) {
             return Ok(topic);
         }
-        let taken = self.budget.take(name.len() + size_of::<Topic>() + 64, 1);
-        taken.map_err(|error| self.over(&error))?;
+        let charged = self.budget.take(name.len() + size_of::<Topic>() + 64, 1);
+        charged.map_err(|error| self.over(&error))?;
         let name: Arc<str> = name.into();
         self.topics.push(Topic {
             name: Arc::clone(&name),
@@ -264,8 +264,8 @@ impl<'a> Log<'a> {
     ) -> Result<(), Diagnostic> {
         if self.topics[topic].left_out.is_none() {
             let description = describe();
-            let taken = self.budget.take(description.len(), 1);
-            taken.map_err(|error| self.over(&error))?;
+            let charged = self.budget.take(description.len(), 1);
+            charged.map_err(|error| self.over(&error))?;
             self.topics[topic].left_out = Some(description);
         }
         Ok(())

@@ -304,10 +304,10 @@ impl<'a> Records<'a> {
         let borrowed = self.budget.borrow(size, 1).map_err(over)?;
         // Chunks are unpacked one after another, so that memory does not limit how many there are.
         self.unpacked = self.unpacked.saturating_add(size as u64);
-        let most = UNPACKED.saturating_mul(self.budget.limit());
-        if self.unpacked > most {
+        let limit = UNPACKED.saturating_mul(self.budget.limit());
+        if self.unpacked > limit {
             let message = format!(
-                "its chunks have more than {most} bytes when they are unpacked, and an input of this length gets no \
+                "its chunks have more than {limit} bytes when they are unpacked, and an input of this length gets no \
                  more; it states more than a recording contains"
             );
             return Err(Diagnostic::new(self.name, Code::Memory, message));

@@ -52,7 +52,7 @@ pub(crate) struct ArchivePlan {
     /// Whether the clip is the motion of an SMPL body.
     pub(crate) is_body: bool,
     /// Names of members that files of this layout usually have besides the motion. No warning names them.
-    pub(crate) usual: &'static [&'static str],
+    pub(crate) companions: &'static [&'static str],
     /// How the channels of each track are interpolated, or empty.
     pub(crate) channels: Vec<Channels>,
     /// The BVH data of each track, or empty.

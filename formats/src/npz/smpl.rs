@@ -228,7 +228,7 @@ pub(crate) fn plan(
     if let Some(skeleton) = skeleton {
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
         plan.is_body = true;
-        plan.usual = &BESIDE;
+        plan.companions = &BESIDE;
         plan.no_world = Some(
             "where a body's joints are depends on its shape; give a model of it with --body-model, or their places with --offsets"
                 .to_owned(),

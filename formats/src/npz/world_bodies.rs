@@ -26,7 +26,7 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
     };
     let mut plan = ArchivePlan {
         is_world: true,
-        usual: &BESIDE,
+        companions: &BESIDE,
         ..ArchivePlan::default()
     };
     plan.add(archive, rotations)?;

@@ -272,7 +272,7 @@ fn orientations_are_tracks_without_positions() {
     let heading = log.topic("/heading", "geometry_msgs/msg/QuaternionStamped", "cdr");
     for k in 0..3u64 {
         let at = NOW + k * SECOND;
-        let turned = Message::stamped(at, "imu").numbers(&[0.0, 0.0, 0.6, 0.8]);
+        let rotation = Message::stamped(at, "imu").numbers(&[0.0, 0.0, 0.6, 0.8]);
         log.message(
             heading,
             at,
@@ -280,7 +280,11 @@ fn orientations_are_tracks_without_positions() {
                 .numbers(&[0.6, 0.0, 0.0, 0.8])
                 .data(),
         );
-        log.message(imu, at, &turned.numbers(&[0.01; 9 + 3 + 9 + 3 + 9]).data());
+        log.message(
+            imu,
+            at,
+            &rotation.numbers(&[0.01; 9 + 3 + 9 + 3 + 9]).data(),
+        );
         let unknown = Message::stamped(at, "imu").numbers(&[0.0, 0.0, 0.0, 0.0, -1.0]);
         log.message(raw, at, &unknown.numbers(&[0.0; 8 + 24]).data());
     }

@@ -414,7 +414,7 @@ impl EvaluationJob<'_> {
                     "its arrays are frames of a rate, without times; give --end-frame hold or leave-out",
                 );
             }
-            (usual, asked) => asked.or(usual).unwrap_or(EndFrame::Key),
+            (of_document, asked) => asked.or(of_document).unwrap_or(EndFrame::Key),
         };
         let at = |clip: &&Motion| {
             let times = document.times(clip.index, rate);

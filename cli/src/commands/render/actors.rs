@@ -15,7 +15,7 @@ use crate::batch::room;
 use crate::commands::render::bones::{Bones, Skin};
 use crate::commands::render::scene::{Actor, Shape, Surroundings};
 use crate::commands::render::solids::{Body, meshes, trails};
-use crate::commands::render::typical_body::place_joints;
+use crate::commands::render::typical_body::set_typical_offsets;
 use crate::commands::travel::{Maker, Scenery, TravelSource, positions_of, scene_origin};
 use crate::messages::colours::Colour;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -44,7 +44,8 @@ impl Subject {
         mesh: Option<CarriedMesh>,
         name: &str,
     ) -> Result<Self, Failure> {
-        if clip.no_world.is_some() && clip.body.is_some() && place_joints(&mut clip).is_ok() {
+        if clip.no_world.is_some() && clip.body.is_some() && set_typical_offsets(&mut clip).is_ok()
+        {
             words::warning(&format!(
                 "{name}: does not say where the body's joints are, so that a typical body is drawn; give a model of \
                  it with --body-model, or their places with --offsets"

@@ -28,7 +28,7 @@ const FINGERS: [(&str, f64); 5] = [
 ///
 /// # Errors
 /// When it has places of its own.
-pub(super) fn place_joints(clip: &mut Motion) -> Result<(), OffsetsError> {
+pub(super) fn set_typical_offsets(clip: &mut Motion) -> Result<(), OffsetsError> {
     let pelvis = clip.body.as_ref().map(|body| body.pelvis.as_dvec3());
     let set = &clip.set;
     let offsets = (0..set.track_count()).map(|track| match pelvis {

@@ -45,7 +45,7 @@ impl ArchivePlan {
     ) {
         let name = |index: usize| &*archive.members[index].name;
         let others = self.not_read(archive, options).into_iter();
-        let unusual = others.filter(|&index| !self.usual.contains(&name(index)));
+        let unusual = others.filter(|&index| !self.companions.contains(&name(index)));
         let quoted = unusual.map(|index| format!("`{}`", name(index)));
         if let Some(names) = listed(quoted.collect()) {
             let message = format!(
