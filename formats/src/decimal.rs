@@ -18,6 +18,9 @@ pub(crate) struct Decimal(i128);
 /// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
 const OFFSET_LIMIT: u64 = 1_000_000;
 
+/// Larger times are not seconds since 1970: it is the year 5138.
+pub(crate) const LARGEST_SECONDS: f64 = 1e11;
+
 /// The whole second from which times count whose first one has the whole second `first`.
 pub(crate) fn offset_of(first: i64) -> i64 {
     match first.unsigned_abs() < OFFSET_LIMIT {

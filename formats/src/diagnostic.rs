@@ -173,6 +173,7 @@ codes! {
     TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line, and so do the samples of a clip that is written (`--times`).";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
+    LargeSeconds = "E029" elsewhere, "times too large for seconds", "Tables and trajectories with such times would be read as milliseconds, microseconds or nanoseconds since 1970 (W305), so they are not written. `--time-unit` states the unit of the input's times.";
     Time = "E030" elsewhere, "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     Memory = "E034", "more memory than is allowed for its length", "Reading an input may take 64 times its length plus 64 MiB (`--max-memory`). This one would take more, because of a count, of compressed data, or of parts that refer to the same part many times.";

@@ -10,8 +10,6 @@ use glam::Quat;
 use tumble::{Engine, Error, FrameRate, Layout, SampleTimes, Timeline};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::feature::Feature;
-use crate::format::Format;
 use crate::motion::Motion;
 use crate::sample::{ChannelMethods, Samples};
 use crate::signs::continue_signs;
@@ -70,13 +68,6 @@ impl EndSample {
 const ON_FRAME: f64 = 1e-3;
 
 impl EndFrame {
-    /// Of clips in a format: a [`Key`](Self::Key) if the format has times, otherwise one frame more
-    /// ([`Hold`](Self::Hold)).
-    #[must_use]
-    pub fn of_clips(format: &Format) -> Self {
-        Self::where_times_are(format.supports(Feature::UnevenTimes))
-    }
-
     /// [`Key`](Self::Key) where every sample has its time, [`Hold`](Self::Hold) where they are frames of a rate.
     #[must_use]
     pub fn where_times_are(has_times: bool) -> Self {

@@ -14,6 +14,7 @@ use glam::{DVec3, Quat};
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
 use crate::carried_mesh::CarriedMesh;
+use crate::decimal::LARGEST_SECONDS;
 use crate::diagnostic::Diagnostic;
 use crate::end_frame::EndFrame;
 use crate::feature::Feature;
@@ -183,9 +184,6 @@ tumble::names! {
     Microseconds => "us",
     Nanoseconds => "ns",
 }
-
-/// Larger times are not seconds since 1970: it is the year 5138.
-pub(crate) const LARGEST_SECONDS: f64 = 1e11;
 
 impl TimeUnit {
     /// The unit of times since 1970 that are too large to be seconds, from the first of them; `None` if it may be

@@ -11,8 +11,7 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
-use crate::decimal::{Decimal, is_clock, offset_of};
-use crate::format::LARGEST_SECONDS;
+use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
 use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.

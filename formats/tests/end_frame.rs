@@ -100,7 +100,11 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
             let frames = SampleTimes::rate(rate(30));
             let timeline = frames.resolve(1, input.set.time_span()).unwrap();
             assert_eq!(timeline.len(), 34);
-            let end = EndFrame::of_clips(to).sample(&timeline, rate(30), last);
+            let end = EndFrame::where_times_are(to.supports(Feature::UnevenTimes)).sample(
+                &timeline,
+                rate(30),
+                last,
+            );
             let samples = sample_to_end(&ChannelMethods::AUTHORED, &engine, &input, &frames, end);
             let even = end.is_some_and(|end| end.is_held()).then(|| rate(30));
             let bytes = write(to, &input, &samples.unwrap(), even);

@@ -565,3 +565,26 @@ fn files_with_any_names_are_read_again() {
         assert!(!is_changed || has_warning, "{}: {warnings:?}", format.name);
     }
 }
+
+/// Seconds that are as large as milliseconds since 1970 would be read as such (E029).
+#[test]
+fn times_too_large_for_seconds_are_not_written_where_they_would_be_milliseconds() {
+    let mut clip = Motion::default();
+    let times = [1.7e12, 1.7e12 + 1.0];
+    clip.set.push("", &times, &[Quat::IDENTITY; 2]).unwrap();
+    let keys = keyed(&clip).unwrap();
+    for format in FORMATS.iter().filter(|format| format.writes_clips()) {
+        let sampled = [keys.of(&clip, None, &[])];
+        let written = format.write_clips(&sampled, &MotionOptions::default(), &mut Vec::new());
+        let refused = match written {
+            Err(WriteError::Refused(error)) => error.code == Code::LargeSeconds,
+            _ => false,
+        };
+        assert_eq!(
+            refused,
+            format.takes(FormatOption::TimeUnit),
+            "{}",
+            format.name
+        );
+    }
+}

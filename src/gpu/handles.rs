@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk::{self, Handle as _};
 
-use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named as _, VulkanError};
 use crate::threads::lock;
 
@@ -168,12 +167,12 @@ pub struct VulkanBuffer {
 impl VulkanBuffer {
     /// Refuses a null buffer, and a range that ends beyond the buffer. Vulkan tells neither a buffer's length nor its
     /// usages; its memory is at least as long as the buffer.
-    pub(crate) fn check(&self, device: &LogicalDevice) -> Result<(), VulkanError> {
+    pub(crate) fn check(&self, device: &ash::Device) -> Result<(), VulkanError> {
         if self.buffer == vk::Buffer::null() {
             return Err(VulkanError::NullHandle { name: "buffer" });
         }
         // SAFETY: the buffer belongs to the device, as whoever makes requests of it promises.
-        let memory = unsafe { device.raw.get_buffer_memory_requirements(self.buffer) }.size;
+        let memory = unsafe { device.get_buffer_memory_requirements(self.buffer) }.size;
         match self.offset.checked_add(self.size) {
             Some(end) if end <= memory => Ok(()),
             _ => Err(VulkanError::BufferEnd {

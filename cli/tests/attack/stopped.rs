@@ -1,6 +1,7 @@
 //! Kills, signals, full disks and folders that nobody may write into: what is there is whole, and
 //! nothing is left behind.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -29,10 +30,7 @@ const WRITERS: &[(&str, &str)] = &[
     ("follow path.csv --fps 20000 -o out/o.npy", "out/o.npy"),
     ("plot a.dat -o out/o.svg", "out/o.svg"),
     ("plot a.dat -o out/pictures", "out/pictures"),
-    (
-        "render a.dat --size 64x48 --fps 10 -o out/o.png",
-        "out/o.png",
-    ),
+    ("render a.dat --size 64x48 -o out/o.png", "out/o.png"),
     ("view a.dat -o out/o.html", "out/o.html"),
     ("generate --boxes 400 --keys 200 -o out/o.dat", "out/o.dat"),
     (
@@ -269,7 +267,13 @@ fn a_full_disk_leaves_what_was_there() {
             "{line:?}: {}: {said}",
             run.code
         );
-        assert_eq!(tree(&folder.join("out")), before, "{line:?}: {made}");
+        // A manifest tells what failed.
+        let results = |mut all: BTreeMap<String, Vec<u8>>| {
+            all.retain(|name, _| !name.ends_with("manifest.jsonl"));
+            all
+        };
+        let after = tree(&folder.join("out"));
+        assert_eq!(results(after), results(before), "{line:?}: {made}");
         fs::remove_dir_all(folder.join("out")).unwrap();
         fs::create_dir(folder.join("out")).unwrap();
     }
@@ -296,7 +300,13 @@ fn a_full_file_system_ends_a_batch_and_resuming_finishes_it() {
     let unmounted = Unmount(folder.join("out"));
     let line = ["eval", "walks", "--fps", "1000", "-o", "out/all"];
     let full = run(folder, &line);
-    assert_eq!(full.code, 7, "{}", full.words);
+    // Each input is refused before anything is written, or the disk is full while it is.
+    assert!(matches!(full.code, 4 | 7), "{}", full.words);
+    assert!(
+        full.words.contains("that are free") || full.code == 7,
+        "{}",
+        full.words
+    );
     assert_eq!(parts(&folder.join("out")), Vec::<String>::new());
     assert!(mount("remount,size=16m"));
     succeed(folder, &[&line[..], &["--resume"]].concat());

@@ -183,6 +183,7 @@ macro_rules! fallible {
 }
 
 fallible! {
+    vkEnumerateInstanceVersion(out) asks;
     vkEnumerateInstanceLayerProperties(count, out) asks;
     vkEnumerateInstanceExtensionProperties(layer, count, out) asks;
     vkEnumerateDeviceExtensionProperties(device, layer, count, out) asks;

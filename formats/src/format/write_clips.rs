@@ -7,7 +7,7 @@ use tumble::Channel;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
-use crate::format::{Document, Format, MotionOptions, WriteError};
+use crate::format::{Document, Format, FormatOption, MotionOptions, TimeUnit, WriteError};
 use crate::motion::{ChannelInterpolation, Motion, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::printable::printable;
@@ -44,6 +44,11 @@ impl Format {
             clips
                 .iter()
                 .try_for_each(|clip| check_times(clip, &options.name))?;
+        }
+        if self.takes(FormatOption::TimeUnit) {
+            clips
+                .iter()
+                .try_for_each(|clip| check_seconds(clip, &options.name))?;
         }
         let mut warnings = warnings(self, clips, options);
         let continued: Vec<Vec<Quat>> = clips
@@ -97,6 +102,25 @@ pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), D
         "time {time} is followed by {next}; the times of a clip increase strictly: sort them, and give each once"
     );
     Err(Diagnostic::new(name, Code::TimeNotIncreasing, message))
+}
+
+/// Refuses times that a reader of this format would take for milliseconds or smaller units ([`TimeUnit::of_large`]).
+fn check_seconds(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
+    let clip = sampled.clip;
+    let keys = (0..clip.set.track_count()).filter_map(|track| clip.set.track(track).times.first());
+    let times = sampled.times.first().into_iter().chain(keys);
+    let seconds = times.map(|time| time + clip.time_offset as f64);
+    let Some(time) = seconds
+        .into_iter()
+        .find(|it| TimeUnit::of_large(*it).is_some())
+    else {
+        return Ok(());
+    };
+    let message = format!(
+        "the time {time} s would be read as one in a smaller unit: seconds since 1970 have ten digits; \
+         give the unit of the input's times"
+    );
+    Err(Diagnostic::new(name, Code::LargeSeconds, message))
 }
 
 /// Refuses parents that are no hierarchy: no file with them could be read.

@@ -6,7 +6,37 @@ use std::ops::Range;
 use serde_json::value::RawValue;
 
 use crate::gltf::json::Json;
-use crate::gltf::prune::LeftOut;
+
+/// The entries of a list that are left out.
+#[derive(Default)]
+pub(super) struct LeftOut {
+    /// In order.
+    indices: Vec<usize>,
+}
+
+impl FromIterator<usize> for LeftOut {
+    fn from_iter<I: IntoIterator<Item = usize>>(indices: I) -> Self {
+        let mut indices: Vec<usize> = indices.into_iter().collect();
+        indices.sort_unstable();
+        indices.dedup();
+        Self { indices }
+    }
+}
+
+impl LeftOut {
+    pub(super) fn indices(&self) -> &[usize] {
+        &self.indices
+    }
+
+    pub(super) fn has(&self, index: usize) -> bool {
+        self.indices.binary_search(&index).is_ok()
+    }
+
+    /// How many entries before this one are left out.
+    pub(super) fn before(&self, index: usize) -> usize {
+        self.indices.partition_point(|&left| left < index)
+    }
+}
 
 /// The changes to make, in any order.
 pub(super) struct Edits<'a> {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use serde_json::value::RawValue;
 
 use crate::diagnostic::Diagnostic;
-use crate::gltf::edits::Edits;
+use crate::gltf::edits::{Edits, LeftOut};
 use crate::gltf::json::{Json, JsonMembers};
 use crate::gltf::reader::MESHOPT;
 use crate::gltf::schema::{Accessor, Animation, Buffer, BufferView, MeshoptView, Sampler};
@@ -33,37 +33,6 @@ const WITHOUT_DATA: [&str; 11] = [
     "VRM",
     "EXT_lights_",
 ];
-
-/// The entries of a list that are left out.
-#[derive(Default)]
-pub(super) struct LeftOut {
-    /// In order.
-    indices: Vec<usize>,
-}
-
-impl FromIterator<usize> for LeftOut {
-    fn from_iter<I: IntoIterator<Item = usize>>(indices: I) -> Self {
-        let mut indices: Vec<usize> = indices.into_iter().collect();
-        indices.sort_unstable();
-        indices.dedup();
-        Self { indices }
-    }
-}
-
-impl LeftOut {
-    pub(super) fn indices(&self) -> &[usize] {
-        &self.indices
-    }
-
-    pub(super) fn has(&self, index: usize) -> bool {
-        self.indices.binary_search(&index).is_ok()
-    }
-
-    /// How many entries before this one are left out.
-    pub(super) fn before(&self, index: usize) -> usize {
-        self.indices.partition_point(|&left| left < index)
-    }
-}
 
 /// A place in the text that has the index of an entry of a list.
 struct Reference<'a> {
@@ -117,7 +86,7 @@ fn without_unused(
         .filter(|it| !used.contains(it))
         .filter(is_free)
         .collect();
-    if accessors.indices.is_empty() {
+    if accessors.indices().is_empty() {
         return Ok(None);
     }
     let (mut kept_views, mut left_views) = (BTreeSet::new(), BTreeSet::new());

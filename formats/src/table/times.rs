@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::decimal::offset_of;
+use crate::decimal::{LARGEST_SECONDS, offset_of};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{LARGEST_SECONDS, ReadOptions, TimeUnit};
+use crate::format::{ReadOptions, TimeUnit};
 use crate::motion::clock_second;
 use crate::rate::Precision;
 use crate::table::columns::{ColumnNumbers, ColumnValues, Table};

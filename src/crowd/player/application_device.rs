@@ -42,7 +42,7 @@ impl Crowd {
         let device = device.filter(|device| !device.engine.device.owned);
         let device = device.ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
-        buffer.check(&device.engine.device)?;
+        buffer.check(&device.engine.device.raw)?;
         let (offset, size) = (buffer.offset, buffer.size);
         let each = device.bytes(output);
         let needed = self.visible_count().max(1) as u64 * each;

@@ -182,7 +182,7 @@ impl<'a> PassRequest<'a> {
         let (read, written) = (self.input_bytes(), self.bytes());
         let engine = opened.engine();
         for buffer in inputs.iter().chain([&result]) {
-            buffer.check(&engine.device)?;
+            buffer.check(&engine.device.raw)?;
         }
         for (index, &input) in inputs.iter().enumerate() {
             check_range(PassOperand::Input(index), input, read, step)?;

@@ -68,7 +68,7 @@ impl Request<'_> {
         if engine.device.owned {
             return Err(Error::BufferOfOther);
         }
-        buffer.check(&engine.device)?;
+        buffer.check(&engine.device.raw)?;
         let (timeline, window) = self.window()?;
         let rotation = self.encoding.bytes() as u64;
         let needed = (window.len() as u64).saturating_mul(rotation);
