@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::source::ZSTD;
+
 /// A kind of file that is not read.
 struct Foreign {
     /// Extensions of its files. They count only where the text does not begin as numbers do.
@@ -31,7 +33,7 @@ const ALL: [Foreign; 21] = [
     },
     Foreign {
         extensions: &["zst"],
-        begins: &[b"\x28\xb5\x2f\xfd"],
+        begins: &[&ZSTD],
         description: "Zstandard; unpack it first (zstd -d)",
     },
     Foreign {
