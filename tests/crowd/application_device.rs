@@ -51,10 +51,10 @@ fn assert_frames_are_recorded(mapping: Mapping) {
                 unsafe {
                     let small = crowd.target(output, slice(offset, size - 1)).unwrap_err();
                     assert!(matches!(small, CrowdError::Buffer { .. }), "{small}");
-                    let beyond = crowd.target(output, slice(offset + 256, size)).unwrap_err();
+                    let after_end = crowd.target(output, slice(offset + 256, size)).unwrap_err();
                     assert!(
-                        beyond.to_string().contains("ends beyond the buffer"),
-                        "{beyond}"
+                        after_end.to_string().contains("ends beyond the buffer"),
+                        "{after_end}"
                     );
                     crowd.target(output, slice(offset, size)).unwrap()
                 }
