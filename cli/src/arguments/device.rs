@@ -8,7 +8,9 @@ use ash::vk;
 use clap::Args;
 use glam::Quat;
 use tumble::vulkan::VulkanError;
-use tumble::{Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet};
+use tumble::{
+    CacheFiles, Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet,
+};
 
 use crate::arguments::options::CommandLine;
 use crate::batch::target::{ChunkSink, ResultError};
@@ -37,6 +39,9 @@ pub(crate) struct DeviceArguments {
     /// Threads of the CPU, for front ends that leave the choice.
     #[arg(skip)]
     threads: Option<usize>,
+    /// Where kernels are kept, for front ends that leave the choice.
+    #[arg(skip)]
+    cache_files: CacheFiles,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +133,7 @@ impl DeviceArguments {
             allow_inexact: options.allow_inexact,
             memory: options.memory,
             threads: options.thread_count,
+            cache_files: options.cache_files.clone(),
         }
     }
 
@@ -212,6 +218,7 @@ impl DeviceArguments {
         options.memory = self.memory;
         options.allow_inexact = self.allow_inexact;
         options.thread_count = self.threads;
+        options.cache_files = self.cache_files.clone();
         options
     }
 
