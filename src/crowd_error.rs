@@ -39,7 +39,7 @@ pub enum CrowdError {
     },
     /// The clip has other joints than the library.
     #[error(transparent)]
-    OtherJoints(#[from] JointMatchError),
+    OtherJoints(Box<JointMatchError>),
     /// The skeleton has no joints.
     #[error("the skeleton has no joints; a crowd has at least one")]
     NoJoints,
@@ -256,5 +256,11 @@ impl From<SetError> for CrowdError {
             // No frames are asked for when a clip is prepared.
             SetError::Frames(_) => Self::TooLarge,
         }
+    }
+}
+
+impl From<JointMatchError> for CrowdError {
+    fn from(error: JointMatchError) -> Self {
+        Self::OtherJoints(Box::new(error))
     }
 }

@@ -16,7 +16,10 @@ use crate::text::lines::Limits;
 #[must_use]
 pub fn referred_files(path: &Path, limits: Limits) -> Vec<PathBuf> {
     let is_file = std::fs::metadata(path).is_ok_and(|found| found.is_file());
-    if path.as_os_str() == "-" || !is_file || !std::ptr::eq(Format::detected(path), &gltf::FORMAT) {
+    if path.as_os_str() == "-"
+        || !is_file
+        || !std::ptr::eq(Format::detected(path), &raw const gltf::FORMAT)
+    {
         return Vec::new();
     }
     let mut files = gltf::buffer_files(path, limits);

@@ -59,7 +59,7 @@ pub enum SkeletonMatchError {
         /// What the clip is called in messages.
         clip: String,
         /// The reason.
-        error: OffsetsError,
+        error: Box<OffsetsError>,
     },
     /// A rest transform is no valid key.
     #[error(transparent)]
@@ -303,7 +303,10 @@ impl ClipSkeleton {
         let mut placed = clip.clone();
         set_offsets(&mut placed, &numbers).map_err(|error| {
             let clip = name.to_owned();
-            SkeletonMatchError::Offsets { clip, error }
+            SkeletonMatchError::Offsets {
+                clip,
+                error: Box::new(error),
+            }
         })?;
         Ok(placed)
     }

@@ -550,10 +550,7 @@ fn joints_are_matched_by_name() {
         }
         let refused = library.push(&set, method::SLERP, linear).unwrap_err();
         assert!(
-            matches!(
-                refused,
-                CrowdError::OtherJoints(JointMatchError::Unnamed { .. })
-            ),
+            matches!(&refused, CrowdError::OtherJoints(error) if matches!(**error, JointMatchError::Unnamed { .. })),
             "{refused}"
         );
         assert_eq!(library.clip_count(), 2);

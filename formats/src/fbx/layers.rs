@@ -59,7 +59,7 @@ pub(super) fn is_spheric(node: &Node) -> bool {
 pub(super) fn without_spheric_orders(
     scene: &Scene,
     layer_ids: Vec<u32>,
-) -> Result<AnimRoot, ufbx::Error> {
+) -> Result<AnimRoot, Box<ufbx::Error>> {
     let spheric = scene.nodes.iter().filter(|node| is_spheric(node));
     let order = |node: &Node| PropOverrideDesc {
         element_id: node.element.element_id,
@@ -72,13 +72,13 @@ pub(super) fn without_spheric_orders(
         prop_overrides: orders.into(),
         ..AnimOpts::default()
     };
-    ufbx::create_anim(scene, options)
+    ufbx::create_anim(scene, options).map_err(Box::new)
 }
 
 impl StackLayers {
     /// # Errors
     /// When the library has no memory.
-    pub(super) fn of(scene: &Scene, stack: &AnimStack) -> Result<Self, ufbx::Error> {
+    pub(super) fn of(scene: &Scene, stack: &AnimStack) -> Result<Self, Box<ufbx::Error>> {
         let layers = || stack.layers.iter().enumerate();
         let audible: Vec<usize> = layers()
             .filter(|(_, layer)| !is_muted(layer))

@@ -138,7 +138,7 @@ impl<'a> Records<'a> {
         fault
     }
 
-    fn warn_cut(&self, warnings: &mut Warnings, offset: u64, message: &str) {
+    fn warn_cut(warnings: &mut Warnings, offset: u64, message: &str) {
         warnings.warn(Code::McapCut, || {
             (Some(Location::Inside(format!("byte {offset}"))), message)
         });
@@ -165,7 +165,7 @@ impl<'a> Records<'a> {
             };
             if at >= bytes.len() || !in_chunk && &bytes[at..] == MAGIC {
                 if !self.is_complete || !self.bytes.ends_with(MAGIC) {
-                    self.warn_cut(
+                    Self::warn_cut(
                         warnings,
                         self.bytes.len() as u64,
                         "the log was not finished: its end is missing, as of a recording that was interrupted; \
@@ -180,7 +180,7 @@ impl<'a> Records<'a> {
                         self.damaged(offset, "a record runs over the end of its chunk".to_owned())
                     );
                 }
-                self.warn_cut(
+                Self::warn_cut(
                     warnings,
                     offset,
                     "the file ends within a record; what is before it is read",
