@@ -27,7 +27,8 @@ miri() {
 
 threads() {
     echo "ThreadSanitizer" >&2
-    # The drivers are not compiled with it, so their own locks are not seen: what they call is left out.
+    # The drivers are not compiled with it, so that it does not see their locks: reports of functions that they call
+    # are suppressed.
     mkdir -p "$CARGO_TARGET_DIR"
     printf 'called_from_lib:%s\n' libvulkan_lvp.so libvk_swiftshader.so >"$CARGO_TARGET_DIR/suppressions"
     export TSAN_OPTIONS="suppressions=$(realpath "$CARGO_TARGET_DIR")/suppressions"

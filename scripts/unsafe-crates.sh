@@ -16,7 +16,7 @@ while read -r name version manifest; do
         unnamed=1
     fi
 done < <(
-    # What the program is built of on this system, without what only builds or tests it.
+    # The crates of the program on this system, without those that only build or test it.
     cargo tree --locked -p tumble-cli -e normal --prefix none -f '{p}' | awk '{print $1, substr($2, 2)}' | sort -u >target/program-crates
     cargo metadata --locked --format-version 1 |
         python3 -c '

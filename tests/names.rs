@@ -53,7 +53,7 @@ fn values_of_options_are_found_by_their_names() {
     }
 }
 
-/// What other programs call a value, but only where an option has it.
+/// A name of other programs counts only where an option has the value.
 #[test]
 fn names_of_other_programs_are_understood_in_hints() {
     for (name, meant) in [

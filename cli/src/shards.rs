@@ -67,7 +67,7 @@ pub fn input_sha256(path: &Path) -> Option<String> {
     InputFile::new(path).sha256().map(str::to_owned)
 }
 
-/// What is unfinished in the text of a manifest: a line for each input that failed or has no result yet.
+/// The unfinished inputs in the text of a manifest: a line for each input that failed or has no result yet.
 #[must_use]
 pub fn manifest_unfinished(text: &str) -> Vec<String> {
     let lines = ManifestLines::parse(text.as_bytes());

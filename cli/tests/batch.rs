@@ -308,7 +308,7 @@ fn results_without_inputs_are_told_and_pruned() {
         "{}",
         check.words
     );
-    // What is not the result any more stays.
+    // A file that no longer matches its line of the manifest stays.
     fs::write(folder.join("out/deep/c.npy"), "mine").unwrap();
     let pruned = succeed(folder, &[&batch[..], &["--prune"]].concat());
     assert!(
@@ -378,7 +378,7 @@ fn a_long_batch_prints_at_most_a_screen() {
     assert_eq!(all.words.matches(".npy\n").count(), 30, "{}", all.words);
 }
 
-/// What is not a file is told, and the others are evaluated.
+/// Pipes, sockets, links in circles and empty directories get a line each, and all other inputs are evaluated.
 #[cfg(unix)]
 #[test]
 fn directories_may_have_anything() {

@@ -117,7 +117,7 @@ fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
     assert_eq!(names(folder.path()), before);
 }
 
-/// A limit of the shell that is too low for the program's own calls.
+/// The shell limits the stack to less than the program's calls need.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_small_stack_is_enough() {

@@ -302,7 +302,7 @@ fn joints_are_matched_by_name_and_parent() {
         let report = String::from_utf8(one.out).unwrap();
         assert!(report.contains("1 track × "), "{report}");
     }
-    // Two paths of one body each need no name, and what is assumed is told.
+    // Two paths of one body each need no name, and a warning says that they are taken for the same body.
     let path =
         |name: &str| format!("time,{name}.x,{name}.y,{name}.z,{name}.w\n0,0,0,0,1\n1,0,0,1,0\n");
     std::fs::write(folder.join("odom.csv"), path("odom")).unwrap();
@@ -498,8 +498,8 @@ fn an_estimate_of_few_poses_is_not_interpolated() {
     }
 }
 
-/// On a line the turn about it is open: the smallest is taken, and the errors of rotations are told to mean nothing.
-/// A gap in either path is told.
+/// On a line the turn about it is open: the smallest is taken, and a warning says that the errors of rotations mean
+/// nothing. A gap in either path is a warning.
 #[test]
 fn what_an_alignment_cannot_know_is_told() {
     let temporary = sample_folder();
@@ -654,7 +654,7 @@ fn documented_checks_hold() {
             assert!(!run.words.contains("W208"), "{line:?}: {}", run.words);
         }
     }
-    // The other direction is told.
+    // In the other direction there is a warning.
     for (from, to) in [
         ("a.dat", "a.glb"),
         ("a.dat", "a.bvh"),

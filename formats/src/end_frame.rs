@@ -14,8 +14,8 @@ use crate::motion::Motion;
 use crate::sample::{ChannelMethods, Samples};
 use crate::signs::continue_signs;
 
-/// What a result that is sampled at the frames of a rate has at the end of its clip, if the end lies between two
-/// frames. If it lies on one, that is the last sample.
+/// How a result that is sampled at the frames of a rate ends, if its clip ends between two frames. If the end lies on a
+/// frame, this frame is the last sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EndFrame {
     /// A sample at the end, after the last frame.

@@ -8,13 +8,13 @@ use crate::source::ZSTD;
 struct Foreign {
     /// Extensions of its files. They count only where the text does not begin as numbers do.
     extensions: &'static [&'static str],
-    /// What its files begin with; any of them.
+    /// First bytes of its files; any of them.
     begins: &'static [&'static [u8]],
-    /// What it is, and what to do.
+    /// The kind in words, and how to get a motion file instead.
     description: &'static str,
 }
 
-/// What solves markers to a skeleton.
+/// The description of a format of markers, which a program must solve to a skeleton.
 macro_rules! of_markers {
     ($format:literal) => {
         concat!(
@@ -133,7 +133,7 @@ const ALL: [Foreign; 21] = [
     },
 ];
 
-/// What a file is that is read as text of numbers, by its first bytes or its name, and what to do with it; `None` if it
+/// The description of a file that was taken for text of numbers, by its first bytes or its name; `None` if it
 /// may be such text.
 pub(crate) fn description(name: &str, start: &[u8]) -> Option<&'static str> {
     let begins = |kind: &&Foreign| kind.begins.iter().any(|bytes| start.starts_with(bytes));

@@ -138,7 +138,7 @@ pub struct ReadOptions {
     pub raw_times: bool,
     /// What is done with two different keys at the same time.
     pub duplicates: Duplicates,
-    /// The rate of the keys, for files that do not contain it. A file that contains another rate keeps its own, and a
+    /// The rate of the keys, for files that do not contain it. A file that contains another rate keeps that rate, and a
     /// warning is returned.
     pub source_rate: Option<FrameRate>,
     /// The rate of the keys, whatever the file says. If it says another rate, a warning is returned.
@@ -280,7 +280,7 @@ pub trait Document: fmt::Debug + Send + Sync {
     /// When the file's type of times cannot distinguish frames of this rate.
     fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic>;
 
-    /// What the file gets, unless the user says otherwise, at the end of a clip that ends between two frames; `None`
+    /// The default for the end of a clip that ends between two frames; `None`
     /// if [`times`](Self::times) always contains the end.
     fn end_frame(&self) -> Option<EndFrame>;
 

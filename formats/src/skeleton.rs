@@ -36,19 +36,19 @@ pub enum SkeletonMatchError {
     /// Its rotations are relative to the world.
     #[error("{clip}: its rotations are relative to the world, not to the parents")]
     World {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
     },
     /// Its positions are relative to an origin, which a library cannot store.
     #[error("{clip}: its positions count from an origin (`clip.origins`); subtract it first")]
     Origins {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
     },
     /// Its poses in the world are not defined by its parents, rotations, translations and scales.
     #[error("{clip}: {reason}")]
     NoWorld {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
         /// The reason.
         reason: String,
@@ -56,7 +56,7 @@ pub enum SkeletonMatchError {
     /// The offsets of the skeleton do not fit the clip.
     #[error("{clip}: {error}")]
     Offsets {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
         /// The reason.
         error: Box<OffsetsError>,

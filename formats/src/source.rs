@@ -160,7 +160,7 @@ const BUFFER: usize = 1 << 18;
 /// The length above which an input is refused, unless the caller raises the limit.
 pub(super) const MAX_BYTES: u64 = 16 << 30;
 
-/// What a path names, in words: `a file`, `a directory`, `a named pipe`, `a socket` or `a device`.
+/// The kind of entry that a path names, in words: `a file`, `a directory`, `a named pipe`, `a socket` or `a device`.
 #[cfg(unix)]
 #[must_use]
 pub fn file_kind(metadata: &Metadata) -> &'static str {
@@ -179,7 +179,7 @@ pub fn file_kind(metadata: &Metadata) -> &'static str {
     }
 }
 
-/// What a path names, in words: `a file` or `a directory`.
+/// The kind of entry that a path names, in words: `a file` or `a directory`.
 #[cfg(not(unix))]
 #[must_use]
 pub fn file_kind(metadata: &Metadata) -> &'static str {

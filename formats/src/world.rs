@@ -10,8 +10,8 @@ use crate::sample::Samples;
 pub struct WorldPose {
     /// Where its origin is.
     pub position: DVec3,
-    /// How it is turned: the product of its ancestors' rotations and its own, without their scales, also where a
-    /// negative scale mirrors its axes, which no rotation equals.
+    /// How it is turned: the product of the rotations of its ancestors and of itself, without their scales, also
+    /// where a negative scale mirrors its axes, which no rotation equals.
     pub rotation: Quat,
 }
 

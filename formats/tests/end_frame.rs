@@ -124,7 +124,7 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
         }
     }
     assert!(pairs >= 64, "{pairs}");
-    // What this test would miss, were the swing slow at the seam.
+    // The swing is fast at the seam: otherwise a lost end would not be noticed.
     let frames = SampleTimes::rate(rate(30));
     let cut = ChannelMethods::AUTHORED
         .sample(&engine, &clip, &frames)

@@ -271,7 +271,7 @@ fn layers_have_the_effect_that_they_have_in_the_sdk() {
     }
 }
 
-/// Whatever rate the file states.
+/// The rate that the file states does not matter.
 #[test]
 fn the_rate_is_that_of_the_keys() {
     for (name, frames, seconds) in [
@@ -315,7 +315,8 @@ fn the_spheric_order_is_read_as_xyz() {
     }
 }
 
-/// A key that is constant until the next one has its own value at its own time, and that of the next one from then on.
+/// A key that is constant until the next one has the value that is stored with it at its time, and that of the next
+/// one after it.
 #[test]
 fn the_value_of_the_next_key_holds_after_a_key() {
     let loaded = read(&fixture("constant_next"), &ReadOptions::default());

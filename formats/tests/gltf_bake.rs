@@ -68,7 +68,7 @@ fn view_bytes<'a>(glb: &'a Glb, json: &Value, index: u64) -> &'a [u8] {
         .find_map(|name| view["extensions"].get(name));
     let view = compressed.unwrap_or(view);
     let number = |name: &str| view[name].as_u64().unwrap_or(0) as usize;
-    // What is behind a URI that is kept is not in the file.
+    // Data behind a URI that is kept is not in the file.
     match json["buffers"][number("buffer")].get("uri") {
         None => &glb.bin[number("byteOffset")..][..number("byteLength")],
         Some(_) => &[],
@@ -225,7 +225,7 @@ fn everything_but_the_samples_comes_back() {
         let again = read_gltf("t", glb.bytes.clone(), None, &ReadOptions::default()).unwrap();
         assert_eq!(again.refused.len(), loaded.refused.len(), "{label}");
         check_clips(&loaded, &again.clips, &label.to_string());
-        // What is sampled once more takes the place of the samples.
+        // Samples of a second bake replace those of the first.
         let (twice, _) = baked(&again, 60, Path::new("/out.glb")).unwrap();
         let twice = Glb::parse(&twice).json();
         for list in ["accessors", "bufferViews", "buffers"] {
@@ -235,7 +235,7 @@ fn everything_but_the_samples_comes_back() {
     }
 }
 
-/// What was written is aligned, and the animations keep their names.
+/// Written data is aligned, and the animations keep their names.
 fn check_new_entries(glb: &Glb, old: &Text, label: &str) {
     let json = glb.json();
     for view in json["bufferViews"].as_array().unwrap().iter().rev().take(1) {

@@ -68,7 +68,7 @@ fn what_is_no_part_of_the_motion_is_named() {
 fn what_is_used_is_not_named() {
     for fixture in [
         "npz/smpl.npz",
-        // What bodies usually have beside their motion: their shape, and that of soft tissue.
+        // Bodies usually have arrays of their shape, and of soft tissue.
         "npz/arrays_beside.npz",
         "npz/pieces.npz",
         "npz/own.npz",

@@ -190,7 +190,7 @@ fn columns_that_a_map_names_are_never_left_out() {
             loaded.warnings
         );
     }
-    // Whose position it is cannot be told, or is no position.
+    // The position may be that of any track, or no position.
     for map in [
         "tx=x,ty=y,tz=z,a=roll..yaw:xyz,b=roll..yaw:rotvec",
         "qw=x,body=roll..yaw:xyz",
@@ -236,7 +236,7 @@ fn a_position_is_not_taken_for_a_quaternion() {
             Quat::from_xyzw(0.0, 0.0, 0.6, 0.8)
         );
     }
-    // Columns of one name are told apart by their numbers.
+    // Columns of one name get numbers.
     let text = "time,X,Y,Z,W,X,Y,Z,\n0,0,0,0,1,1,2,3,\n1,0,0,0.6,0.8,4,5,6,\n";
     let loaded = read(text, Some("body=X..W,body.translation=X.1..Z.1"), false).unwrap();
     assert_eq!(positions(&loaded)[1], Vec3::new(4.0, 5.0, 6.0));

@@ -524,7 +524,7 @@ fn signs_continue_whatever_writes_them() {
     }
 }
 
-/// Whatever the names of the tracks are, a file that is written can be read.
+/// A file that is written can be read, with any names of tracks.
 #[test]
 fn files_with_any_names_are_read_again() {
     let names = [

@@ -1,5 +1,5 @@
 // Reads damaged FBX files as `formats/src/fbx` does, compiled with ufbx by gcc's AddressSanitizer and
-// UndefinedBehaviorSanitizer (scripts/soundness.sh): cargo's own sanitizers do not see into C.
+// UndefinedBehaviorSanitizer (scripts/soundness.sh): rustc's sanitizers do not see into C.
 // Arguments: seconds, files. Each file is read whole, then damaged: bytes changed, cut out, repeated, and cut off.
 #include "ufbx.h"
 #include <stdint.h>
@@ -36,7 +36,7 @@ static void read_bytes(const unsigned char *bytes, size_t length) {
     };
     ufbx_error error;
     ufbx_scene *scene = ufbx_load_memory(copy, length, &options, &error);
-    free(copy); // a scene has its own memory
+    free(copy); // a scene copies what it keeps
     if (!scene) {
         refusals++;
         return;

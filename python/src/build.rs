@@ -46,7 +46,7 @@ impl Times {
     }
 }
 
-/// How a call is told which axis of its keys is that of the tracks.
+/// The option by which a call says which axis of its keys is that of the tracks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum KeysLayout {
     /// By its argument `layout`, which may have been left out. Names of tracks speak for the order of the
@@ -67,7 +67,7 @@ impl KeysLayout {
         }
     }
 
-    /// What to write for a layout.
+    /// The argument that chooses a layout, for messages.
     fn spelling(self, layout: Layout) -> String {
         let layout = format!("layout=\"{}\"", layout.name());
         match self {
@@ -246,7 +246,7 @@ fn tracks_of(
     }
 }
 
-/// What the two axes of keys are: as it was said, else tracks and keys, where nothing speaks against it.
+/// The meaning of the two axes of keys: by `layout`; without it tracks and keys, where the shape is not ambiguous.
 fn layout_of(
     py: Python<'_>,
     [first, second]: [usize; 2],
@@ -303,7 +303,7 @@ fn swapped<T: Copy>(values: &[T], [rows, columns]: [usize; 2], each: usize) -> V
     found
 }
 
-/// What clips may have beside rotations, as it comes in.
+/// The arguments for clips beside rotations.
 pub(crate) struct ClipArguments<'a, 'py> {
     pub(crate) parents: Option<Vec<Option<i64>>>,
     pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
@@ -320,7 +320,7 @@ pub(crate) const NO_OFFSETS: &str = "the joints have parents, but no offsets; gi
 /// The numbers of some tracks, by their indices.
 type TrackRows = Vec<(usize, Vec<f64>)>;
 
-/// What clips may have beside rotations.
+/// The data of clips beside rotations, checked.
 pub(crate) struct ClipParts {
     skeleton: Vec<Joint>,
     has_offsets: bool,

@@ -111,7 +111,7 @@ pub(crate) fn array_of<'py>(
     for &other in inputs {
         let shares = numpy(py)?.call_method1(intern!(py, "shares_memory"), (out, other));
         let shares = match shares {
-            // What is no array shares nothing.
+            // Only arrays can share memory.
             Err(error) if error.is_instance_of::<PyException>(py) => false,
             shares => shares?.is_truthy()?,
         };

@@ -148,7 +148,7 @@ pub(crate) struct Worker {
 
 #[pymethods]
 impl Worker {
-    /// What the results of an input are known by, of its path below the library.
+    /// The part of an input's path below the library that names its results.
     fn key_of(&self, below: PathBuf) -> String {
         let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
         worker.key_of(&below)

@@ -55,7 +55,7 @@ pub(crate) fn broken() -> PyErr {
     input("the pickle of a result is broken, or of another version of tumble")
 }
 
-/// What `__reduce__` gives: the function that makes a value again, and its arguments.
+/// The result of `__reduce__`: the function that makes a value again, and its arguments.
 pub(crate) type Pickled<'py> = (
     Bound<'py, PyAny>,
     (Bound<'py, PyString>, Bound<'py, PyTuple>),

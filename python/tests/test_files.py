@@ -542,9 +542,9 @@ def test_parents_and_offsets_come_back(tmp_path, rng, name, recwarn):
     again = tumble.load(tmp_path / name).clip
     assert (again.names, again.parents) == (clip.names, clip.parents)
     assert np.array_equal(again.offsets, offsets)
-    # The rows of a table may come in another order. Lines join the keys of glTF, which is told.
-    told = [str(warning.message) for warning in recwarn if issubclass(warning.category, tumble.InputWarning)]
-    assert ["W208" in message for message in told] == [True] * (name == "walk.glb")
+    # The rows of a table may come in another order. Lines join the keys of glTF, which a warning says.
+    messages = [str(warning.message) for warning in recwarn if issubclass(warning.category, tumble.InputWarning)]
+    assert ["W208" in message for message in messages] == [True] * (name == "walk.glb")
     tumble.save(tmp_path / f"baked-{name}", clip, fps=60)
     assert tumble.load(tmp_path / f"baked-{name}").clip.parents == clip.parents
 

@@ -1,6 +1,6 @@
 """Ctrl-C at random moments of every call that may take a tenth of a second.
 
-A process of its own makes the calls, and another one sends the signals: a thread of the first could only send them
+A child process makes the calls, and another one sends the signals: a thread of the first could only send them
 while the interpreter's lock is free. `SOAK=1` sends 100 to each call, else a few are sent.
 """
 
@@ -213,7 +213,7 @@ for name, (call, output) in calls.items():
             found["after the call"] += 1
             sent = sending.stdout.readline()
         longest = max(longest, ended - float(sent))
-        # What was left behind ends by itself.
+        # Files that are left behind vanish by themselves.
         for _ in range(500):
             left = set(os.listdir()) - before - {output}
             if not left:

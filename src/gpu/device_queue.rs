@@ -9,7 +9,7 @@ use crate::gpu::handles::QueueLock;
 use crate::threads::lock;
 
 /// The lock of every queue that an engine of this process uses, by the queue's handle: several engines may be made of
-/// one application's device, and each has its own [`DeviceQueue`] for the same queue.
+/// one application's device, and each of them makes a [`DeviceQueue`] for the same queue.
 static LOCKS: Mutex<BTreeMap<u64, Weak<Mutex<()>>>> = Mutex::new(BTreeMap::new());
 
 /// A queue as one engine uses it.

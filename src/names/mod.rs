@@ -13,7 +13,7 @@ pub struct UnknownNameError {
     pub known: Vec<&'static str>,
 }
 
-/// What other programs and libraries call the values of options: each value with these names. A name counts only for
+/// Names of other programs and libraries for the values of options: each value with these names. A name counts only for
 /// options that have the value, so one may stand in several rows.
 const OTHER_NAMES: [(&str, &[&str]); 22] = [
     ("slerp", &["linear", "lerp", "line", "lines"]),
@@ -59,7 +59,7 @@ pub fn by_meaning<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> O
     known.into_iter().find(|value| is_called(value))
 }
 
-/// What is added to a message about an unknown name.
+/// The end of a message about an unknown name: the name that was probably meant.
 fn hint(name: &str, known: &[&'static str]) -> String {
     let meant = by_meaning(name, known.iter().copied());
     meant.map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"))

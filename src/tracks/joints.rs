@@ -54,7 +54,7 @@ pub enum JointMatchError {
         "{clip} has two joints `{name}`; joints are matched by name, so give them names that differ"
     )]
     Repeated {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
         /// The name of both joints.
         name: String,
@@ -65,17 +65,17 @@ pub enum JointMatchError {
          index"
     )]
     Unnamed {
-        /// What the clip with names is called in messages.
+        /// The name of the clip with names in messages.
         named: String,
         /// Its first name.
         name: String,
-        /// What the other clip is called in messages.
+        /// The name of the other clip in messages.
         unnamed: String,
     },
     /// The clips have different numbers of joints, and no names.
     #[error("{}: {} tracks; {} has {} joints", clips[1], joints[1], clips[0], joints[0])]
     Count {
-        /// What the clips are called in messages.
+        /// The names of the clips in messages.
         clips: [String; 2],
         /// Their numbers of joints.
         joints: [usize; 2],
@@ -83,11 +83,11 @@ pub enum JointMatchError {
     /// A joint has no partner.
     #[error("{clip} has a joint `{name}`, {other} has none of that name{}", hint(near.as_deref()))]
     Missing {
-        /// What the clip is called in messages.
+        /// The name of the clip in messages.
         clip: String,
         /// The joint's name.
         name: String,
-        /// What the clip without that joint is called in messages.
+        /// The name of the clip without that joint in messages.
         other: String,
         /// A name in the other clip that differs only in case, separators or a prefix.
         near: Option<String>,
@@ -98,7 +98,7 @@ pub enum JointMatchError {
         hangs(parents[0].as_deref()), clips[0], hangs(parents[1].as_deref()), clips[1]
     )]
     Parent {
-        /// What the clips are called in messages.
+        /// The names of the clips in messages.
         clips: [String; 2],
         /// The joint's name.
         joint: String,

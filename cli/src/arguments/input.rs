@@ -288,7 +288,7 @@ pub(crate) struct GatheredInputs {
     pub(crate) files: Vec<FoundInput>,
     /// The command line has a directory, a pattern or a list: there may be any number of files.
     pub(crate) many: bool,
-    /// What directories have that looks like an input but is none: pipes, sockets, links in a circle.
+    /// Skipped entries of directories that are named like inputs: pipes, sockets, links in a circle.
     pub(crate) skipped: Vec<InputEntry>,
 }
 
@@ -491,7 +491,7 @@ impl GatheredInputs {
     }
 }
 
-/// What a walk could not look into.
+/// Directories and links that a walk could not read.
 enum UnreadableEntry {
     /// It is an input, which fails.
     Input,

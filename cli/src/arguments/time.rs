@@ -433,7 +433,7 @@ pub(crate) fn in_frames(
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // Those that are left out are told with their number.
+    // `Outside::kept` prints how many are left out.
     let [before, after] = outside.leaves_out();
     if start < first && !before || end > last && !after {
         let [start, end, first, last] =

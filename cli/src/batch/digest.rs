@@ -141,7 +141,7 @@ pub(crate) fn of_folder(folder: &Path, extension: &str) -> String {
 #[derive(Debug, PartialEq, Eq)]
 struct Identity {
     bytes: u64,
-    /// What else tells two files, or two states of one file, apart.
+    /// The numbers by which the system distinguishes two files, or two states of one file.
     marks: [i128; 4],
 }
 

@@ -117,7 +117,7 @@ impl InputEntry {
         }
     }
 
-    /// What looks like an input but is none, and why.
+    /// Paths that were skipped because they are no files that can be read, and why.
     pub(crate) fn skipped(path: &Path, why: String) -> Self {
         Self {
             state: InputState::Skipped,
@@ -209,7 +209,7 @@ pub(crate) struct ManifestLines {
     pub(crate) damaged: usize,
 }
 
-/// What a line of a manifest is about.
+/// The subject of a line of a manifest.
 enum ManifestLine {
     Result(ManifestEntry),
     Input(InputEntry),
@@ -314,11 +314,11 @@ pub(crate) fn warn_of_damaged_lines(folder: &Path, lines: usize) {
 /// The longest line, in bytes.
 const MAX_LINE: u64 = 1 << 20;
 
-/// What a batch is about to do.
+/// The inputs of a batch before its work begins.
 pub(crate) struct BatchStart<'a> {
     /// Each input that it evaluates, with the name of its result.
     pub(crate) inputs: Vec<(&'a Path, &'a str)>,
-    /// What directories have that is skipped.
+    /// Skipped entries of directories.
     pub(crate) skipped: Vec<InputEntry>,
     /// As in [`ManifestEntry`].
     pub(crate) options: &'a str,

@@ -29,7 +29,7 @@ pub(crate) struct OutputPlan {
     pub(crate) targets: Vec<ResultTarget>,
     /// Inputs that have no target.
     pub(crate) refused: Vec<UnplannedInput>,
-    /// What directories of inputs have that is skipped.
+    /// Skipped entries of the directories of inputs.
     pub(crate) skipped: Vec<InputEntry>,
     pub(crate) manifest: Option<Manifest>,
 }

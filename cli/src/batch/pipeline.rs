@@ -43,13 +43,13 @@ use crate::messages::{listing, names, signals, words};
 /// An input and the target of its result.
 pub(crate) type PipelineJob = (PathBuf, ResultTarget);
 
-/// What a command is to work on.
+/// The inputs and results of a command.
 #[derive(Default)]
 pub(crate) struct PipelineInputs {
     pub(crate) jobs: Vec<PipelineJob>,
     /// Inputs that have no job.
     pub(crate) refused: Vec<UnplannedInput>,
-    /// What directories of inputs have that is skipped.
+    /// Skipped entries of the directories of inputs.
     pub(crate) skipped: Vec<InputEntry>,
 }
 

@@ -1,4 +1,4 @@
-//! What a batch prints about its inputs: the lines of results and failures, as long as they are few, and a line for
+//! Messages of a batch about its inputs: the lines of results and failures, as long as they are few, and a line for
 //! each code of a warning at the end. Everything that is not printed is in the manifest.
 
 use std::collections::BTreeMap;

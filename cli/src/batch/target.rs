@@ -391,7 +391,7 @@ pub(crate) struct WrittenFile {
     pub(crate) digest: Option<Digest>,
     /// Its length.
     pub(crate) bytes: u64,
-    /// What its format could not store, or has changed.
+    /// Warnings about data that the format could not store, or that it changed.
     pub(crate) warnings: Vec<Diagnostic>,
     /// Files that get their names together with it.
     beside: Vec<WrittenFile>,

@@ -5,7 +5,7 @@
 /// With the status that the environment names, 0 too.
 fn end() -> ! {
     match std::env::var("CRASH_STATUS") {
-        // What runs at an ordinary end waits for the loader's lock, and the loader for us.
+        // Destructors would wait for the loader's lock, and the loader for this function.
         Ok(status) if status == "exit" => std::process::exit(0),
         // At once.
         Ok(status) => signal_hook::low_level::exit(status.parse().unwrap_or(1)),

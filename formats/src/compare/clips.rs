@@ -387,13 +387,13 @@ impl ClipPair<'_> {
         })
     }
 
-    /// What is assumed to compare the clips, for a warning: that two tracks are the same although their names differ,
-    /// because each clip has one track. `None` if nothing is assumed.
+    /// The assumption by which the clips are compared, for a warning: that two tracks are the same although their
+    /// names differ, because each clip has one track. `None` if nothing is assumed.
     #[must_use]
     pub fn assumption(&self) -> Option<String> {
         let [first, second] = self.clips.map(|clip| {
             let name = clip.set.get(0)?.name?;
-            // What a trajectory is called when it is read is no name that it had.
+            // Readers of trajectories make up this name.
             (name != TRAJECTORY_TRACK && clip.set.track_count() == 1).then_some(name)
         });
         let (first, second) = (first?, second?);

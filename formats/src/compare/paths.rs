@@ -49,7 +49,7 @@ pub struct PathDifference {
     pub ape: Option<PathErrors>,
     /// Relative errors, if they are computed.
     pub rpe: Option<PathErrors>,
-    /// What limits the meaning of the errors: gaps, and an alignment that the positions do not determine.
+    /// Warnings about the meaning of the errors: gaps, and an alignment that the positions do not determine.
     pub warnings: Vec<String>,
 }
 

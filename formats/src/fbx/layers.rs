@@ -141,8 +141,8 @@ impl StackLayers {
         }
     }
 
-    /// What must be added to the translation that `ufbx` computes for a node: it evaluates layers that override others
-    /// without their weight. `None` if nothing must be added.
+    /// The correction to add to the translation that `ufbx` computes for a node: it evaluates layers that override
+    /// others without their weight. `None` if nothing must be added.
     pub(super) fn weight_of_translation(
         &self,
         stack: &AnimStack,

@@ -1,6 +1,6 @@
 //! Makes the tracks of a clip from the poses of a log: which clock their times are of, what has no time, and names.
 //!
-//! Static transforms have no time of their own: their stamps say when a node was started, often before the recording,
+//! Static transforms have no time: their stamps say when a node was started, often before the recording,
 //! or are 0. They are constant, and a value that is published later is a step at the time when it was logged.
 
 use std::collections::{HashMap, HashSet};
@@ -53,7 +53,7 @@ impl TimedPose {
     }
 }
 
-/// What a body's messages say of it.
+/// The poses of a body, as its messages state them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BodyKind {
     /// Its pose at a time.

@@ -52,8 +52,8 @@ const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "f
 /// The array with the duration in seconds, in files of AMASS.
 const LENGTH: &str = "mocap_time_length";
 
-/// What files of AMASS and SMPL-X usually have besides the motion: the shape of the body, the motion of soft tissue,
-/// and the markers that the motion was computed from.
+/// Arrays that files of AMASS and SMPL-X usually have besides the motion: the shape of the body, the motion of soft
+/// tissue, and the markers that the motion was computed from.
 const BESIDE: [&str; 20] = [
     "betas",
     "dmpls",

@@ -8,7 +8,8 @@ use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::quaternion::ComponentOrder;
 
-/// What these files usually have besides the bodies' poses: their rates, and the same motion as angles of joints.
+/// Arrays that these files usually have besides the bodies' poses: their rates, and the same motion as angles of
+/// joints.
 const BESIDE: [&str; 5] = [
     "body_angular_velocities",
     "body_linear_velocities",

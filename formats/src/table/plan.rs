@@ -37,7 +37,7 @@ pub(crate) struct TablePlan {
     pub(crate) notes: Vec<(String, String)>,
 }
 
-/// What says the time of a row.
+/// The source of the times of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimeSource {
     /// A column of times.
@@ -400,7 +400,7 @@ impl TablePlan {
     }
 }
 
-/// What `--map` says of columns.
+/// The columns that `--map` names.
 #[derive(Default)]
 struct MappedColumns {
     /// The entries that are rotations, and translations and scales of their tracks.

@@ -1,4 +1,4 @@
-//! What times and names the bodies of a log have: stamps of 0, static transforms, robots with the same frames, clocks
+//! Times and names of the bodies of a log: stamps of 0, static transforms, robots with the same frames, clocks
 //! that differ.
 
 use std::fs;
@@ -84,7 +84,7 @@ fn a_stamp_of_zero_is_a_time_where_others_have_stamps() {
     assert_eq!(clip.time_offset, 1_700_000_000);
 }
 
-/// Whatever stamps static transforms have, they neither lengthen the clip nor say its rate.
+/// Stamps of static transforms neither lengthen the clip nor say its rate.
 #[test]
 fn static_transforms_have_no_time() {
     let sim = 928 * SECOND;

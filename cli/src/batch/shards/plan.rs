@@ -56,7 +56,7 @@ pub(crate) struct RecordedPlan {
     pub(crate) options: String,
     pub(crate) kernels_sha256: String,
     pub(crate) tumble: String,
-    /// What directories of inputs have that is skipped.
+    /// Skipped entries of the directories of inputs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) skipped: Vec<InputEntry>,
 }

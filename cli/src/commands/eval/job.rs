@@ -144,7 +144,7 @@ impl EvaluationJob<'_> {
         self.rotations(name, &*tracks.select(clip, name)?, end_frame, target)
     }
 
-    /// What a new result has at the end of a clip that ends between two frames.
+    /// The rule for the end of a clip that ends between two frames, for a new result.
     fn end_frame(&self, kind: ResultKind, target: &ResultTarget) -> EndFrame {
         let (asked, format) = (self.arguments.end_frame.end_frame, target.format());
         let has_times = format.supports(Feature::UnevenTimes) || target.has_times_apart();

@@ -119,7 +119,7 @@ impl EvaluationRequest {
     }
 }
 
-/// What evaluating a shard came to.
+/// The outcome of evaluating a shard.
 pub(crate) struct EvaluatedShard {
     /// How many were evaluated.
     pub(crate) rotations: u64,

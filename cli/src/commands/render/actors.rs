@@ -1,4 +1,4 @@
-//! What stands in a picture: chains of boxes, skeletons and their meshes, or bodies on paths.
+//! The actors of a picture: chains of boxes, skeletons and their meshes, or bodies on paths.
 
 use std::sync::Arc;
 
@@ -136,7 +136,7 @@ impl Subject {
         })
     }
 
-    /// What is around the actors of this clip.
+    /// The box around the actors of this clip.
     pub(super) fn surroundings(&self, actors: &[Actor]) -> Surroundings {
         if self.is_chain {
             return Surroundings {

@@ -143,7 +143,7 @@ fn cube(at: Vec3, rotation: Quat, edge: f32, colour: Colour) -> impl Iterator<It
     })
 }
 
-/// A triangle that is lit by its own normal.
+/// A triangle, shaded by its normal.
 fn face(corners: [Vec3; 3], colour: Colour) -> Face {
     let [a, b, c] = corners;
     Face {

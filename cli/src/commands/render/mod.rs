@@ -176,7 +176,7 @@ impl RenderOutput {
     }
 }
 
-/// What is drawn of a file, and the failure of animations that were refused.
+/// The actors of a file, and the failure of animations that were refused.
 struct Input {
     source: TravelSource,
     /// The mesh that the clip's joints move.

@@ -72,7 +72,7 @@ pub(crate) struct Actor {
     pub(crate) reach: Vec<Vec3>,
 }
 
-/// What is drawn of the tracks of an actor.
+/// The shape by which the tracks of an actor are drawn.
 pub(crate) enum Shape {
     /// A box for each.
     Boxes(Body),

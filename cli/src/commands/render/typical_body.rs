@@ -27,7 +27,7 @@ const FINGERS: [(&str, f64); 5] = [
 /// Places the joints of a body.
 ///
 /// # Errors
-/// When it has places of its own.
+/// When the clip states offsets.
 pub(super) fn set_typical_offsets(clip: &mut Motion) -> Result<(), OffsetsError> {
     let pelvis = clip.body.as_ref().map(|body| body.pelvis.as_dvec3());
     let set = &clip.set;
