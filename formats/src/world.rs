@@ -195,8 +195,8 @@ mod tests {
             scales: vec![Vec3::new(-1.0, 1.0, 1.0), Vec3::ONE, Vec3::ONE, Vec3::ONE],
         };
         let found = world(&clip, &samples).unwrap();
-        for joint in 1..4 {
-            assert!(found[joint].rotation.dot(quarter) > 1.0 - 1e-6, "{joint}");
+        for pose in &found[1..4] {
+            assert!(pose.rotation.dot(quarter) > 1.0 - 1e-6, "{}", pose.rotation);
         }
         assert!(found[2].position.distance(DVec3::Y) < 1e-6);
         assert!(found[3].position.distance(DVec3::X) < 1e-6);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
-use tumble_formats::end_frame::{EndFrame, sample_to_end};
+use tumble_formats::end_frame::{EndFrame, EndSample, sample_to_end};
 use tumble_formats::format::{FormatOption, MotionOptions, ReadOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Channels, Motion};
@@ -106,7 +106,7 @@ fn the_last_moment_of_a_loop_survives_between_all_formats() {
                 last,
             );
             let samples = sample_to_end(&ChannelMethods::AUTHORED, &engine, &input, &frames, end);
-            let even = end.is_some_and(|end| end.is_held()).then(|| rate(30));
+            let even = end.is_some_and(EndSample::is_held).then(|| rate(30));
             let bytes = write(to, &input, &samples.unwrap(), even);
             let found = read(to, bytes, 30);
             let (first, last) = found.set.time_span().unwrap();

@@ -97,7 +97,7 @@ fn clip(numbers: &mut Numbers) -> Motion {
         ..Motion::default()
     };
     let from_bvh = has_skeleton && numbers.coin();
-    let is_smooth = !from_bvh && !is_stepped && frames % 2 == 0;
+    let is_smooth = !from_bvh && !is_stepped && frames.is_multiple_of(2);
     for (track, name) in names.iter().enumerate().take(tracks) {
         let keys: Vec<Quat> = times.iter().map(|_| numbers.rotation()).collect();
         motion.set.push(*name, &times, &keys).unwrap();

@@ -430,7 +430,7 @@ impl ClipParts {
         let set = &mut clip.set;
         for (track, row) in self.scales {
             let times = set.track(track).times.to_vec();
-            let scales: Vec<Vec3> = threes(&row).map(|scale| scale.as_vec3()).collect();
+            let scales: Vec<Vec3> = threes(&row).map(DVec3::as_vec3).collect();
             let scaled = set.set_scales(track, &times, &scales, &[]);
             scaled.map_err(of_track)?;
         }

@@ -266,7 +266,7 @@ impl Outside {
         let all = timeline.len();
         let kept: Vec<f64> = timeline.times(0).filter(|&it| !is_left_out(it)).collect();
         let (Some(&start), Some(&end)) = (kept.first(), kept.last()) else {
-            return Err(self.nothing_in_common(timeline.times(0), clip, name));
+            return Err(Self::nothing_in_common(timeline.times(0), clip, name));
         };
         let left_out = all - kept.len();
         if left_out == 0 {
@@ -297,16 +297,11 @@ impl Outside {
         };
         match times.is_empty() || times.iter().any(says_something) {
             true => Ok(()),
-            false => Err(self.nothing_in_common(times.iter().copied(), clip, name)),
+            false => Err(Self::nothing_in_common(times.iter().copied(), clip, name)),
         }
     }
 
-    fn nothing_in_common(
-        self,
-        times: impl Iterator<Item = f64>,
-        clip: &Motion,
-        name: &str,
-    ) -> Failure {
+    fn nothing_in_common(times: impl Iterator<Item = f64>, clip: &Motion, name: &str) -> Failure {
         let (start, end) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| {
             (time.min(low), time.max(high))
         });

@@ -701,15 +701,31 @@ mod tests {
             freed: freed.to_vec(),
             used: used.to_vec(),
         };
-        let cut = |freed: &[Range<u64>], used: &[Range<u64>]| -> Vec<Range<u64>> {
-            let cut = layout(freed, used).cut(100);
-            cut.ranges.into_iter().map(|(range, _)| range).collect()
-        };
-        assert_eq!(cut(&[8..20], &[]), [8..20]);
-        assert_eq!(cut(&[5..19], &[]), [8..16]);
-        assert_eq!(cut(&[0..40], &[0..100]), []);
-        assert_eq!(cut(&[0..40], &[10..12, 20..24]), [0..8, 12..20, 24..40]);
-        assert_eq!(cut(&[0..8, 4..16, 90..200], &[12..13]), [0..12, 92..100]);
+        type Ranges<'a> = &'a [[u64; 2]];
+        let cases: [(Ranges<'_>, Ranges<'_>, Ranges<'_>); 5] = [
+            (&[[8, 20]], &[], &[[8, 20]]),
+            (&[[5, 19]], &[], &[[8, 16]]),
+            (&[[0, 40]], &[[0, 100]], &[]),
+            (
+                &[[0, 40]],
+                &[[10, 12], [20, 24]],
+                &[[0, 8], [12, 20], [24, 40]],
+            ),
+            (
+                &[[0, 8], [4, 16], [90, 200]],
+                &[[12, 13]],
+                &[[0, 12], [92, 100]],
+            ),
+        ];
+        for (freed, used, expected) in cases {
+            let [freed, used] = [freed, used].map(|all| all.iter().map(|&[start, end]| start..end));
+            let cut = layout(&freed.collect::<Vec<_>>(), &used.collect::<Vec<_>>()).cut(100);
+            let found = cut
+                .ranges
+                .into_iter()
+                .map(|(range, _)| [range.start, range.end]);
+            assert_eq!(found.collect::<Vec<_>>(), expected);
+        }
         let both = layout(&[8..16, 40..48], &[]).cut(60);
         let moved = [0, 8, 12, 16, 20, 48, 60].map(|offset| both.moved(offset));
         assert_eq!(moved, [0, 8, 8, 8, 12, 32, 44]);

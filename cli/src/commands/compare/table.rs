@@ -174,6 +174,8 @@ pub(super) fn csv_table(differences: &[ClipDifference]) -> io::Result<String> {
             writer.write_record(&record)?;
         }
     }
-    let bytes = writer.into_inner().map_err(|error| error.into_error())?;
+    let bytes = writer
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
     String::from_utf8(bytes).map_err(io::Error::other)
 }
