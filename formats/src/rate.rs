@@ -386,15 +386,23 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
         let is_at_zero = on_frames(times.iter().copied(), grid, 0.0, precision);
         Some(found(grid, if is_at_zero { 0.0 } else { first }))
     };
+    // The first time may be rounded too: other times decide where in its window its frame is.
+    let on_first = |steps: &StepRates, grid| {
+        let frame = steps.first_frame(&windows, grid)?;
+        Some(found(grid, first.clamp(frame.from, frame.to)))
+    };
     let from_first = || {
         let steps = steps.as_ref()?;
-        let grid = steps.choose(|rate| steps.fit(&windows, rate))?;
-        Some(found(grid, first))
+        let grid = steps.choose(|rate| steps.first_frame(&windows, rate).is_some())?;
+        on_first(steps, grid)
     };
     let simple = || {
         let grid = at_zero.as_ref().and_then(StepRates::simple);
         let grid = grid.map(|grid| found(grid, 0.0));
-        grid.or_else(|| Some(found(steps.as_ref()?.simple()?, first)))
+        grid.or_else(|| {
+            let steps = steps.as_ref()?;
+            on_first(steps, steps.simple()?)
+        })
     };
     let some_grid = || {
         let grid = on_some_grid(&windows)?;
@@ -524,14 +532,14 @@ impl StepRates {
         (self.low <= self.high).then_some(())
     }
 
-    /// Whether the frames of the rate can be shifted so that each window contains one.
-    fn fit(&self, windows: &[TimeWindow], rate: FrameRate) -> bool {
+    /// Where the first frame of the rate can be so that each window contains one; `None` if it can be nowhere.
+    fn first_frame(&self, windows: &[TimeWindow], rate: FrameRate) -> Option<TimeWindow> {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for (window, count) in windows.iter().zip(&self.counts) {
             let behind = count / rate.per_second();
             (from, to) = (from.max(window.from - behind), to.min(window.to - behind));
         }
-        from <= to
+        (from <= to).then_some(TimeWindow { from, to })
     }
 
     fn choose(&self, fits: impl Fn(FrameRate) -> bool) -> Option<FrameRate> {

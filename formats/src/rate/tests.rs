@@ -205,3 +205,41 @@ fn tenths_in_one_decimal_are_at_ten_a_second_however_many() {
         assert_eq!(found.unwrap().phase, 0.0);
     }
 }
+
+/// Moves times that were written with some decimals to their frames, and asserts that none of them moved further than
+/// its digits allow.
+fn assert_moved_by_half_a_digit(units: &[u32], decimals: u32) {
+    let unit = super::whole_power(10.0, -(decimals as i32));
+    let times: Vec<f64> = units.iter().map(|&units| f64::from(units) * unit).collect();
+    let mut lists = [times.clone()];
+    crate::motion::grid::restore(&mut lists, Precision::Decimals(decimals));
+    for (found, written) in lists[0].iter().zip(&times) {
+        let off = (found - written).abs();
+        assert!(off <= 0.500_01 * unit, "{times:?}: {:?}", lists[0]);
+    }
+}
+
+/// Few keys with few digits: a first frame at its written time would leave the others a whole digit away.
+#[test]
+fn times_in_text_move_by_half_a_digit_at_most() {
+    for (units, decimals) in [
+        (&[0u32, 10, 20, 37][..], 2),
+        (&[0, 10, 20, 37], 1),
+        (&[0, 10, 20, 37], 0),
+        (&[0, 10, 20, 26], 1),
+        (&[4, 14, 25, 34, 40, 48], 1),
+        (&[7, 18, 25, 36, 52, 57], 1),
+        (&[11, 19, 31, 40], 3),
+    ] {
+        assert_moved_by_half_a_digit(units, decimals);
+    }
+    let steps = proptest::collection::vec(1u32..40, 2..9);
+    proptest::proptest!(|(first in 0u32..30, steps in steps, decimals in 0u32..4)| {
+        let mut units = vec![first];
+        units.extend(steps.iter().scan(first, |time, step| {
+            *time += step;
+            Some(*time)
+        }));
+        assert_moved_by_half_a_digit(&units, decimals);
+    });
+}
