@@ -18,6 +18,7 @@ mod compare;
 mod configurations;
 mod dat_fixtures;
 mod end_frame;
+mod examples;
 mod faults;
 mod follow;
 mod json;

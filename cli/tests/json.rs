@@ -94,6 +94,31 @@ fn every_command_prints_json_without_debug_text() {
     }
 }
 
+/// Inputs that fail are records too: a reader of the JSON alone learns of all.
+#[test]
+fn lists_have_the_inputs_that_failed() {
+    let temporary = sample_folder();
+    for line in [
+        &["info", "bad.dat", "a.dat"][..],
+        &[
+            "verify", "bad.dat", "a.dat", "-m", "slerp", "--fps", "5", "--device", "cpu",
+        ],
+    ] {
+        let run = run(temporary.path(), &[line, &["--json"]].concat());
+        assert_eq!(run.code, 3, "{line:?}: {}", run.words);
+        let records: Value = serde_json::from_slice(&run.out).unwrap();
+        assert_eq!(records[0]["input"], "a.dat", "{line:?}");
+        let failed = &records[1];
+        assert_eq!(
+            (&failed["state"], &failed["input"]),
+            (&"failed".into(), &"bad.dat".into())
+        );
+        assert_eq!(failed["code"], 4, "{line:?}");
+        let message = failed["message"].as_str().unwrap();
+        assert!(message.starts_with("bad.dat:2:"), "{message}");
+    }
+}
+
 #[test]
 fn debug_text_is_found() {
     for wrong in [

@@ -23,7 +23,7 @@ fn terrain(folder: &Path) {
 }
 
 /// A square of 10 by 10 in the plane of x and z, with y up, as glTF; beside it one of 1 by 1.
-fn plaza(folder: &Path) {
+pub(crate) fn plaza(folder: &Path) {
     let corners: [f32; 24] = [
         0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 10.0, 0.0, 10.0, 0.0, 0.0, 10.0, 20.0, 0.0, 0.0, 21.0, 0.0,
         0.0, 21.0, 0.0, 1.0, 20.0, 0.0, 1.0,

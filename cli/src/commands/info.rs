@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
 use clap::Args;
 use glam::DVec3;
@@ -14,6 +15,7 @@ use tumble_formats::motion::Motion;
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::curve_warning;
+use crate::batch::entry::InputEntry;
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::{listing, names, words};
 
@@ -89,43 +91,53 @@ struct Summary {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut summaries = Vec::new();
+    let (mut summaries, mut failed) = (Vec::new(), Vec::new());
     let inputs = arguments.inputs.distinct(false)?;
     let outcome = for_each(&inputs, |path| {
-        let loaded = arguments.inputs.load_quietly(path)?;
-        let name = names::input(path);
-        let several = loaded.clips.len() + loaded.refused.len() > 1;
-        for (index, clip) in loaded.clips.iter().enumerate() {
-            let animation = several.then(|| names::clip(clip));
-            let clip = arguments.inputs.tracks.select(clip, &name)?;
-            let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
-            // The warnings of the file are listed once.
-            if index > 0 {
-                summary.warnings.clear();
-            }
-            // Keys that follow a file's curves are none that a method is asked to join.
-            let follows = arguments.inputs.follows_curves(path);
-            let smoothest = Interpolation::from(C2);
-            let of_curves = (!follows)
-                .then(|| curve_warning(&name, &clip.set, &smoothest))
-                .flatten();
-            summary
-                .warnings
-                .extend(of_curves.map(|warning| warning.to_string()));
-            summaries.push(summary);
-        }
-        for refused in &loaded.refused {
-            words::note(&refused.to_string());
-        }
-        input::check_complete(&name, &loaded)
+        let outcome = summarise(arguments, path, &mut summaries);
+        outcome.inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
     });
     if arguments.json {
-        listing::json(&summaries)?;
+        listing::records(&summaries, &failed)?;
     } else {
         let texts: Vec<String> = summaries.iter().map(Summary::text).collect();
         listing::text(&texts.join("\n"))?;
     }
     outcome
+}
+
+/// Adds a summary of each clip of an input.
+fn summarise(
+    arguments: &Arguments,
+    path: &Path,
+    summaries: &mut Vec<Summary>,
+) -> Result<(), Failure> {
+    let loaded = arguments.inputs.load_quietly(path)?;
+    let name = names::input(path);
+    let several = loaded.clips.len() + loaded.refused.len() > 1;
+    for (index, clip) in loaded.clips.iter().enumerate() {
+        let animation = several.then(|| names::clip(clip));
+        let clip = arguments.inputs.tracks.select(clip, &name)?;
+        let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
+        // The warnings of the file are listed once.
+        if index > 0 {
+            summary.warnings.clear();
+        }
+        // Keys that follow a file's curves are none that a method is asked to join.
+        let follows = arguments.inputs.follows_curves(path);
+        let smoothest = Interpolation::from(C2);
+        let of_curves = (!follows)
+            .then(|| curve_warning(&name, &clip.set, &smoothest))
+            .flatten();
+        summary
+            .warnings
+            .extend(of_curves.map(|warning| warning.to_string()));
+        summaries.push(summary);
+    }
+    for refused in &loaded.refused {
+        words::note(&refused.to_string());
+    }
+    input::check_complete(&name, &loaded)
 }
 
 /// The times between neighbouring keys, seconds.

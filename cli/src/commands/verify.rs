@@ -1,6 +1,7 @@
 //! `tumble verify`: the device against the CPU, both against the f64 reference.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use clap::Args;
 use serde::Serialize;
@@ -16,6 +17,7 @@ use crate::arguments::interpolation::{
 };
 use crate::arguments::options::CommandLine;
 use crate::arguments::time::{SampleRequest, SamplingArguments};
+use crate::batch::entry::InputEntry;
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
 use crate::messages::progress::Progress;
@@ -88,8 +90,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let device = arguments.device.compared(&arguments.command_line).open()?;
     let steps = (inputs.len() * methods.len()) as u64;
     let mut progress = Progress::new("verifying", steps);
-    let mut lines = Vec::new();
-    let outcome = for_each(&inputs, |path| {
+    let (mut lines, mut failed) = (Vec::new(), Vec::new());
+    let mut verify = |path: &Path| {
         let name = names::input(path);
         let loaded = progress.suspend(|| arguments.inputs.load(path))?;
         for clip in &loaded.clips {
@@ -108,12 +110,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
         input::check_complete(&name, &loaded)
+    };
+    let outcome = for_each(&inputs, |path| {
+        verify(path).inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
     });
     drop(progress);
     let is_failed = |line: &&VerificationLine| line.verdict == Verdict::Failed;
     let failing = lines.iter().filter(is_failed).count();
     if arguments.json {
-        listing::json(&lines)?;
+        listing::records(&lines, &failed)?;
     } else {
         listing::text(&report(&lines, &device))?;
     }

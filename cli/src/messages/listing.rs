@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use tumble_formats::printable::{printable, printable_lines};
 
+use crate::batch::entry::InputEntry;
 use crate::messages::exit::Failure;
 
 /// Writes a listing to standard output. Names in it went through [`printable`], so that none begins a
@@ -28,6 +29,17 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text =
         serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
     styled(&format!("{}\n", json_printable(&text)))
+}
+
+/// As [`json`]: a list of results, and after them of the inputs that failed.
+pub(crate) fn records(
+    results: &[impl serde::Serialize],
+    failed: &[InputEntry],
+) -> Result<(), Failure> {
+    let failed = failed.iter().map(serde_json::to_value);
+    let results = results.iter().map(serde_json::to_value);
+    let records: Result<Vec<_>, _> = results.chain(failed).collect();
+    json(&records.expect("names are strings and numbers are numbers"))
 }
 
 /// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings
