@@ -376,15 +376,15 @@ fn nothing_to_bake_is_the_same_file() {
 #[test]
 fn deeply_nested_extras_are_copied() {
     let extras = format!("{}7{}", "[".repeat(100_000), "]".repeat(100_000));
-    for place in [r#""extras":"#, r#""extensions":{"VENDOR_x":"#] {
-        let end = if place.ends_with("extras\":") {
+    for start in [r#""extras":"#, r#""extensions":{"VENDOR_x":"#] {
+        let end = if start.ends_with("extras\":") {
             ""
         } else {
             "}"
         };
         let text = fs::read_to_string(fixture("names_twice_elsewhere.gltf")).unwrap();
         let nested =
-            format!(r#"{{"extensionsRequired":[],{place}{extras}{end},"x":["extensions"],"#);
+            format!(r#"{{"extensionsRequired":[],{start}{extras}{end},"x":["extensions"],"#);
         let text = text
             .replacen('{', &nested, 1)
             .replace("\"extras\": {", "\"extra\": {");

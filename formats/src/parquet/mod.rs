@@ -40,6 +40,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: true,
+    guesses_time_unit: true,
     read: open_parquet,
     read_bytes: read_parquet,
     write: Some(WriteResults {

@@ -224,7 +224,7 @@ fn rates_and_units_come_from_options_where_the_file_has_none() {
         .unwrap()
         .clips[0];
     assert_eq!(clip.set.track(0).times, [0.0, 0.5, 0.75]);
-    // What is no rate is replaced, in the file that is written too.
+    // A number that is no rate is replaced.
     let options = ReadOptions {
         override_rate: FrameRate::new(24, 1).ok(),
         ..ReadOptions::default()
