@@ -241,7 +241,7 @@ fn read_rate<R: BufRead>(
     )?;
     let period = match number::parse(&text) {
         Ok(number) => number.value,
-        Err((Code::NotFinite, _)) if options.override_rate.is_some() => f64::NAN,
+        Err((Code::NotFinite | Code::TooLarge, _)) if options.override_rate.is_some() => f64::NAN,
         Err((code, message)) => return Err(lines.refuse(column, code, message)),
     };
     let rate = match options.raw_times {
