@@ -132,6 +132,8 @@ fn half_size_results_are_what_the_library_encodes() {
 #[test]
 fn standard_input_and_output_carry_data() {
     let folder = sample_folder();
+    // Standard input, although there is a file of this name.
+    fs::write(folder.path().join("-"), "").unwrap();
     let quats = expected(&SampleTimes::fps(25), Layout::TrackMajor);
     let components = || bits(quats.iter().flat_map(Quat::to_array));
     for line in [&["eval", "-", "-o", "-"][..], &["eval", "-"]] {
@@ -142,6 +144,15 @@ fn standard_input_and_output_carry_data() {
         let run = finish(output);
         assert_eq!(run.code, 0, "{}", run.words);
         assert_eq!(read_npy(&run.out), (vec![2, 51, 4], components()));
+    }
+    for format in ["dat", "csv", "npz"] {
+        let output = command(folder.path(), &["info", "-", "--from", format])
+            .stdin(fs::File::open(folder.path().join("-")).unwrap())
+            .output()
+            .unwrap();
+        let run = finish(output);
+        let words = "standard input: error[E010]: the file is empty";
+        assert!(run.code == 4 && run.words.contains(words), "{}", run.words);
     }
     let run = succeed(
         folder.path(),

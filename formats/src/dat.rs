@@ -42,6 +42,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: true,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_dat,
     read_bytes: |name, bytes, options| read_dat(name, &bytes[..], options),
     write: None,
@@ -99,7 +100,7 @@ struct DatHeader {
 
 fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<DatHeader, Diagnostic> {
     let Some(line) = lines.next()? else {
-        return Err(lines.refuse_whole(Code::Empty, "the file is empty".to_owned()));
+        return Err(Diagnostic::empty(lines.file()));
     };
     let Some(body) = line.trim_start().strip_prefix('#') else {
         let message = "no header; the first line is `# <boxes> <box length>`".to_owned();

@@ -173,7 +173,7 @@ codes! {
     TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line, and so do the samples of a clip that is written (`--times`).";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
-    LargeSeconds = "E029" elsewhere, "times too large for seconds", "Tables and trajectories with such times would be read as milliseconds, microseconds or nanoseconds since 1970 (W305), so they are not written. `--time-unit` states the unit of the input's times.";
+    LargeSeconds = "E029" elsewhere, "times too large for seconds", "CSV, Parquet, Arrow and TUM files and KITTI's files of times with such times would be read as milliseconds, microseconds or nanoseconds since 1970 (W305), so they are not written. `--time-unit` states the unit of the input's times.";
     Time = "E030" elsewhere, "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     Memory = "E034", "more memory than is allowed for its length", "Reading an input may take 64 times its length plus 64 MiB (`--max-memory`). This one would take more, because of a count, of compressed data, or of parts that refer to the same part many times.";
@@ -247,16 +247,16 @@ codes! {
     WholeTimes = "E410", "times that are whole numbers", "The unit is not known; give it by `--time-unit s`, `ms`, `us` or `ns`.";
     ListLength = "E411" elsewhere, "a list of another length", "A rotation needs four numbers of a list, a translation or a scale three; `--map NAME=LIST[3:7]` selects them.";
     NoRows = "E412", "a table without rows", "It has columns but no keys.";
-    ColumnsAmbiguous = "E414", "columns of two meanings", "The names `x y z` are a quaternion's with `w`, and a position's beside a quaternion whose columns have a number after their names (`x_1`, `x.1`). `--map` says which they are.";
     SeveralClips = "E413" elsewhere, "several clips for one table", "A table with a row for each time contains one clip. Write the clips to separate files, or as Parquet.";
+    ColumnsAmbiguous = "E414", "columns of two meanings", "The names `x y z` are a quaternion's with `w`, and a position's beside a quaternion whose columns have a number after their names (`x_1`, `x.1`). `--map` says which they are.";
     // E5xx and W5xx: trajectories.
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504" elsewhere, "a clip that a trajectory cannot store", "A trajectory has one clip with one track, whose times must differ after rounding to the format's precision. KITTI does not store times; poses that are not at frames of a rate need a separate file of times, `--times-out`, in Python `times_out`.";
     KittiPose = "E505" elsewhere, "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` is allowed. A frame number before them, as in KITTI-360, is not: remove it, and give the times of the frames by `--source-times`, in Python `source_times`.";
-    FrameTimes = "E507" elsewhere, "not a time for each pose", "A file of times has one number on each line, the time of a pose in seconds, in the order of the poses.";
     NoRotation = "E506" elsewhere, "a matrix that is not a rotation", "The rows of a rotation matrix have length 1 and are orthogonal, and its determinant is 1.";
+    FrameTimes = "E507" elsewhere, "not a time for each pose", "A file of times has one number on each line, the time of a pose in seconds, in the order of the poses.";
     // E6xx: paths.
     Path = "E601" elsewhere, "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, where `t` and `ux,uy,uz` are optional, or NPY of shape (tracks, points, 3). An upward direction must not be 0; its cells may be blank.";
     PathTimes = "E602" elsewhere, "no times, or too many", "A path without times needs `--seconds` or `--rate`. A path with times must have neither.";
@@ -315,12 +315,12 @@ codes! {
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
-    TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file; `--source-fps` is for files that state none.";
+    TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file, or a number that is no rate; `--source-fps` is for files that state none.";
     TimeUnit = "W305", "times in another unit than seconds", "Seconds since 1970 have ten digits, milliseconds thirteen, microseconds sixteen, nanoseconds nineteen (ORB-SLAM writes them). A first time from 1e11 on is taken for milliseconds, from 1e14 on for microseconds, from 1e17 on for nanoseconds. `--time-unit` states the unit and avoids this warning.";
     ArraysNotRead = "W306", "arrays that are not read", "This is no error: the rotations were found in other arrays, and the names of these are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. What files of a layout usually have besides the motion, such as `betas` and `gender` of AMASS, the shape of the body that `--body-model` uses, causes no warning. A result in the same layout keeps arrays that are constant.";
     Bridged = "W401" elsewhere, "keys that are missing", "Cells are blank or NaN. Because of `--bridge-gaps`, the track is interpolated between its other keys there.";
-    RowsSorted = "W403", "rows that are not in the order of their times", "The rows of a track are sorted by time. If the clock was set back instead, so that sorting would mix two recordings, they are refused (E026).";
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are not known, or a list has more numbers than `--map` uses. `--map` says what columns are.";
+    RowsSorted = "W403", "rows that are not in the order of their times", "The rows of a track are sorted by time. If the clock was set back instead, so that sorting would mix two recordings, they are refused (E026).";
     FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory has a time, a position and a quaternion, or the twelve numbers of a matrix in KITTI. Numbers after these, such as a covariance or velocities, are not read.";
     FbxBeside = "W701", "content that is not motion", "Only nodes and their animation are read from FBX. Meshes, skins, materials and other content are not.";
     FbxProperties = "W702", "curves of other properties", "They animate something other than a transform, such as blend shapes, visibility or a lens.";
@@ -328,12 +328,12 @@ codes! {
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, or is a pose: each curve has one key. Nothing moves.";
+    FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
     FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
     FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
-    FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
 }
 
 impl Code {

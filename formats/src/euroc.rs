@@ -40,6 +40,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: true,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_euroc,
     read_bytes: |name, bytes, options| match options.map {
         Some(_) => (crate::csv::FORMAT.read_bytes)(name, bytes, options),

@@ -5,7 +5,6 @@ pub mod registry;
 mod write_clips;
 
 use std::fmt;
-use std::fs::{self, Metadata};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -48,6 +47,9 @@ pub struct Format {
     /// Whether names of tracks must be unique in a file. A repeated name is then written with the track's number
     /// after it, and a warning is returned. For writers that warn themselves this is `false`.
     pub numbers_repeated_names: bool,
+    /// Whether times of which the first is too large for seconds are read as times in a smaller unit (W305). Such
+    /// seconds are not written.
+    pub guesses_time_unit: bool,
     /// Reads clips from a file; `-` is standard input.
     pub read: ReadKeys,
     /// Reads clips from the bytes of a file. Other files that it names are not read.
@@ -195,6 +197,20 @@ impl TimeUnit {
             size if size >= LARGEST_SECONDS => Some(Self::Milliseconds),
             _ => None,
         }
+    }
+
+    /// The unit that is stated for times, of which this is the first; otherwise the unit of times that are too large for
+    /// seconds, with a warning.
+    pub(crate) fn or_of_first(
+        stated: Option<Self>,
+        first: f64,
+        warn: impl FnOnce(Self),
+    ) -> Option<Self> {
+        stated.or_else(|| {
+            let unit = Self::of_large(first)?;
+            warn(unit);
+            Some(unit)
+        })
     }
 
     /// The words of a warning that times, of which this is the first, are taken for times in this unit.
@@ -487,11 +503,6 @@ impl Format {
     /// # Errors
     /// When the file cannot be opened or is invalid; the first error is returned.
     pub fn open(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-        // A pipe's first bytes are its reader's.
-        let is_empty = |metadata: Metadata| metadata.is_file() && metadata.len() == 0;
-        if fs::metadata(path).is_ok_and(is_empty) {
-            return Err(Diagnostic::empty(path.display().to_string()));
-        }
         (self.read)(path, options)
     }
 }

@@ -184,10 +184,7 @@ fn is_unit(key: DQuat) -> bool {
 const SHORTEST: f64 = 1e-9;
 
 /// The f32 after `time`.
-#[cfg_attr(
-    not(feature = "fbx"),
-    expect(dead_code, reason = "curves of FBX jump after a key")
-)]
+#[cfg(feature = "fbx")]
 pub(crate) fn just_after(time: f64) -> f64 {
     f64::from((time as f32).next_up()).max(time + SHORTEST)
 }

@@ -32,6 +32,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: Some(12),
     is_text: true,
     numbers_repeated_names: false,
+    guesses_time_unit: true,
     read: open_kitti,
     read_bytes: |name, bytes, options| read_kitti(name, &bytes[..], options),
     write: None,
@@ -76,11 +77,10 @@ pub fn read_frame_times(
         for (column, token) in tokens(&text) {
             let read = number::parse(token);
             let read = read.map_err(|(code, message)| lines.refuse(column, code, message))?;
-            if found.times.is_empty()
-                && let Some(large) = TimeUnit::of_large(read.value)
-            {
-                unit = Some(large);
-                lines.warn(column, Code::TimeUnit, large.assumed(token));
+            if found.times.is_empty() {
+                unit = TimeUnit::or_of_first(None, read.value, |unit| {
+                    lines.warn(column, Code::TimeUnit, unit.assumed(token));
+                });
             }
             let power = unit.map_or(0, TimeUnit::power);
             let Some(time) = Decimal::parse_in(token, power) else {

@@ -24,6 +24,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_npy,
     read_bytes: read_npy,
     write: Some(WriteResults {

@@ -110,9 +110,6 @@ pub fn read_paths(
     bytes: &[u8],
     pace: Option<Pace>,
 ) -> Result<Motion, Diagnostic> {
-    if bytes.is_empty() {
-        return Err(Diagnostic::empty(file));
-    }
     let paths = (PathFormat::detect(bytes).read_bytes)(file, bytes)?;
     paths_of(file, name, paths, pace)
 }

@@ -45,14 +45,17 @@ impl Source {
         Self::of_file(file, name.clone()).map_err(unreadable)
     }
 
-    /// Opens a file and reads it by a function, which gets the name for messages. Refuses the file if it was changed
-    /// meanwhile.
+    /// Opens a file and reads it by a function, which gets the name for messages. Refuses the file if it is empty, or
+    /// was changed meanwhile.
     pub(super) fn read_by<T>(
         path: &Path,
         pipes: bool,
         read: impl FnOnce(&str, &mut BufReader<Box<dyn Read>>) -> Result<T, Diagnostic>,
     ) -> Result<T, Diagnostic> {
         let mut source = Self::open(path, pipes)?;
+        if source.reader.fill_buf().is_ok_and(<[u8]>::is_empty) {
+            return Err(Diagnostic::empty(source.name));
+        }
         let found = read(&source.name, &mut source.reader)?;
         source.check_unchanged()?;
         Ok(found)
@@ -102,7 +105,7 @@ impl Source {
     /// All bytes of a file that is not longer than `limit`.
     ///
     /// # Errors
-    /// When reading fails, when the file is longer, or when it changes meanwhile.
+    /// When reading fails, when the file is longer or empty, or when it changes meanwhile.
     pub(super) fn into_bytes(mut self, limit: u64) -> Result<Vec<u8>, Diagnostic> {
         let known = self.file.as_ref().map_or(0, |(_, metadata)| metadata.len());
         let refuse = |code, message: String| Diagnostic::new(&self.name, code, message);
@@ -128,7 +131,10 @@ impl Source {
             return Err(too_long());
         }
         self.check_unchanged()?;
-        Ok(bytes)
+        match bytes.is_empty() {
+            true => Err(Diagnostic::empty(self.name)),
+            false => Ok(bytes),
+        }
     }
 
     /// Refuses a file that was changed while it was read.

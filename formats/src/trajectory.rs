@@ -79,15 +79,18 @@ pub enum Undetermined {
     Still,
     /// The positions of a path lie on a straight line, and any rotation about it fits as well.
     Line,
+    /// The positions of the paths are not correlated, and every rotation fits as well.
+    Uncorrelated,
 }
 
 impl Undetermined {
-    /// A name: `still` or `line`.
+    /// A name: `still`, `line` or `uncorrelated`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Still => "still",
             Self::Line => "line",
+            Self::Uncorrelated => "uncorrelated",
         }
     }
 }
@@ -97,6 +100,7 @@ impl fmt::Display for Undetermined {
         f.write_str(match self {
             Self::Still => "the positions of a path are all the same",
             Self::Line => "the positions of a path lie on a straight line",
+            Self::Uncorrelated => "the positions of the paths are not correlated",
         })
     }
 }
@@ -207,6 +211,13 @@ impl Alignment {
             apart.fold(0.0, f64::max) / (1.0 + mean.length())
         };
         let is_still = extent(reference, to) < STILL || extent(estimate, from) < STILL;
+        // Of the largest covariance that paths of these extents have.
+        let is_zero = |covariance: f64| {
+            let squares = pairs().map(|(a, b)| [level(a), level(b)].map(DVec3::length_squared));
+            let [a, b] = squares.fold([0.0, 0.0], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+            covariance < UNCORRELATED * (a * b).sqrt()
+        };
+        let uncorrelated = (DQuat::IDENTITY, Some(Undetermined::Uncorrelated));
         let (rotation, undetermined) = match align {
             Align::None | Align::Position => (DQuat::IDENTITY, None),
             Align::Yaw | Align::Se3 | Align::Sim3 if is_still => {
@@ -216,13 +227,22 @@ impl Alignment {
                 let (sine, cosine) = pairs().fold((0.0, 0.0), |(sine, cosine), (a, b)| {
                     (sine + b.x * a.y - b.y * a.x, cosine + b.x * a.x + b.y * a.y)
                 });
-                let (sine, cosine) = libm::sincos(0.5 * libm::atan2(sine, cosine));
-                (DQuat::from_xyzw(0.0, 0.0, sine, cosine), None)
+                if is_zero(libm::hypot(sine, cosine)) {
+                    uncorrelated
+                } else {
+                    let (sine, cosine) = libm::sincos(0.5 * libm::atan2(sine, cosine));
+                    (DQuat::from_xyzw(0.0, 0.0, sine, cosine), None)
+                }
             }
-            Align::Se3 | Align::Sim3 => match rotation_of_lines(pairs()) {
-                Some(rotation) => (rotation, Some(Undetermined::Line)),
-                None => (best_rotation(pairs()), None),
-            },
+            Align::Se3 | Align::Sim3 => {
+                let outer = |(a, b): (DVec3, DVec3)| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+                let covariance: DMat3 = pairs().map(outer).sum();
+                match rotation_of_lines(covariance) {
+                    _ if is_zero(size(covariance)) => uncorrelated,
+                    Some(rotation) => (rotation, Some(Undetermined::Line)),
+                    None => (best_rotation(pairs()), None),
+                }
+            }
         };
         let scale = match align {
             Align::Sim3 => {
@@ -273,11 +293,18 @@ const STILL: f64 = 1e-9;
 /// a hundred thousandth of the length beside it. f32 rounds positions by a hundredth of this.
 const LINE: f64 = 1e-10;
 
-/// The smallest rotation of the best from the second vectors to the first, if many are the best because one of both
-/// paths is a line.
-fn rotation_of_lines(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<DQuat> {
-    let outer = |(a, b): (DVec3, DVec3)| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-    let covariance: DMat3 = pairs.map(outer).fold(DMat3::ZERO, |sum, one| sum + one);
+/// A covariance that is a smaller part of the largest of such paths is 0, but for rounding.
+const UNCORRELATED: f64 = 1e-12;
+
+/// The root of the sum of the squares of a matrix's numbers.
+fn size(matrix: DMat3) -> f64 {
+    let squares = matrix.to_cols_array().map(|it| it * it);
+    squares.iter().sum::<f64>().sqrt()
+}
+
+/// The smallest rotation of the best from the second positions to the first, if many are the best because one of both
+/// paths is a line. The covariance is not 0.
+fn rotation_of_lines(covariance: DMat3) -> Option<DQuat> {
     let square = covariance.transpose() * covariance;
     let mut matrix = [[0.0; 4]; 4];
     for (row, from) in matrix.iter_mut().zip(square.transpose().to_cols_array_2d()) {
@@ -286,10 +313,10 @@ fn rotation_of_lines(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<DQua
     let [x, y, z, _] = largest_eigenvector(matrix);
     let from = DVec3::new(x, y, z).try_normalize()?;
     let to = covariance * from;
-    let size = to.length();
     let rest = covariance - DMat3::from_cols(to * from.x, to * from.y, to * from.z);
-    let rest: f64 = rest.to_cols_array().iter().map(|it| it * it).sum();
-    (rest.sqrt() <= LINE * size).then(|| DQuat::from_rotation_arc(from, to / size))
+    let is_line = size(rest) <= LINE * to.length();
+    let direction = to.try_normalize().filter(|_| is_line)?;
+    Some(DQuat::from_rotation_arc(from, direction))
 }
 
 /// The rotation from the second vectors to the first by least squares: the eigenvector of the largest eigenvalue of
@@ -701,6 +728,27 @@ mod tests {
         let mut bent = along(direction);
         bent[3].position.y += 0.1;
         assert_eq!(Alignment::of(&bent, &bent, Align::Se3).undetermined, None);
+    }
+
+    /// Two lines along x whose covariance is 0: no rotation fits better than another.
+    #[test]
+    fn paths_that_are_not_correlated_are_not_turned() {
+        let along = |all: [f64; 3], direction: DVec3| -> Vec<Pose> {
+            let at = all.map(|x| direction * x);
+            at.map(|position| pose(position.x, position.y, position.z, DQuat::IDENTITY))
+                .to_vec()
+        };
+        let direction = DVec3::new(0.3, 0.1, 0.7).normalize();
+        for direction in [DVec3::X, direction] {
+            let reference = along([-1.0, 0.0, 1.0], direction);
+            let estimate = along([1.0, -2.0, 1.0], direction);
+            for align in [Align::Yaw, Align::Se3, Align::Sim3] {
+                let found = Alignment::of(&reference, &estimate, align);
+                assert_eq!(found.rotation, DQuat::IDENTITY, "{align}");
+                assert_eq!(found.undetermined, Some(Undetermined::Uncorrelated));
+                assert_eq!(found.scale, 1.0);
+            }
+        }
     }
 
     #[test]

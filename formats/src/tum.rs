@@ -58,6 +58,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: Some(8),
     is_text: true,
     numbers_repeated_names: false,
+    guesses_time_unit: true,
     read: open_tum,
     read_bytes: |name, bytes, options| read_tum(name, &bytes[..], options),
     write: None,
@@ -210,12 +211,10 @@ impl TrajectoryPoses {
             numbers[index] = read.value;
         }
         let (column, token) = tokens(line).next().unwrap_or((1, ""));
-        if self.unit.is_none()
-            && self.times.is_empty()
-            && let Some(unit) = TimeUnit::of_large(numbers[0])
-        {
-            self.unit = Some(unit);
-            lines.warn(column, Code::TimeUnit, unit.assumed(token));
+        if self.times.is_empty() {
+            self.unit = TimeUnit::or_of_first(self.unit, numbers[0], |unit| {
+                lines.warn(column, Code::TimeUnit, unit.assumed(token));
+            });
         }
         let power = self.unit.map_or(0, TimeUnit::power);
         let Some(time) = Decimal::parse_in(token, power) else {
@@ -239,36 +238,33 @@ impl TrajectoryPoses {
 
     /// Removes the poses that have a number that is NaN.
     fn leave_out_gaps<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(), Diagnostic> {
-        let poses = self.positions.iter().zip(&self.rotations);
-        let gaps = poses.map(|(position, rotation)| position.is_nan() || rotation.is_nan());
-        let gaps: Vec<bool> = gaps.collect();
-        let Some(first) = gaps.iter().position(|&is_gap| is_gap) else {
+        let is_gap =
+            |pose: &usize| self.positions[*pose].is_nan() || self.rotations[*pose].is_nan();
+        let (gaps, kept): (Vec<usize>, Vec<usize>) = (0..self.times.len()).partition(is_gap);
+        let Some(&first) = gaps.first() else {
             return Ok(());
         };
-        let count = gaps.iter().filter(|&&is_gap| is_gap).count();
-        if count == gaps.len() {
+        if kept.is_empty() {
             let message = "no pose is without a gap".to_owned();
             return Err(lines.refuse_end(Code::NotFinite, message));
         }
-        let mut warning = Diagnostic {
-            location: Some(Location::Text {
+        let mut warnings = Warnings::new(lines.file());
+        warnings.warn_of(gaps.len(), Code::Bridged, || {
+            let location = Location::Text {
                 line: self.lines[first],
                 column: 1,
-            }),
-            ..Diagnostic::new(
-                lines.file(),
-                Code::Bridged,
-                format!(
-                    "{count} poses have numbers that are missing; the path is interpolated from the others"
-                ),
-            )
-        };
-        warning.count = count as u64;
-        lines.warnings.push(warning);
-        retain(&mut self.times, &gaps);
-        retain(&mut self.positions, &gaps);
-        retain(&mut self.rotations, &gaps);
-        retain(&mut self.lines, &gaps);
+            };
+            let message = format!(
+                "{} poses have numbers that are missing; the path is interpolated from the others",
+                gaps.len()
+            );
+            (Some(location), message)
+        });
+        lines.warnings.append(&mut warnings.into_list());
+        select(&mut self.times, Some(&kept));
+        select(&mut self.positions, Some(&kept));
+        select(&mut self.rotations, Some(&kept));
+        select(&mut self.lines, Some(&kept));
         Ok(())
     }
 
@@ -344,12 +340,6 @@ impl TrajectoryPoses {
             .chain(warnings.into_list().into_iter().map(from_offset));
         Ok(Loaded::of(clip, warnings.collect()))
     }
-}
-
-/// Removes the entries of a list that are gaps.
-fn retain<T>(list: &mut Vec<T>, gaps: &[bool]) {
-    let mut gaps = gaps.iter();
-    list.retain(|_| !gaps.next().is_some_and(|&is_gap| is_gap));
 }
 
 /// Number of decimals in seconds of a number in a unit of `10^power` seconds.

@@ -38,14 +38,24 @@ impl Warnings {
         code: Code,
         describe: impl FnOnce() -> (Option<Location>, M),
     ) {
+        self.warn_of(1, code, describe);
+    }
+
+    /// Counts a warning of `count` keys, if these are any.
+    pub(crate) fn warn_of<M: Into<String>>(
+        &mut self,
+        count: usize,
+        code: Code,
+        describe: impl FnOnce() -> (Option<Location>, M),
+    ) {
         if let Some(known) = self.list.iter_mut().find(|known| known.code == code) {
-            known.count += 1;
-            return;
+            known.count += count as u64;
+        } else if count > 0 {
+            let (location, message) = describe();
+            let mut warning = Diagnostic::new(&self.file, code, message);
+            (warning.location, warning.count) = (location, count as u64);
+            self.list.push(warning);
         }
-        let (location, message) = describe();
-        let mut warning = Diagnostic::new(&self.file, code, message);
-        warning.location = location;
-        self.list.push(warning);
     }
 
     /// All warnings, in the order in which their codes first occurred.

@@ -196,6 +196,34 @@ fn raw_times_are_multiples_of_the_printed_frame_time() {
     assert_eq!(clip.set.track(0).times, [0.0, 0.008_333_3, 0.016_666_6]);
 }
 
+/// A rate of the options replaces a frame time that is that of no rate.
+#[test]
+fn a_frame_time_without_a_rate_is_replaced() {
+    let rate = FrameRate::new(30, 1).unwrap();
+    for raw_times in [false, true] {
+        let options = ReadOptions {
+            override_rate: Some(rate),
+            raw_times,
+            ..ReadOptions::default()
+        };
+        for written in ["0", "-0.1", "1e300", "nan"] {
+            let text = format!("{HEAD}Frame Time: {written}\n{}", "0 0 0 0\n".repeat(3));
+            let loaded = read_bvh("t", text.as_bytes(), &options).unwrap();
+            assert_eq!(loaded.clips[0].rate, Some(rate));
+            let [warning] = &*loaded.warnings else {
+                panic!("{:?}", loaded.warnings);
+            };
+            let message = format!(
+                "a frame time of {written} s; it is from 1e-9 to 1e9; because of --override-fps it is read at 30 \
+                 frames a second"
+            );
+            assert_eq!((warning.code, &warning.message), (Code::TwoRates, &message));
+        }
+        let text = format!("{HEAD}Frame Time: fast\n{}", "0 0 0 0\n".repeat(3));
+        assert_eq!(read(&text, &options).unwrap_err().code, Code::Number);
+    }
+}
+
 #[test]
 fn joints_without_a_word_for_a_name_get_one() {
     let text = "HIERARCHY\nROOT {\nOFFSET 0 0 0\nJOINT linke Größe{ OFFSET 0 0 0 CHANNELS 1 Xrotation \

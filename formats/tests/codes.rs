@@ -100,6 +100,7 @@ fn the_page_of_codes_is_up_to_date() {
          With a code that begins with `E`, the\ninput is refused. Codes with `W` are warnings, \
          reported once for each file. `tumble explain CODE` prints the same text.\n",
     );
+    assert!(Code::ALL.is_sorted_by_key(|code| code.name()));
     for &code in Code::ALL {
         let (title, text) = (code.title(), code.explanation());
         write!(page, "\n## {code}: {title}\n\n{text}\n").unwrap();

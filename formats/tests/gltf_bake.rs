@@ -372,6 +372,29 @@ fn nothing_to_bake_is_the_same_file() {
     assert!(bytes == fs::read(fixture("step_scale.gltf")).unwrap());
 }
 
+/// What is nested deeper than a thread's stack is copied.
+#[test]
+fn deeply_nested_extras_are_copied() {
+    let extras = format!("{}7{}", "[".repeat(100_000), "]".repeat(100_000));
+    for start in [r#""extras":"#, r#""extensions":{"VENDOR_x":"#] {
+        let end = if start.ends_with("extras\":") {
+            ""
+        } else {
+            "}"
+        };
+        let text = fs::read_to_string(fixture("names_twice_elsewhere.gltf")).unwrap();
+        let nested =
+            format!(r#"{{"extensionsRequired":[],{start}{extras}{end},"x":["extensions"],"#);
+        let text = text
+            .replacen('{', &nested, 1)
+            .replace("\"extras\": {", "\"extra\": {");
+        let options = ReadOptions::default();
+        let loaded = read_gltf("t.gltf", text.into_bytes(), None, &options).unwrap();
+        let (bytes, _) = baked(&loaded, 2, Path::new("/out.gltf")).unwrap();
+        assert!(String::from_utf8(bytes).unwrap().contains(&nested));
+    }
+}
+
 #[test]
 fn text_is_changed_where_it_has_to_be_and_nowhere_else() {
     let name = "names_twice_elsewhere.gltf";

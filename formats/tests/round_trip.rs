@@ -566,7 +566,7 @@ fn files_with_any_names_are_read_again() {
     }
 }
 
-/// Seconds that are as large as milliseconds since 1970 would be read as such (E029).
+/// Seconds that are as large as milliseconds since 1970 are not written where they would be read as such (E029).
 #[test]
 fn times_too_large_for_seconds_are_not_written_where_they_would_be_milliseconds() {
     let mut clip = Motion::default();
@@ -575,16 +575,33 @@ fn times_too_large_for_seconds_are_not_written_where_they_would_be_milliseconds(
     let keys = keyed(&clip).unwrap();
     for format in FORMATS.iter().filter(|format| format.writes_clips()) {
         let sampled = [keys.of(&clip, None, &[])];
-        let written = format.write_clips(&sampled, &MotionOptions::default(), &mut Vec::new());
-        let refused = match written {
-            Err(WriteError::Refused(error)) => error.code == Code::LargeSeconds,
-            _ => false,
-        };
-        assert_eq!(
-            refused,
-            format.takes(FormatOption::TimeUnit),
-            "{}",
-            format.name
-        );
+        for times_apart in [false, true] {
+            let options = MotionOptions {
+                times_apart,
+                ..MotionOptions::default()
+            };
+            let mut bytes = Vec::new();
+            let written = format.write_clips(&sampled, &options, &mut bytes);
+            let refused = match &written {
+                Err(WriteError::Refused(error)) => error.code == Code::LargeSeconds,
+                _ => false,
+            };
+            let expected = match format.name {
+                "csv" | "parquet" | "arrow" | "tum" => true,
+                "kitti" => times_apart,
+                _ => false,
+            };
+            assert_eq!(refused, expected, "{} {times_apart}", format.name);
+            // Whole nanoseconds, and arrays of seconds.
+            if ["euroc", "npz"].contains(&format.name) {
+                assert!(written.unwrap().is_empty());
+                let read = (format.read_bytes)("clip", bytes, &ReadOptions::default()).unwrap();
+                let again = &read.clips[0];
+                let seconds = again.set.track(0).times.iter();
+                let seconds = seconds.map(|time| time + again.time_offset as f64);
+                assert_eq!(seconds.collect::<Vec<_>>(), times, "{}", format.name);
+                assert_eq!(read.warnings, [], "{}", format.name);
+            }
+        }
     }
 }

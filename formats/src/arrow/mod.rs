@@ -34,6 +34,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: true,
+    guesses_time_unit: true,
     read: open_arrow,
     read_bytes: read_arrow,
     write: Some(WriteResults {

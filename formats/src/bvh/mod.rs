@@ -37,6 +37,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: true,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_bvh,
     read_bytes: |name, bytes, options| read_bvh(name, &bytes[..], options),
     write: None,

@@ -228,7 +228,7 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
 }
 
 /// Reads the rate of `Frame Time: 0.0083333`. With `raw_times` the frame time is the printed number, not that of a common
-/// rate.
+/// rate. A rate that replaces it does so whatever the number is.
 fn read_rate<R: BufRead>(
     lines: &mut Lines<R>,
     options: &ReadOptions,
@@ -239,23 +239,33 @@ fn read_rate<R: BufRead>(
         Code::BvhFrameTime,
         "Frame Time: 0.0083333",
     )?;
-    let period = number::parse(&text)
-        .map_err(|(code, message)| lines.refuse(column, code, message))?
-        .value;
+    let period = match number::parse(&text) {
+        Ok(number) => number.value,
+        Err((Code::NotFinite | Code::TooLarge, _)) if options.override_rate.is_some() => f64::NAN,
+        Err((code, message)) => return Err(lines.refuse(column, code, message)),
+    };
     let rate = match options.raw_times {
         true => itself(period),
         false => of(&RateSource::FrameTime(&text)).map(|found| found.grid),
     };
-    let rate = rate.ok_or_else(|| {
-        let message = format!("a frame time of {text} s; it is from 1e-9 to 1e9");
-        lines.refuse(column, Code::BvhFrameTime, message)
-    })?;
+    let out_of_range = || format!("a frame time of {text} s; it is from 1e-9 to 1e9");
     if let Some(other) = options.override_rate {
-        if other != rate {
-            lines.warn(column, Code::TwoRates, overridden(rate, other));
+        let message = match rate {
+            Some(rate) => overridden(rate, other),
+            None => format!(
+                "{}; because of --override-fps it is read at {other} frames a second",
+                out_of_range()
+            ),
+        };
+        if rate != Some(other) {
+            lines.warn(column, Code::TwoRates, message);
         }
         return Ok(other);
     }
+    let rate = rate.ok_or_else(|| {
+        let message = out_of_range() + "; --override-fps replaces it";
+        lines.refuse(column, Code::BvhFrameTime, message)
+    })?;
     if let Some(change) = noticed_change(period, rate) {
         let (longer, percent) = match change > 0.0 {
             true => ("longer", 100.0 * change),

@@ -157,7 +157,7 @@ impl PathDifference {
             let (name, clip, track) = clips[side];
             let there = [0.0, shift][side];
             let times = found.pairs.iter().map(|pair| pair[side] + there);
-            path_poses((name, clip), track, engine, times.collect())
+            path_poses(name, clip, track, engine, times.collect())
         };
         let (reference, estimate) = (poses(0)?, poses(1)?);
         let alignment = Alignment::of(&reference, &estimate, measure.align);
@@ -179,7 +179,12 @@ impl PathDifference {
                 let gap = longest_gap(&times[side], [at[0], at[at.len() - 1]])?;
                 let is_interpolated =
                     side != found.times_of && measure.associate == Associate::Interpolated;
-                Some(gap.warning(names[side], clock, is_interpolated, measure.max_gap))
+                let poses_in_it = match measure.max_gap {
+                    _ if !is_interpolated => PosesInGap::None,
+                    Some(limit) if limit < gap.seconds => PosesInGap::LeftOut,
+                    _ => PosesInGap::Interpolated,
+                };
+                Some(gap.warning(names[side], clock, poses_in_it))
             })
             .collect();
         warnings.extend(alignment.undetermined.map(|why| {
@@ -213,7 +218,8 @@ impl PathDifference {
 
 /// The poses of a track in the world, between its keys on lines and arcs.
 fn path_poses(
-    (input, clip): (&str, &Motion),
+    input: &str,
+    clip: &Motion,
     track: usize,
     engine: &Engine,
     times: Vec<f64>,
@@ -333,23 +339,29 @@ fn longest_gap(times: &[f64], [start, end]: [f64; 2]) -> Option<PathGap> {
     })
 }
 
+/// The poses of the other path at times in a gap.
+enum PosesInGap {
+    /// None is compared there.
+    None,
+    /// They are left out.
+    LeftOut,
+    /// They are compared with a straight line through the gap.
+    Interpolated,
+}
+
 impl PathGap {
-    fn warning(
-        &self,
-        name: &str,
-        clock: f64,
-        is_interpolated: bool,
-        max_gap: Option<f64>,
-    ) -> String {
+    fn warning(&self, name: &str, clock: f64, poses_in_it: PosesInGap) -> String {
         let Self {
             start,
             seconds,
             median,
         } = self;
-        let done = match max_gap {
-            _ if !is_interpolated => "no pose in it is compared",
-            Some(limit) if limit < *seconds => "poses in it are left out",
-            _ => "poses in it are compared with a straight line; --max-gap leaves them out",
+        let done = match poses_in_it {
+            PosesInGap::None => "no pose in it is compared",
+            PosesInGap::LeftOut => "poses in it are left out",
+            PosesInGap::Interpolated => {
+                "poses in it are compared with a straight line; --max-gap leaves them out"
+            }
         };
         format!(
             "{name}: has no pose for {seconds:.3} s from {:.3} s on, where its poses are mostly {median:.3} s apart; \

@@ -29,6 +29,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: true,
     numbers_repeated_names: true,
+    guesses_time_unit: true,
     read: read::open_csv,
     read_bytes: read::read_csv,
     write: Some(WriteResults {

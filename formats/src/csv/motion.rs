@@ -8,8 +8,9 @@ use crate::format::{MotionOptions, WriteError};
 use crate::motion::SampledClip;
 use crate::names::distinct_names;
 use crate::poses::{TRANSFORM, WORLD};
+use crate::printable::printable;
 use crate::quaternion::ComponentOrder;
-use crate::text::cell::text_cell;
+use crate::text::cell::{text_cell, without_nul};
 
 /// Writes one clip; its columns have the names that the reader knows.
 ///
@@ -79,5 +80,12 @@ pub(crate) fn write_motion(
         writer.write_record(&row).map_err(io_error)?;
     }
     writer.flush()?;
-    Ok(Vec::new())
+    let mut names = (0..tracks).map(|track| set.track_name(track));
+    let changed = names.find_map(|name| {
+        let written = without_nul(&name);
+        let message = format!("`{}` is written as `{written}`", printable(&name));
+        let warning = || Diagnostic::new(&options.name, Code::NameChanged, message);
+        (written != name).then(warning)
+    });
+    Ok(changed.into_iter().collect())
 }

@@ -35,7 +35,6 @@ pub fn open_csv(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
 pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut warnings = Warnings::new(name);
     let start = check_encoding(name, &bytes, &mut warnings)?;
-    let mut options = Cow::Borrowed(options);
     let mut sheet = Sheet {
         name,
         bytes: &bytes[start..],
@@ -52,7 +51,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         .iter()
         .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned());
     let names: Vec<String> = names.collect();
-    let plan = TablePlan::of(name, &names, &options)
+    let mut plan = TablePlan::of(name, &names, options)
         .map_err(|refusal| sheet.with_names_below(&mut reader, refusal))?;
     let mut columns = Vec::with_capacity(plan.columns.len());
     for requested in &plan.columns {
@@ -89,12 +88,16 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     while sheet.next(&mut reader, &mut record)? {
         sheet.check_width(&record, &names)?;
         if starts.is_empty()
-            && options.time_unit.is_none()
-            && let Some((unit, warning)) = sheet.large_unit(&record, &plan)
+            && let TimeSource::Times(time) = plan.time_source
+            && let index = plan.columns[time].index
+            && let text = as_text(record.get(index).unwrap_or_default().trim_ascii())
+            && let Ok(first) = text.parse::<f64>()
         {
-            sheet.time_power = unit.power();
-            options.to_mut().time_unit = Some(unit);
-            warnings.warn(Code::TimeUnit, || warning);
+            plan.time_unit = TimeUnit::or_of_first(plan.time_unit, first, |unit| {
+                let location = sheet.cell(&record, index);
+                warnings.warn(Code::TimeUnit, || (Some(location), unit.assumed(text)));
+            });
+            sheet.time_power = plan.time_unit.map_or(0, TimeUnit::power);
         }
         let outputs = columns.iter_mut().zip(&mut known).zip(&plan.columns);
         for ((column, known), requested) in outputs {
@@ -119,7 +122,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
             cell_location(&bytes[start..], starts[row], column)
         })),
     };
-    let mut loaded = clips(&table, &plan, &options)?;
+    let mut loaded = clips(&table, &plan, options)?;
     let mut all = warnings.into_list();
     all.append(&mut loaded.warnings);
     loaded.warnings = all;
@@ -204,22 +207,6 @@ impl<'a> Sheet<'a> {
             "{found} cells where the header has {width}; every row has as many as the header{hint}"
         );
         Err(self.refuse(location, Code::Columns, message))
-    }
-
-    /// The unit of times whose first one, in this record, is too large for seconds, with a warning that says it.
-    fn large_unit(
-        &self,
-        record: &ByteRecord,
-        plan: &TablePlan,
-    ) -> Option<(TimeUnit, (Option<Location>, String))> {
-        let column = plan.columns.get(plan.time)?;
-        if plan.time_source != TimeSource::Times {
-            return None;
-        }
-        let text = as_text(record.get(column.index)?.trim_ascii());
-        let unit = TimeUnit::of_large(text.parse().ok()?)?;
-        let location = self.cell(record, column.index);
-        Some((unit, (Some(location), unit.assumed(text))))
     }
 
     /// The refusal of a first row without the names of columns; if a later row has them, as in the tables of motion

@@ -5,7 +5,7 @@ use crate::diagnostic::{Code, Diagnostic, Location};
 
 /// A list whose length is written before it: `KeyValueFloat: *2 {`.
 struct List<'a> {
-    name: &'a str,
+    name: &'a [u8],
     length: usize,
     line: u64,
     found: usize,
@@ -14,31 +14,30 @@ struct List<'a> {
 
 /// Refuses a file of text in which a list has more numbers than it states, and none of them has a decimal point.
 pub(super) fn refuse(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
-    let is_text = !bytes[..bytes.len().min(1024)].contains(&0);
-    let Some(text) = is_text.then(|| String::from_utf8_lossy(bytes)) else {
+    if bytes[..bytes.len().min(1024)].contains(&0) {
         return Ok(());
-    };
+    }
     let mut open: Option<List<'_>> = None;
-    for (line, number) in text.lines().zip(1..) {
+    for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
         if let Some(list) = &mut open {
-            let (numbers, is_end) = match line.split_once('}') {
-                Some((numbers, _)) => (numbers, true),
-                None => (line, false),
-            };
-            let numbers = numbers.trim().trim_start_matches("a:");
+            let end = line.iter().position(|&byte| byte == b'}');
+            let numbers = line[..end.unwrap_or(line.len())].trim_ascii();
+            let numbers = numbers.strip_prefix(b"a:").unwrap_or(numbers);
             let numbers = numbers
-                .split(',')
-                .filter(|number| !number.trim().is_empty());
+                .split(|&byte| byte == b',')
+                .filter(|number| !number.trim_ascii().is_empty());
             list.found += numbers.count();
-            list.has_points |= line.contains('.');
-            if !is_end {
+            list.has_points |= line.contains(&b'.');
+            if end.is_none() {
                 continue;
             }
             if list.found > list.length && !list.has_points {
                 let message = format!(
                     "`{}` has {} numbers and states {}: these are decimal commas; set the system's number format to decimal \
                      points, and export the file again",
-                    list.name, list.found, list.length
+                    String::from_utf8_lossy(list.name),
+                    list.found,
+                    list.length
                 );
                 let location = Location::Text {
                     line: list.line,
@@ -52,11 +51,7 @@ pub(super) fn refuse(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
             open = None;
             continue;
         }
-        let begun = line.split_once(": *").and_then(|(name, rest)| {
-            let length = rest.trim_end().strip_suffix('{')?.trim_end();
-            Some((name.trim(), length.parse().ok()?))
-        });
-        open = begun.map(|(name, length)| List {
+        open = begun(line).map(|(name, length)| List {
             name,
             length,
             line: number,
@@ -65,4 +60,15 @@ pub(super) fn refuse(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
         });
     }
     Ok(())
+}
+
+/// The name and the length of a list that begins on this line.
+fn begun(line: &[u8]) -> Option<(&[u8], usize)> {
+    const MARK: &[u8] = b": *";
+    let at = line.windows(MARK.len()).position(|part| part == MARK)?;
+    let length = line[at + MARK.len()..]
+        .trim_ascii_end()
+        .strip_suffix(b"{")?;
+    let length = std::str::from_utf8(length.trim_ascii_end()).ok()?;
+    Some((line[..at].trim_ascii(), length.parse().ok()?))
 }

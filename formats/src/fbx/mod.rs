@@ -29,7 +29,7 @@ use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::fbx::direct::DirectEvaluator;
 use crate::fbx::follow::{ChannelFollower, ChannelKind, ChannelValue, FollowedKeys, KeyStop};
 use crate::fbx::layers::{StackLayers, is_solo, is_spheric, without_spheric_orders};
-use crate::fbx::times::{ChannelTimes, NodeTimes, Takes, was_rounded};
+use crate::fbx::times::{ChannelTimes, NodeTimes, Takes, TimeDisorder, was_rounded};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
 use crate::motion::{self, ChannelInterpolation, Channels, Joint, Motion};
@@ -49,6 +49,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_fbx,
     read_bytes: |name, bytes, options| read_fbx(name, &bytes, options),
     write: None,
@@ -202,7 +203,6 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
     };
     ufbx::load_memory(bytes, options).map_err(|error| {
         let (code, message) = match error.type_ {
-            ErrorType::EmptyFile => (Code::Empty, "the file is empty".to_owned()),
             ErrorType::OutOfMemory | ErrorType::MemoryLimit | ErrorType::AllocationLimit => (
                 Code::Memory,
                 format!(
@@ -417,7 +417,12 @@ impl FbxReader<'_> {
         let layers = layers.map_err(|error| no_anim(self.name, &error))?;
         let anim_stack = &scene.anim_stacks[stack];
         let takes = Takes::of(scene, anim_stack, &layers.audible, self.budget).map_err(over)?;
-        if let Some((property, node, [time, next])) = &takes.disorder {
+        if let Some(TimeDisorder {
+            property,
+            node,
+            times: [time, next],
+        }) = &takes.disorder
+        {
             let message = format!(
                 "the key times of `{property}` of `{node}` do not increase: {time} s is followed by {next} s; export \
                  the file again"

@@ -4,7 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use tumble::FrameRate;
 use ufbx::{
-    AnimCurve, AnimLayer, AnimStack, ElementType, ExtrapolationMode, Interpolation, Node, Scene,
+    AnimCurve, AnimLayer, AnimProp, AnimStack, ElementType, ExtrapolationMode, Interpolation, Node,
+    Scene,
 };
 
 use crate::budget::{Budget, OverBudget};
@@ -78,8 +79,18 @@ pub(super) struct Takes {
     pub(super) rate: Option<FrameRate>,
     /// The frames to which key times belong: those of the file's rate if all keys lie on them.
     pub(super) grid: Option<FrameRate>,
-    /// A curve whose key times do not increase: the name of its property and of its node, and the two times.
-    pub(super) disorder: Option<(String, String, [f64; 2])>,
+    pub(super) disorder: Option<TimeDisorder>,
+}
+
+/// A curve whose key times do not increase.
+#[derive(Debug)]
+pub(super) struct TimeDisorder {
+    /// The name of its property.
+    pub(super) property: String,
+    /// The name of its node.
+    pub(super) node: String,
+    /// The time of a key, and that of the next.
+    pub(super) times: [f64; 2],
 }
 
 /// The part of a node's transform that a property determines.
@@ -134,8 +145,7 @@ impl Takes {
                 };
                 let mut times = ChannelTimes::default();
                 for curve in curves() {
-                    let names = (&*property.prop_name, &*property.element.name);
-                    takes.note_keys(curve, names, budget)?;
+                    takes.note_keys(property, curve, budget)?;
                     takes.has_curves = true;
                     takes.outside +=
                         times.add(curve, takes.span, part == TransformPart::Rotation, budget)?;
@@ -170,19 +180,22 @@ impl Takes {
         Ok(takes)
     }
 
-    /// Keeps the key times of a curve, and notes whether they decrease.
+    /// Keeps the key times of a property's curve, and notes whether they decrease.
     fn note_keys(
         &mut self,
+        property: &AnimProp,
         curve: &AnimCurve,
-        (property, node): (&str, &str),
         budget: &Budget,
     ) -> Result<(), OverBudget> {
         let keys = curve.keyframes.as_ref();
         let mut pairs = keys.windows(2);
         if let Some(pair) = pairs.find(|pair| pair[1].time < pair[0].time) {
             let times = [pair[0].time, pair[1].time];
-            let found = || (property.to_owned(), node.to_owned(), times);
-            self.disorder.get_or_insert_with(found);
+            self.disorder.get_or_insert_with(|| TimeDisorder {
+                property: property.prop_name.to_string(),
+                node: property.element.name.to_string(),
+                times,
+            });
         }
         let times = || keys.iter().map(|key| key.time);
         let is_known = |last: &Vec<f64>| times().eq(last.iter().copied());

@@ -12,7 +12,6 @@ use crate::motion::{ChannelInterpolation, Motion, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::printable::printable;
 use crate::signs::{continue_signs, signs_jump};
-use crate::text::cell::without_nul;
 
 /// Scales this close to 1 count as 1, because of rounding.
 const UNSCALED: f32 = 1e-5;
@@ -45,7 +44,8 @@ impl Format {
                 .iter()
                 .try_for_each(|clip| check_times(clip, &options.name))?;
         }
-        if self.takes(FormatOption::TimeUnit) {
+        let has_times = !self.takes(FormatOption::TimesApart) || options.times_apart;
+        if self.guesses_time_unit && has_times {
             clips
                 .iter()
                 .try_for_each(|clip| check_seconds(clip, &options.name))?;
@@ -108,6 +108,7 @@ pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), D
 fn check_seconds(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
     let clip = sampled.clip;
     let keys = (0..clip.set.track_count()).filter_map(|track| clip.set.track(track).times.first());
+    let keys = keys.filter(|_| sampled.is_at_keys);
     let times = sampled.times.first().into_iter().chain(keys);
     let seconds = times.map(|time| time + clip.time_offset as f64);
     let Some(time) = seconds
@@ -154,24 +155,7 @@ fn warnings(
         );
         Some(Diagnostic::new(&options.name, Code::NameChanged, message))
     });
-    let has_nul = |clip: &SampledClip<'_>| {
-        let set = &clip.clip.set;
-        let mut names = (0..set.track_count()).map(|track| set.track_name(track));
-        names.find(|name| name.contains('\0'))
-    };
-    // Other formats replace it themselves, or store it.
-    let is_table = format.is_text && format.numbers_repeated_names;
-    let nul = clips.iter().filter(|_| is_table).find_map(has_nul);
-    let replaced = nul.map(|name| {
-        let written = without_nul(&name);
-        let message = format!("`{}` is written as `{written}`", printable(&name));
-        Diagnostic::new(&options.name, Code::NameChanged, message)
-    });
-    left_out
-        .into_iter()
-        .chain(changed)
-        .chain(replaced)
-        .collect()
+    left_out.into_iter().chain(changed).collect()
 }
 
 fn no_room(

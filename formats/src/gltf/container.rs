@@ -137,7 +137,8 @@ impl Container {
     }
 }
 
-/// The JSON of a file, read without the other chunks of a GLB; `None` if the file is invalid or longer than `limit`.
+/// The JSON of a file, read without the other chunks of a GLB; `None` if the file is invalid, or if the JSON is longer
+/// than `limit`.
 pub(super) fn json_alone(mut file: impl Read, limit: u64) -> Option<String> {
     let mut bytes = Vec::new();
     file.by_ref().take(20).read_to_end(&mut bytes).ok()?;
@@ -146,7 +147,7 @@ pub(super) fn json_alone(mut file: impl Read, limit: u64) -> Option<String> {
         true => {
             let length = u32::from_le_bytes(*bytes.get(12..)?.first_chunk()?);
             bytes.clear();
-            u64::from(length)
+            Some(u64::from(length)).filter(|&length| length <= limit)?
         }
         false => limit.saturating_add(1),
     };

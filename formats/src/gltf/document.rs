@@ -203,22 +203,20 @@ impl Document for GltfDocument {
                 is_baked = true;
             }
         }
-        let bin = data.finish(&json, &mut edits);
-        let bin = bin.map(|parts| parts.concat());
+        let mut bin = data.finish(&json, &mut edits);
         let mut text = edits.finish();
-        drop(data);
-        let mut bin = bin.filter(|_| !is_text);
         if is_baked {
-            (text, bin) = prune(&json, (text, bin));
+            let length = |parts: &Vec<&[u8]>| parts.iter().map(|part| part.len()).sum();
+            let cut;
+            (text, cut) = prune(&json, text, bin.as_ref().map_or(0, length));
+            bin = bin.map(|parts| cut.kept(&parts));
         }
         if is_text {
             out.write_all(text.as_bytes())?;
         } else {
-            let bytes = text.len() + bin.as_ref().map_or(0, Vec::len);
+            let bytes = bin.iter().flatten().map(|part| part.len()).sum::<usize>() + text.len();
             check_length(&json, bytes as u64)?;
-            let parts = bin.as_deref().map(|bin| [bin]);
-            self.container
-                .write_glb(&text, parts.as_ref().map(<[_; 1]>::as_slice), out)?;
+            self.container.write_glb(&text, bin.as_deref(), out)?;
         }
         // Whatever else is remarkable was said when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();

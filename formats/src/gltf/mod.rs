@@ -64,6 +64,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: true,
+    guesses_time_unit: false,
     read: open_gltf,
     read_bytes: |name, bytes, options| read_gltf(name, bytes, None, options),
     write: None,

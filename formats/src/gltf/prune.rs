@@ -53,23 +53,23 @@ struct References<'a> {
     pinned: Option<usize>,
 }
 
-/// A text and the BIN chunk that belongs to it.
-pub(super) type WrittenText = (String, Option<Vec<u8>>);
+/// A text, and what is left out of the BIN chunk that belongs to it.
+type PrunedText = (String, Cut);
 
-/// The text and the BIN chunk of a file with other keys, without what `before`, the file as it was, used for its
-/// animations and the new text does not use. A file with parts that are not as in glTF, so that it is not known what
-/// they refer to, stays as it is.
-pub(super) fn prune(before: &Json<'_>, written: WrittenText) -> WrittenText {
-    let pruned = without_unused(before, &written.0, written.1.as_deref());
-    pruned.ok().flatten().unwrap_or(written)
+/// The text of a file with other keys, without what `before`, the file as it was, used for its animations and the new
+/// text does not use, and what to leave out of its BIN chunk of `length` bytes. A file with parts that are not as in
+/// glTF, so that it is not known what they refer to, stays as it is.
+pub(super) fn prune(before: &Json<'_>, text: String, length: usize) -> PrunedText {
+    let pruned = without_unused(before, &text, length).ok().flatten();
+    pruned.unwrap_or((text, Cut::default()))
 }
 
 /// See [`prune`]; `None` if everything is used.
 fn without_unused(
     before: &Json<'_>,
     text: &str,
-    bin: Option<&[u8]>,
-) -> Result<Option<WrittenText>, Diagnostic> {
+    length: usize,
+) -> Result<Option<PrunedText>, Diagnostic> {
     let mut json = Json::parse(before.name, text)?;
     for list in ["meshes", "skins"] {
         json.take_apart(list)?;
@@ -100,7 +100,7 @@ fn without_unused(
     let unused = left_views.difference(&kept_views).copied();
     let views: LeftOut = unused.filter(is_free).collect();
     let layout = Layout::of(json, &references, &accessors, &views)?;
-    let cut = bin.map_or(Cut::default(), |bin| layout.cut(bin.len()));
+    let cut = layout.cut(length);
     layout.move_bytes(json, &cut, &mut edits)?;
     let buffers = unused_buffers(json, &references, &views, &is_free)?;
     let all = |list: &[Reference<'_>], left: &LeftOut, edits: &mut Edits<'_>| {
@@ -122,8 +122,7 @@ fn without_unused(
     edits.remove_entries(json.entries("accessors"), &accessors);
     edits.remove_entries(json.entries("bufferViews"), &views);
     edits.remove_entries(json.entries("buffers"), &buffers);
-    let edited = edits.finish();
-    Ok(Some((edited, bin.map(|bin| cut.bytes(bin)))))
+    Ok(Some((edits.finish(), cut)))
 }
 
 /// The accessors of the keys of all animations.
@@ -309,7 +308,7 @@ impl<'a> References<'a> {
             }
         }
         if json.text.contains("\"extensions\"") {
-            found.pinned = largest_in_unknown(json.text, false);
+            found.pinned = largest_in_unknown(json.text);
         }
         Ok(found)
     }
@@ -374,31 +373,81 @@ fn extension<'a>(
         .transpose()
 }
 
-/// The largest whole number in extensions that are not known, which may be the index of an accessor, a view or a buffer.
-fn largest_in_unknown(text: &str, is_unknown: bool) -> Option<usize> {
-    if let Ok(object) = serde_json::from_str::<JsonMembers<'_>>(text) {
-        let each = object.0.iter().map(|(name, value)| {
-            if name != "extensions" || is_unknown {
-                return largest_in_unknown(value.get(), is_unknown);
-            }
-            let extensions: JsonMembers<'_> = serde_json::from_str(value.get()).unwrap_or_default();
-            let each = extensions.0.iter().map(|(name, value)| {
-                let is_known = MESHOPT.contains(&name.as_str())
-                    || [DRACO, INSTANCING].contains(&name.as_str())
+/// What a value of a file is part of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Surroundings {
+    /// glTF itself, or an extension that is known.
+    Known,
+    /// An object whose members are extensions.
+    Extensions,
+    /// An extension that is not known.
+    Unknown,
+}
+
+impl Surroundings {
+    /// What the member `name` of an object in these surroundings is part of.
+    fn of_member(self, name: &str) -> Self {
+        match self {
+            Self::Known if name == "extensions" => Self::Extensions,
+            Self::Known => Self::Known,
+            Self::Extensions => {
+                let is_known = MESHOPT.contains(&name)
+                    || [DRACO, INSTANCING].contains(&name)
                     || WITHOUT_DATA.iter().any(|start| name.starts_with(start));
-                largest_in_unknown(value.get(), !is_known)
-            });
-            each.max().flatten()
-        });
-        return each.max().flatten();
+                if is_known { Self::Known } else { Self::Unknown }
+            }
+            Self::Unknown => Self::Unknown,
+        }
     }
-    if let Ok(list) = serde_json::from_str::<Vec<&RawValue>>(text) {
-        let each = list
-            .iter()
-            .map(|value| largest_in_unknown(value.get(), is_unknown));
-        return each.max().flatten();
+}
+
+/// The largest whole number in extensions that are not known, which may be the index of an accessor, a view or a buffer.
+///
+/// The text is valid JSON. It is read once, token by token: a file may be nested deeper than a thread's stack.
+fn largest_in_unknown(text: &str) -> Option<usize> {
+    let mut open = Vec::new();
+    let mut here = Surroundings::Known;
+    let mut largest = None;
+    let mut rest = text.trim_ascii_start();
+    while let Some(first) = rest.bytes().next() {
+        let length = match first {
+            b'"' => string_length(rest),
+            b'{' | b'[' | b'}' | b']' | b',' | b':' => 1,
+            _ => {
+                let end = |byte: u8| b"{[}],:\"".contains(&byte) || byte.is_ascii_whitespace();
+                rest.bytes().position(end).unwrap_or(rest.len())
+            }
+        };
+        let (token, after) = rest.split_at(length);
+        rest = after.trim_ascii_start();
+        match first {
+            b'{' | b'[' => open.push(here),
+            b'}' | b']' => drop(open.pop()),
+            b',' => here = open.last().copied().unwrap_or(Surroundings::Known),
+            b'"' if rest.starts_with(':') => {
+                let name: String = serde_json::from_str(token).unwrap_or_default();
+                here = here.of_member(&name);
+            }
+            _ if here == Surroundings::Unknown => {
+                let number = serde_json::from_str(token).ok();
+                largest = largest.max(number.map(|Whole(number)| number));
+            }
+            _ => {}
+        }
     }
-    text.parse().ok().filter(|_| is_unknown)
+    largest
+}
+
+/// The length of the string at the start of a JSON text, with its quotation marks.
+fn string_length(text: &str) -> usize {
+    let mut is_escaped = false;
+    let mut bytes = text.bytes().skip(1);
+    let end = bytes.position(|byte| {
+        let ends = byte == b'"' && !is_escaped;
+        is_escaped = byte == b'\\' && !is_escaped;
+        ends
+    });
+    end.map_or(text.len(), |end| end + 2)
 }
 
 /// Where accessors and views lie in the BIN chunk.
@@ -464,15 +513,16 @@ impl<'a> Layout<'a> {
             let mut ranges: Vec<Range<u64>> = Vec::new();
             ranges.extend(is_in_bin.then(|| range.clone()));
             for name in MESHOPT {
-                let Some(found) = extension(json, &members, name)? else {
+                let Some(raw) = view.extensions.get(name) else {
                     continue;
                 };
-                let raw = view.extensions.get(name).unwrap_or(raw);
                 let data: MeshoptView = json.typed(raw, &pointer)?;
                 if has_bin && data.buffer == 0 {
                     ranges
                         .push(data.byte_offset..data.byte_offset.saturating_add(data.byte_length));
-                    compressed = found.get("byteOffset").map(|raw| (raw, data.byte_offset));
+                    let members: JsonMembers<'a> = json.typed(raw, &pointer)?;
+                    let offset = members.get("byteOffset");
+                    compressed = offset.map(|raw| (raw, data.byte_offset));
                 }
             }
             if left_views.has(index) {
@@ -650,7 +700,7 @@ fn joined(ranges: &[Range<u64>]) -> Vec<Range<u64>> {
 
 /// Ranges of bytes that are left out, in order, each with the number of bytes that are left out before it.
 #[derive(Default)]
-struct Cut {
+pub(super) struct Cut {
     ranges: Vec<(Range<u64>, u64)>,
 }
 
@@ -676,15 +726,29 @@ impl Cut {
         }
     }
 
-    fn bytes(&self, bin: &[u8]) -> Vec<u8> {
-        let mut left = Vec::with_capacity(bin.len());
-        let mut done = 0;
-        for (range, _) in &self.ranges {
-            left.extend_from_slice(&bin[done..range.start as usize]);
-            done = range.end as usize;
+    /// The parts of some bytes that stay.
+    pub(super) fn kept<'a>(&self, parts: &[&'a [u8]]) -> Vec<&'a [u8]> {
+        let mut kept = Vec::with_capacity(parts.len() + self.ranges.len());
+        let (mut start, mut next) = (0, 0);
+        for part in parts {
+            let end = start + part.len() as u64;
+            let mut from = start;
+            while let Some((range, _)) = self.ranges.get(next).filter(|it| it.0.start < end) {
+                if range.start > from {
+                    kept.push(&part[(from - start) as usize..(range.start - start) as usize]);
+                }
+                from = range.end.min(end);
+                if range.end > end {
+                    break;
+                }
+                next += 1;
+            }
+            if from < end {
+                kept.push(&part[(from - start) as usize..]);
+            }
+            start = end;
         }
-        left.extend_from_slice(&bin[done..]);
-        left
+        kept
     }
 }
 
@@ -729,8 +793,36 @@ mod tests {
         let both = layout(&[8..16, 40..48], &[]).cut(60);
         let moved = [0, 8, 12, 16, 20, 48, 60].map(|offset| both.moved(offset));
         assert_eq!(moved, [0, 8, 8, 8, 12, 32, 44]);
+        // The chunk is written in parts, wherever they end.
         let bytes: Vec<u8> = (0..60).collect();
-        let left = both.bytes(&bytes);
-        assert_eq!((left.len(), left[8], left[31], left[32]), (44, 16, 39, 48));
+        let left: Vec<u8> = [0..8, 16..40, 48..60].into_iter().flatten().collect();
+        for end in 0..=60 {
+            let (one, other) = bytes.split_at(end);
+            assert_eq!(both.kept(&[one, &[], other]).concat(), left, "{end}");
+        }
+        let many: Vec<&[u8]> = bytes.chunks(3).collect();
+        assert_eq!(both.kept(&many).concat(), left);
+    }
+
+    #[test]
+    fn numbers_in_unknown_extensions_may_be_indices() {
+        for (text, largest) in [
+            (r#"{"a":7,"extras":{"X":{"a":8}}}"#, None),
+            (r#"{"extensions":{"KHR_lights_punctual":{"a":7}}}"#, None),
+            (
+                r#"{"extensions":{"X":{"a":7,"b":[1,9,"12"]},"VRM":{"a":20}},"c":30}"#,
+                Some(9),
+            ),
+            (r#"[{"a":[]},{"ext\u0065nsions" : {"X":3}},4]"#, Some(3)),
+            (
+                r#"{"extensions":{"VRM":{"extensions":{"\"{\\":[{"extensions":{"VRM":5}},-6,1.5]}}}}"#,
+                Some(5),
+            ),
+            // Whole numbers may have a point and an exponent.
+            (r#"{"extensions":{"X":[1,2.0e1]}}"#, Some(20)),
+        ] {
+            assert!(serde_json::from_str::<serde_json::Value>(text).is_ok());
+            assert_eq!(largest_in_unknown(text), largest, "{text}");
+        }
     }
 }

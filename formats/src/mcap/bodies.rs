@@ -254,11 +254,13 @@ pub(super) fn into_loaded(
     let of_time = |body: &&Body<'_>| body.kind != BodyKind::Static;
     let timed = bodies.iter().filter(of_time).flat_map(|body| &body.poses);
     let start = timed.map(|pose| pose.time).min();
-    let clock = StampClock::of(&bodies);
-    let statics = bodies
-        .iter_mut()
-        .filter(|body| body.kind == BodyKind::Static);
-    statics.for_each(|body| resolve_static(body, start, &clock));
+    // Its times are sorted: a log without static transforms needs none.
+    if bodies.iter().any(|body| body.kind == BodyKind::Static) {
+        let clock = StampClock::of(&bodies);
+        let statics = bodies.iter_mut();
+        let statics = statics.filter(|body| body.kind == BodyKind::Static);
+        statics.for_each(|body| resolve_static(body, start, &clock));
+    }
     warn_of_clocks(&bodies, &mut warnings);
     let first = bodies.iter().flat_map(|body| &body.poses);
     let first = first.map(|pose| pose.time).min().unwrap_or_default();
@@ -339,14 +341,12 @@ fn leave_out_gaps(
         let message = format!("no pose of `{name}` is without a gap");
         return Err(body.refuse(file, first, Code::NotFinite, message));
     }
-    for _ in 0..gaps {
-        warnings.warn(Code::Bridged, || {
-            let message = format!(
-                "the track `{name}` lacks {gaps} of its poses; it is interpolated from the others"
-            );
-            (Some(body.location(first)), message)
-        });
-    }
+    warnings.warn_of(gaps, Code::Bridged, || {
+        let message = format!(
+            "the track `{name}` lacks {gaps} of its poses; it is interpolated from the others"
+        );
+        (Some(body.location(first)), message)
+    });
     body.poses.retain(|pose| !pose.has_gap());
     Ok(())
 }

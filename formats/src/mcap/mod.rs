@@ -9,6 +9,7 @@ mod cdr;
 mod records;
 
 use std::collections::HashMap;
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::mcap::bodies::{Body, BodyKind, TimedPose, into_loaded};
 use crate::mcap::cdr::Cdr;
-use crate::mcap::records::{MAGIC, McapChannel, Record, Records};
+use crate::mcap::records::{MAGIC, Record, Records};
 use crate::path::{PathFormat, PathPoints};
 use crate::source::Source;
 use crate::text::lines::Limits;
@@ -35,6 +36,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: false,
+    guesses_time_unit: false,
     read: open_mcap,
     read_bytes: |name, bytes, options| read_mcap(name, &bytes, options),
     write: None,
@@ -164,14 +166,51 @@ impl MessageKind {
 #[derive(Default)]
 struct Topic {
     name: Arc<str>,
-    /// Its type, why it is left out, if it is.
-    left_out: Option<String>,
+    left_out: Option<LeftOut>,
     is_refused: bool,
     /// The index of its body, if its messages are of one.
     body: Option<usize>,
     /// The indices of the bodies of transforms, by parent and child.
     transforms: HashMap<String, HashMap<String, usize>>,
 }
+
+/// Why a topic is left out.
+enum LeftOut {
+    /// Its messages are of another type or in another encoding than those that are read.
+    OtherType { schema: Arc<str>, encoding: String },
+    /// The covariance of a message says that it has no orientation.
+    NoOrientation { schema: Arc<str> },
+}
+
+impl LeftOut {
+    fn is_ros1(&self) -> bool {
+        matches!(self, Self::OtherType { encoding, .. } if encoding == "ros1")
+    }
+}
+
+/// The type of the topic, and why it is left out.
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OtherType { schema, encoding } => {
+                f.write_str(match &**schema {
+                    "" => "no type",
+                    schema => schema,
+                })?;
+                match &**encoding {
+                    CDR => Ok(()),
+                    encoding => write!(f, ", encoded as `{encoding}`"),
+                }
+            }
+            Self::NoOrientation { schema } => {
+                write!(f, "{schema}, whose covariance says: no orientation")
+            }
+        }
+    }
+}
+
+/// The encoding of messages of ROS 2.
+const CDR: &str = "cdr";
 
 /// A log that is being read.
 struct Log<'a> {
@@ -215,19 +254,20 @@ impl<'a> Log<'a> {
         if self.topics[topic].is_refused {
             return Ok(());
         }
-        let kind = MessageKind::of(&channel.schema).filter(|_| channel.encoding == "cdr");
+        let kind = MessageKind::of(&channel.schema).filter(|_| channel.encoding == CDR);
+        let schema = || Arc::clone(&channel.schema);
         let Some(kind) = kind else {
-            return self.leave_out(topic, || type_of(channel));
+            return self.leave_out(topic, channel.encoding.len(), || LeftOut::OtherType {
+                schema: schema(),
+                encoding: channel.encoding.clone(),
+            });
         };
         match self.poses(kind, topic, record) {
             Ok(()) => Ok(()),
             Err(MessageFault::Memory(error)) => Err(self.over(&error)),
-            Err(MessageFault::NoOrientation) => self.leave_out(topic, || {
-                format!(
-                    "{}, whose covariance says: no orientation",
-                    type_of(channel)
-                )
-            }),
+            Err(MessageFault::NoOrientation) => {
+                self.leave_out(topic, 0, || LeftOut::NoOrientation { schema: schema() })
+            }
             Err(MessageFault::Message(reason)) => {
                 let (name, schema) = (&channel.topic, &channel.schema);
                 let message = format!("a message of `{name}` ({schema}) {reason}");
@@ -257,16 +297,17 @@ impl<'a> Log<'a> {
         Ok(self.topics.len() - 1)
     }
 
+    /// Notes why a topic is left out, which takes `bytes` of memory.
     fn leave_out(
         &mut self,
         topic: usize,
-        describe: impl FnOnce() -> String,
+        bytes: usize,
+        reason: impl FnOnce() -> LeftOut,
     ) -> Result<(), Diagnostic> {
         if self.topics[topic].left_out.is_none() {
-            let description = describe();
-            let charged = self.budget.take(description.len(), 1);
+            let charged = self.budget.take(bytes, 1);
             charged.map_err(|error| self.over(&error))?;
-            self.topics[topic].left_out = Some(description);
+            self.topics[topic].left_out = Some(reason());
         }
         Ok(())
     }
@@ -409,19 +450,19 @@ impl<'a> Log<'a> {
     fn into_loaded(mut self, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
         self.bodies.retain(|body| !body.poses.is_empty());
         let left_out = self.topics.iter().filter_map(|topic| {
-            let description = topic.left_out.as_ref()?;
-            Some(format!("`{}` ({description})", topic.name))
+            let reason = topic.left_out.as_ref()?;
+            Some(format!("`{}` ({reason})", topic.name))
         });
         let left_out = listed(left_out.collect());
         if self.bodies.is_empty() {
             if !self.refused.is_empty() {
                 return Err(self.refused.remove(0));
             }
-            let is_ros1 = |topic: &Topic| {
-                let description = topic.left_out.as_ref();
-                description.is_some_and(|text| text.ends_with(&encoded_as("ros1")))
-            };
-            let remedy = match self.topics.iter().any(is_ros1) {
+            let mut reasons = self
+                .topics
+                .iter()
+                .filter_map(|topic| topic.left_out.as_ref());
+            let remedy = match reasons.any(LeftOut::is_ros1) {
                 true => "; convert messages of ROS 1 to ROS 2, for example by rosbags-convert",
                 false => "",
             };
@@ -441,22 +482,6 @@ impl<'a> Log<'a> {
         }
         into_loaded(self.name, self.bodies, self.refused, self.warnings, options)
     }
-}
-
-/// The type of a channel's messages, for messages.
-fn type_of(channel: &McapChannel) -> String {
-    let schema = match &*channel.schema {
-        "" => "no type",
-        schema => schema,
-    };
-    match &*channel.encoding {
-        "cdr" => schema.to_owned(),
-        encoding => format!("{schema}{}", encoded_as(encoding)),
-    }
-}
-
-fn encoded_as(encoding: &str) -> String {
-    format!(", encoded as `{encoding}`")
 }
 
 /// Why a message cannot be read.

@@ -109,9 +109,6 @@ impl<'a> Records<'a> {
         bytes: &'a [u8],
         budget: &'a Budget,
     ) -> Result<Self, Diagnostic> {
-        if bytes.is_empty() {
-            return Err(Diagnostic::new(name, Code::Empty, "the file is empty"));
-        }
         if !bytes.starts_with(MAGIC) {
             let message = "the file does not begin like an MCAP file; is it a bag of ROS 1, or SQLite? convert it first";
             return Err(Diagnostic::new(name, Code::McapDamaged, message));

@@ -38,6 +38,8 @@ pub(crate) struct ArchivePlan {
     /// The member with the rate.
     pub(crate) rate_member: Option<usize>,
     pub(crate) rate: Option<FrameRate>,
+    /// The error of a rate that is none, unless another replaces it.
+    pub(crate) bad_rate: Option<Diagnostic>,
     /// The message if the file contains two different rates.
     pub(crate) two_rates: Option<String>,
     /// The times of all frames, including those that are left out of the clip.

@@ -3,6 +3,8 @@
 mod columns;
 mod pages;
 mod plain;
+mod schema;
+mod thrift;
 mod write;
 
 use std::fmt::Display;
@@ -18,6 +20,7 @@ use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
 use crate::parquet::columns::ParquetFile;
 use crate::parquet::pages::check_pages;
+use crate::parquet::schema::check_schema;
 use crate::parquet::write::ParquetSink;
 use crate::quaternion::ComponentOrder;
 use crate::source::Source;
@@ -37,6 +40,7 @@ pub static FORMAT: Format = Format {
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: true,
+    guesses_time_unit: true,
     read: open_parquet,
     read_bytes: read_parquet,
     write: Some(WriteResults {
@@ -85,7 +89,7 @@ pub fn read_parquet(
     clips(&table, &plan, options)
 }
 
-/// Refuses bytes that do not end as Parquet files do.
+/// Refuses bytes that do not end as Parquet files do, and schemas that cannot be decoded safely.
 fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     let refuse = |message: String| Err(Diagnostic::new(name, Code::TableDamaged, message));
     if !bytes.starts_with(MAGIC) {
@@ -109,7 +113,9 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
             "its metadata is said to have {length} bytes of {limit}; the file is damaged"
         ));
     }
-    Ok(())
+    let end = bytes.len() - TAIL;
+    check_schema(&bytes[end - length as usize..end])
+        .or_else(|reason| refuse(format!("{reason}; the file is damaged, write it again")))
 }
 
 /// The error of a file that cannot be decoded.

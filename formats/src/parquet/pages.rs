@@ -8,6 +8,7 @@ use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
 use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::parquet::thrift::{Compact, INTEGER, STRUCT};
 use crate::text::lines::Limits;
 
 /// The largest number of numbers for each byte of a file. Equal numbers compress best: a page of 2^20 of them may
@@ -170,105 +171,6 @@ pub(super) fn page(bytes: &[u8]) -> Option<PageSizes> {
         values: u64::try_from(values).ok()?,
         is_plain: page_type == Some(0) && encodings == [Some(0), Some(3)],
     })
-}
-
-/// Thrift's compact protocol, as far as page headers use it.
-struct Compact<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-const TRUE: u8 = 1;
-const FALSE: u8 = 2;
-const BYTE: u8 = 3;
-const SHORT: u8 = 4;
-const INTEGER: u8 = 5;
-const LONG: u8 = 6;
-const DOUBLE: u8 = 7;
-const BINARY: u8 = 8;
-const LIST: u8 = 9;
-const SET: u8 = 10;
-const STRUCT: u8 = 12;
-
-impl Compact<'_> {
-    fn byte(&mut self) -> Option<u8> {
-        let byte = *self.bytes.get(self.at)?;
-        self.at += 1;
-        Some(byte)
-    }
-
-    fn varint(&mut self) -> Option<u64> {
-        let mut number = 0;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
-            number |= u64::from(byte & 0x7f) << shift;
-            if byte < 0x80 {
-                return Some(number);
-            }
-        }
-        None
-    }
-
-    /// A signed number, zigzag.
-    fn integer(&mut self) -> Option<i64> {
-        let number = self.varint()?;
-        Some((number >> 1) as i64 ^ -((number & 1) as i64))
-    }
-
-    /// The type of the next field, whose id goes to `id`; `Some(None)` at the end of the struct.
-    fn field(&mut self, id: &mut i64) -> Option<Option<u8>> {
-        let byte = self.byte()?;
-        if byte == 0 {
-            return Some(None);
-        }
-        *id = match byte >> 4 {
-            0 => self.integer()?,
-            step => id.checked_add(i64::from(step))?,
-        };
-        Some(Some(byte & 0x0f))
-    }
-
-    fn skip(&mut self, kind: u8, depth: u32) -> Option<()> {
-        /// The deepest nesting that is read; page headers nest two deep.
-        const DEEPEST: u32 = 8;
-        if depth > DEEPEST {
-            return None;
-        }
-        match kind {
-            TRUE | FALSE => {}
-            BYTE => self.at += 1,
-            SHORT | INTEGER | LONG => drop(self.varint()?),
-            DOUBLE => self.at += 8,
-            BINARY => {
-                let length = usize::try_from(self.varint()?).ok()?;
-                self.at = self.at.checked_add(length)?;
-            }
-            LIST | SET => {
-                let head = self.byte()?;
-                let count = match head >> 4 {
-                    15 => self.varint()?,
-                    count => u64::from(count),
-                };
-                for _ in 0..count {
-                    match head & 0x0f {
-                        // In a list they take a byte.
-                        TRUE | FALSE => self.at += 1,
-                        kind => self.skip(kind, depth + 1)?,
-                    }
-                    // Every item has a byte at least, so that a count costs no more than its bytes.
-                    self.bytes.get(self.at - 1)?;
-                }
-            }
-            STRUCT => {
-                let mut id = 0;
-                while let Some(kind) = self.field(&mut id)? {
-                    self.skip(kind, depth + 1)?;
-                }
-            }
-            _ => return None,
-        }
-        Some(())
-    }
 }
 
 #[cfg(test)]

@@ -125,9 +125,6 @@ impl SurfaceFormat {
         let source = Source::open(path, false)?;
         let name = source.name.clone();
         let bytes = source.into_bytes(limits.file)?;
-        if bytes.is_empty() {
-            return Err(Diagnostic::empty(name));
-        }
         let folder = path.parent().unwrap_or(Path::new(""));
         (self.read_bytes)(&name, bytes, Some(folder), limits)
     }

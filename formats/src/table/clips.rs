@@ -245,7 +245,7 @@ impl TableClip<'_> {
             let [before, time] = [row - 1, row].map(|row| time_text(offset, times[row]));
             let location = self
                 .table
-                .location(plan.time, self.row(positions[row] as usize));
+                .location(plan.time_source.column(), self.row(positions[row] as usize));
             (location, before, time)
         };
         match time_order(&times) {
@@ -307,16 +307,17 @@ impl TableClip<'_> {
                 let message = format!("the track `{name}` has no key without a gap; remove it");
                 return Err(self.table.refuse(Code::Null, message));
             }
-            for &key in &missing {
-                warnings.warn(Code::Bridged, || {
-                    let message = format!(
-                        "the track `{name}` lacks {} of its keys; it is interpolated from the others",
-                        missing.len()
-                    );
-                    let row = self.row(key as usize);
-                    (Some(self.table.location(plan.time, row)), message)
-                });
-            }
+            warnings.warn_of(missing.len(), Code::Bridged, || {
+                let message = format!(
+                    "the track `{name}` lacks {} of its keys; it is interpolated from the others",
+                    missing.len()
+                );
+                let row = self.row(missing[0] as usize);
+                (
+                    Some(self.table.location(plan.time_source.column(), row)),
+                    message,
+                )
+            });
             let times = self.times_of(&there);
             let start = shared.order.len();
             shared.order.extend(there);
@@ -396,7 +397,7 @@ impl TableClip<'_> {
             let positions = shared.positions(&shared.tracks[track]);
             let location = |key: usize| {
                 self.table
-                    .location(plan.time, self.row(positions[key] as usize))
+                    .location(plan.time_source.column(), self.row(positions[key] as usize))
             };
             let origin = Origin {
                 file: &self.table.file,

@@ -95,7 +95,7 @@ impl<S: RowSink> ResultWriter for Rotations<'_, S> {
                 Layout::FrameMajor => (self.written % self.tracks, self.written / self.tracks),
             };
             let time = self.timeline.time(track, frame).unwrap_or(f64::NAN);
-            self.batch.row(frame, (self.time_offset, time), track);
+            self.batch.row(frame, self.time_offset, time, track);
             let mut numbers = q.to_array();
             if self.is_w_first {
                 numbers.rotate_right(1);
@@ -154,7 +154,7 @@ pub(crate) fn write_poses<S: RowSink>(
     {
         let (frame, track) = (index / tracks, index % tracks);
         let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
-        batch.row(frame, (poses.time_offset, time), track);
+        batch.row(frame, poses.time_offset, time, track);
         let origin = poses.origin(track);
         for (i, (column, &number)) in batch.numbers.iter_mut().zip(pose).enumerate() {
             let moved = if i < 3 { origin[i] } else { 0.0 };
@@ -336,11 +336,7 @@ fn write_clip(
     sampled.checked_len()?;
     for (index, &rotation) in sampled.rotations.iter().enumerate() {
         let (frame, track) = (index / tracks, index % tracks);
-        batch.row(
-            frame,
-            (clip.time_offset, sampled.times[frame]),
-            codes[track],
-        );
+        batch.row(frame, clip.time_offset, sampled.times[frame], codes[track]);
         let relative = sampled.translations.get(index).copied().unwrap_or_default();
         let row = RowNumbers {
             rotation,
@@ -373,7 +369,7 @@ fn write_track(
             .unwrap_or_else(|| clip.rest(channel, track))
     };
     for (key, &time) in times.iter().enumerate() {
-        batch.row(key, (clip.time_offset, time), code);
+        batch.row(key, clip.time_offset, time, code);
         let row = RowNumbers {
             rotation: at(&rotations, key).unwrap_or(Quat::IDENTITY),
             translation: clip.origin(track) + vector(Channel::Translation, key).as_dvec3(),

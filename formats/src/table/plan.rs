@@ -3,8 +3,10 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
+use tumble::FrameRate;
+
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::ReadOptions;
+use crate::format::{ReadOptions, TimeUnit};
 use crate::map::{Entry, Map};
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
@@ -24,9 +26,9 @@ const COUNTED: [&str; 3] = ["frame", "frame_index", "index"];
 #[derive(Debug)]
 pub(crate) struct TablePlan {
     pub(crate) columns: Vec<RequestedColumn>,
-    /// The column of times or frames; where rows are frames, any column.
-    pub(crate) time: usize,
     pub(crate) time_source: TimeSource,
+    /// The unit of the times in a column of numbers, if it is given or was recognised.
+    pub(crate) time_unit: Option<TimeUnit>,
     /// The column of clips, and the prefix of its values in the names of clips.
     pub(crate) clip: Option<(usize, &'static str)>,
     pub(crate) rows: RowLayout,
@@ -38,14 +40,25 @@ pub(crate) struct TablePlan {
 }
 
 /// The source of the times of rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum TimeSource {
     /// A column of times.
-    Times,
-    /// A column with the number of the frame.
-    Frames,
-    /// The position of the row among those of its track.
-    Rows,
+    Times(usize),
+    /// A column with the number of the frame, of frames of a rate.
+    Frames(usize, FrameRate),
+    /// The position of the row among those of its track, of frames of a rate.
+    Rows(FrameRate),
+}
+
+impl TimeSource {
+    /// The column in which a row has its time, for messages about it.
+    pub(crate) fn column(self) -> usize {
+        match self {
+            Self::Times(column) | Self::Frames(column, _) => column,
+            // Any cell leads to the row.
+            Self::Rows(_) => 0,
+        }
+    }
 }
 
 /// The meaning of a row.
@@ -361,7 +374,7 @@ impl TablePlan {
             Some(map) => rename(&mut names, map)?,
             None => MappedColumns::default(),
         };
-        let time = time_column(&mut names, options)?;
+        let time_source = time_source(&mut names, options)?;
         let clip = match names.first_of(&CLIP)? {
             Some(clip) => Some((clip, "")),
             None => names
@@ -390,8 +403,8 @@ impl TablePlan {
         Ok(Self {
             left_out: left_out.collect(),
             columns: names.requested,
-            time: time.map_or(0, |(column, _)| column),
-            time_source: time.map_or(TimeSource::Rows, |(_, source)| source),
+            time_source,
+            time_unit: options.time_unit,
             clip,
             rows,
             #[cfg(feature = "parquet")]
@@ -472,14 +485,14 @@ fn is_column(target: &str) -> bool {
     WHOLE.contains(&target) || tells_apart || target == "episode_index" || NUMBERS.contains(&last)
 }
 
-/// The column of the times of rows; `None` if the rows are frames.
-fn time_column(
+/// The source of the times of rows.
+fn time_source(
     names: &mut ColumnNames<'_>,
     options: &ReadOptions,
-) -> Result<Option<(usize, TimeSource)>, Diagnostic> {
+) -> Result<TimeSource, Diagnostic> {
     for name in ["time", "timestamp", "t"] {
         if let Some(time) = names.take(name, ColumnNeed::Time)? {
-            return Ok(Some((time, TimeSource::Times)));
+            return Ok(TimeSource::Times(time));
         }
     }
     let frames = match names.find("frame_index")? {
@@ -488,11 +501,11 @@ fn time_column(
     };
     let hint = heading_hint(names.file_columns);
     let message = match (frames, options.source_rate) {
-        (Some(frames), Some(_)) => {
+        (Some(frames), Some(rate)) => {
             let column = names.request(frames, ColumnNeed::Whole);
-            return Ok(Some((column, TimeSource::Frames)));
+            return Ok(TimeSource::Frames(column, rate));
         }
-        (None, Some(_)) if hint.is_none() => return Ok(None),
+        (None, Some(rate)) if hint.is_none() => return Ok(TimeSource::Rows(rate)),
         (Some(frames), None) => format!(
             "times are frames, in the column `{}`; give their rate with --source-fps",
             names.file_columns[frames]

@@ -222,9 +222,9 @@ impl Batch {
     }
 
     /// Begins a row; its time is in seconds after a whole second.
-    pub(crate) fn row(&mut self, frame: usize, (whole, time): (i64, f64), track: usize) {
+    pub(crate) fn row(&mut self, frame: usize, whole_seconds: i64, time: f64, track: usize) {
         self.frames.push(frame as i64);
-        self.times.push(whole, time);
+        self.times.push(whole_seconds, time);
         self.tracks.push(track as i32);
     }
 

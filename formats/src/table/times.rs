@@ -2,12 +2,14 @@
 
 use std::collections::HashMap;
 
+use tumble::FrameRate;
+
 use crate::decimal::{LARGEST_SECONDS, offset_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
 use crate::motion::clock_second;
 use crate::rate::Precision;
-use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
+use crate::table::columns::{Column, ColumnNumbers, ColumnValues, Table};
 use crate::table::plan::{TablePlan, TimeSource};
 use crate::warnings::Warnings;
 
@@ -18,6 +20,16 @@ pub(crate) struct RowTimes {
     pub(crate) precision: Option<Precision>,
     /// The whole second from which they count.
     pub(crate) offset: i64,
+}
+
+impl RowTimes {
+    fn at_zero(seconds: Vec<f64>, precision: Option<Precision>) -> Self {
+        Self {
+            seconds,
+            precision,
+            offset: 0,
+        }
+    }
 }
 
 /// The clip and the track of each row, if columns say them.
@@ -51,61 +63,44 @@ pub(crate) fn times(
     options: &ReadOptions,
     warnings: &mut Warnings,
 ) -> Result<RowTimes, Diagnostic> {
-    let column = &table.columns[plan.time];
-    let exact = |seconds, precision| {
-        Ok(RowTimes {
-            seconds,
-            precision,
-            offset: 0,
-        })
+    let column = match plan.time_source {
+        TimeSource::Times(column) => column,
+        TimeSource::Frames(column, rate) => return frame_times(table, column, rate),
+        TimeSource::Rows(rate) => {
+            let frames = groups.numbers(table.rows);
+            let seconds = frames.into_iter().map(|frame| rate.time_of(frame));
+            return Ok(RowTimes::at_zero(seconds.collect(), None));
+        }
     };
-    if let (Some(rate), TimeSource::Rows) = (options.source_rate, plan.time_source) {
-        let frames = groups.numbers(table.rows);
-        let seconds = frames.into_iter().map(|frame| rate.time_of(frame));
-        return exact(seconds.collect(), None);
-    }
-    if let (Some(rate), TimeSource::Times) = (options.source_rate, plan.time_source) {
+    let Column { name, values, .. } = &table.columns[column];
+    if let Some(rate) = options.source_rate {
         let message = format!(
-            "`{}` has the time of every row; --source-fps {rate} would be another, leave it out",
-            column.name
+            "`{name}` has the time of every row; --source-fps {rate} would be another, leave it out"
         );
-        return Err(table.refuse_at(plan.time, 0, Code::RateBesideTimes, message));
+        return Err(table.refuse_at(column, 0, Code::RateBesideTimes, message));
     }
     // A unit that is given holds for numbers of every kind; stamps have their own.
-    let unit = options.time_unit.or_else(|| {
-        let ColumnValues::Numbers(numbers) = &column.values else {
-            return None;
-        };
-        let first =
-            (plan.time_source == TimeSource::Times && numbers.len() > 0).then(|| numbers.at(0))?;
-        let unit = TimeUnit::of_large(first)?;
-        let location = Some(table.location(plan.time, 0));
-        warnings.warn(Code::TimeUnit, || (location, unit.assumed(first)));
-        Some(unit)
-    });
+    let unit = match values {
+        ColumnValues::Numbers(numbers) if numbers.len() > 0 => {
+            let first = numbers.at(0);
+            TimeUnit::or_of_first(plan.time_unit, first, |unit| {
+                let location = Some(table.location(column, 0));
+                warnings.warn(Code::TimeUnit, || (location, unit.assumed(first)));
+            })
+        }
+        _ => plan.time_unit,
+    };
     let per_second = unit.map_or(1.0, |unit| unit.per_second() as f64);
-    match (&column.values, options.source_rate) {
-        (ColumnValues::Numbers(ColumnNumbers::Whole(frames)), Some(rate))
-            if plan.time_source == TimeSource::Frames =>
-        {
-            if let Some(row) = frames.iter().position(|&frame| frame < 0) {
-                let message = format!("frame {} comes before the first, 0", frames[row]);
-                return Err(table.refuse_at(plan.time, row, Code::Time, message));
-            }
-            let seconds = frames
-                .iter()
-                .map(|&frame| rate.time_of(frame.unsigned_abs()));
-            exact(seconds.collect(), None)
-        }
-        (ColumnValues::Numbers(ColumnNumbers::F32(times)), _) => {
+    match values {
+        ColumnValues::Numbers(ColumnNumbers::F32(times)) => {
             let seconds = times.iter().map(|&time| f64::from(time) / per_second);
-            exact(seconds.collect(), Some(Precision::F32))
+            Ok(RowTimes::at_zero(seconds.collect(), Some(Precision::F32)))
         }
-        (ColumnValues::Numbers(ColumnNumbers::F64(times)), _) => {
+        ColumnValues::Numbers(ColumnNumbers::F64(times)) => {
             let seconds = times.iter().map(|&time| time / per_second);
             Ok(doubles(seconds.collect()))
         }
-        (ColumnValues::Decimals(times, decimals), _) => {
+        ColumnValues::Decimals(times, decimals) => {
             let offset = offset_of(times.iter().min().map_or(0, |first| first.whole_seconds()));
             Ok(RowTimes {
                 seconds: times.iter().map(|time| time.since(offset)).collect(),
@@ -113,7 +108,7 @@ pub(crate) fn times(
                 offset,
             })
         }
-        (ColumnValues::Numbers(ColumnNumbers::Whole(times)), _) => {
+        ColumnValues::Numbers(ColumnNumbers::Whole(times)) => {
             // Text does not tell 2 from 2.0: small whole numbers are seconds there.
             let small = times
                 .iter()
@@ -122,19 +117,35 @@ pub(crate) fn times(
             let Some(unit) = unit.or(guessed) else {
                 let first = times.first().copied().unwrap_or_default();
                 let message = format!(
-                    "`{}` has whole numbers, {first} first; give their unit with --time-unit s, ms, us or ns",
-                    column.name
+                    "`{name}` has whole numbers, {first} first; give their unit with --time-unit s, ms, us or ns"
                 );
-                return Err(table.refuse_at(plan.time, 0, Code::WholeTimes, message));
+                return Err(table.refuse_at(column, 0, Code::WholeTimes, message));
             };
             Ok(stamps(times, unit))
         }
-        (ColumnValues::Stamps(times, unit), _) => Ok(stamps(times, *unit)),
-        (ColumnValues::Words { .. } | ColumnValues::Lists { .. }, _) => {
-            let message = format!("`{}` holds no times", column.name);
-            Err(table.refuse_at(plan.time, 0, Code::ColumnType, message))
+        ColumnValues::Stamps(times, unit) => Ok(stamps(times, *unit)),
+        ColumnValues::Words { .. } | ColumnValues::Lists { .. } => {
+            let message = format!("`{name}` holds no times");
+            Err(table.refuse_at(column, 0, Code::ColumnType, message))
         }
     }
+}
+
+/// The times of rows that say which frame of a rate they are.
+fn frame_times(table: &Table, column: usize, rate: FrameRate) -> Result<RowTimes, Diagnostic> {
+    let Column { name, values, .. } = &table.columns[column];
+    let ColumnValues::Numbers(ColumnNumbers::Whole(frames)) = values else {
+        let message = format!("`{name}` holds no numbers of frames");
+        return Err(table.refuse_at(column, 0, Code::ColumnType, message));
+    };
+    if let Some(row) = frames.iter().position(|&frame| frame < 0) {
+        let message = format!("frame {} comes before the first, 0", frames[row]);
+        return Err(table.refuse_at(column, row, Code::Time, message));
+    }
+    let seconds = frames
+        .iter()
+        .map(|&frame| rate.time_of(frame.unsigned_abs()));
+    Ok(RowTimes::at_zero(seconds.collect(), None))
 }
 
 /// Times in f64. Those that begin at a large distance from 0 were rounded there: 1.7e9 s to a quarter of a

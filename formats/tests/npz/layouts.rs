@@ -224,6 +224,30 @@ fn rates_and_units_come_from_options_where_the_file_has_none() {
         .unwrap()
         .clips[0];
     assert_eq!(clip.set.track(0).times, [0.0, 0.5, 0.75]);
+    // A number that is no rate is replaced.
+    let options = ReadOptions {
+        override_rate: FrameRate::new(24, 1).ok(),
+        ..ReadOptions::default()
+    };
+    for (name, rate) in [("rate_zero", "0"), ("two_rates", "an array of 2 numbers")] {
+        let bytes = fixture(&format!("npz/{name}.npz"));
+        let loaded = read_npz("t", bytes, &options).unwrap();
+        let clip = &loaded.clips[0];
+        assert_eq!(
+            (clip.rate, clip.set.track(0).times[3]),
+            (options.override_rate, 0.125)
+        );
+        let warning = loaded.warnings.iter().find(|it| it.code == Code::TwoRates);
+        let message = &warning.unwrap().message;
+        assert!(
+            message.starts_with(&format!("{rate} is not a frame rate; ")),
+            "{message}"
+        );
+        assert!(
+            message.ends_with(" it is read at 24 frames a second"),
+            "{message}"
+        );
+    }
 }
 
 /// What a file would unpack to is known before anything is unpacked.

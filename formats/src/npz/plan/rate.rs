@@ -11,10 +11,10 @@ use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::rate::{Precision, RateSource, of, on_frames, overridden};
 
 impl ArchivePlan {
-    /// Reads the rate in the first of these arrays that exists.
+    /// Reads the rate in the first of these arrays that exists. Of one that is not a rate, the error is kept.
     ///
     /// # Errors
-    /// When it is not a single number, or not a rate.
+    /// When they are not numbers.
     pub(crate) fn read_rate(
         &mut self,
         archive: &Archive,
@@ -32,13 +32,19 @@ impl ArchivePlan {
                     let found = of(&RateSource::Number(number)).map(|found| found.grid);
                     found.ok_or_else(|| number.to_string())
                 }
-                _ => Err(format!("{} numbers", numbers.len())),
+                _ => Err(format!("an array of {} numbers", numbers.len())),
             };
-            let rate = rate.map_err(|found| {
-                let message =
-                    format!("{found} is not a frame rate; expected one number greater than 0");
-                archive.refuse(member, Code::FrameRate, message)
-            })?;
+            let rate = match rate {
+                Ok(rate) => rate,
+                Err(found) => {
+                    let message =
+                        format!("{found} is not a frame rate; expected one number greater than 0");
+                    let refusal = archive.refuse(member, Code::FrameRate, message);
+                    self.bad_rate.get_or_insert(refusal);
+                    self.rate_member.get_or_insert(member);
+                    continue;
+                }
+            };
             match self.rate {
                 None => (self.rate, self.rate_member, before) = (Some(rate), Some(member), name),
                 Some(first) if first != rate => {
@@ -85,12 +91,21 @@ impl ArchivePlan {
     /// The times of all frames in seconds. The rate of the plan becomes that of these times.
     ///
     /// # Errors
-    /// When neither times nor a rate are known, or when the number of times is not that of the frames.
+    /// When neither times nor a rate are known, when a rate is none and is not replaced, or when the number of times is
+    /// not that of the frames.
     pub(crate) fn read_times(
         &mut self,
         archive: &Archive,
         options: &ReadOptions,
     ) -> Result<Vec<f64>, Diagnostic> {
+        let replaced = options.override_rate.filter(|_| self.times.is_none());
+        let bad_rate = self.bad_rate.take();
+        if let (Some(mut error), None) = (bad_rate.clone(), replaced) {
+            if self.times.is_none() {
+                error.message += "; --override-fps replaces it";
+            }
+            return Err(error);
+        }
         let Some(list) = self.times else {
             let rates = [options.override_rate, self.rate, options.source_rate];
             let rate = rates.into_iter().flatten().next().ok_or_else(|| {
@@ -101,7 +116,13 @@ impl ArchivePlan {
             let is_other = |other: &FrameRate| self.rate.is_some_and(|stated| stated != *other);
             if let Some(other) = options.override_rate {
                 let stated = self.rate.filter(|_| is_other(&other));
-                self.two_rates = stated.map(|stated| overridden(stated, other));
+                self.two_rates = match (stated, bad_rate) {
+                    (None, Some(bad)) => Some(format!(
+                        "{}; because of --override-fps it is read at {other} frames a second",
+                        bad.message
+                    )),
+                    (stated, _) => stated.map(|stated| overridden(stated, other)),
+                };
             } else if let Some(other) = options.source_rate.filter(is_other) {
                 self.two_rates = Some(format!(
                     "the file says {rate} frames a second, which is used; --source-fps {other} is for files that say \
