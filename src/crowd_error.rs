@@ -261,6 +261,12 @@ impl From<SetError> for CrowdError {
 
 impl From<JointMatchError> for CrowdError {
     fn from(error: JointMatchError) -> Self {
-        Self::OtherJoints(Box::new(error))
+        match error {
+            JointMatchError::Count {
+                joints: [joints, tracks],
+                ..
+            } => Self::Tracks { tracks, joints },
+            error => Self::OtherJoints(Box::new(error)),
+        }
     }
 }

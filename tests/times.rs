@@ -1,12 +1,12 @@
 //! At any time: no sample is left unwritten, and accuracy does not hang on when a motion is.
 
-use glam::{DQuat, DVec3, Quat};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use proptest::prelude::*;
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::verify;
 use tumble::{
-    Device, Engine, FrameRate, Interpolation, Layout, METHODS, Method, SampleTimes, Speed,
-    TrackSet, WrapMode, method,
+    Channel, Device, Engine, FrameRate, Interpolation, Layout, METHODS, Method, SampleTimes, Speed,
+    TrackSet, VectorMethod, WrapMode, method,
 };
 
 use crate::support::{Random, first_difference, vulkan_engines};
@@ -410,6 +410,109 @@ fn far_extrapolation_is_finite() {
                         "{before:?} {after:?} at {start}: {q:?}"
                     );
                 }
+            }
+        }
+    }
+}
+
+/// A curve depends on the ratios of its intervals, and a parameter is a ratio of seconds: keys and samples in another unit
+/// have the same bits. Seconds below 2^-64 and reciprocals of seconds above 2^64 are 0 in f32, so that every sample was the
+/// middle of its interval.
+#[test]
+fn the_unit_of_time_changes_no_bits() {
+    let mut random = Random(64);
+    let mut times = vec![0.0];
+    for _ in 1..40 {
+        times.push(times[times.len() - 1] + random.between(0.25, 2.0));
+    }
+    let keys: Vec<Vec<Quat>> = [0.02, 0.4, 3.0]
+        .map(|step| {
+            let mut rotation = random.rotation();
+            let mut next = || {
+                let turn = random.between(0.0, step);
+                rotation *= DQuat::from_axis_angle(random.direction(), turn);
+                rotation.normalize().as_quat()
+            };
+            times.iter().map(|_| next()).collect()
+        })
+        .to_vec();
+    let points: Vec<Vec3> = (times.iter())
+        .map(|_| (random.direction() * 3.0).as_vec3())
+        .collect();
+    let last = times[times.len() - 1];
+    let samples: Vec<f64> = (0..300).map(|_| random.between(-0.5, last + 0.5)).collect();
+    let in_unit = |unit: f64| {
+        let scaled = |all: &[f64]| -> Vec<f64> { all.iter().map(|time| time * unit).collect() };
+        let mut set = TrackSet::new();
+        for (track, keys) in keys.iter().enumerate() {
+            set.push("", &scaled(&times), keys).unwrap();
+            set.set_translations(track, &scaled(&times), &points, &[])
+                .unwrap();
+        }
+        // Every route: few samples straight from the keys, few intervals, batches.
+        let counts = [2, 12, 300];
+        (
+            set,
+            counts.map(|count| SampleTimes::at(scaled(&samples[..count]))),
+        )
+    };
+    let evaluated = |engine: &Engine, unit: f64, interpolation: Interpolation| {
+        let (set, frames) = in_unit(unit);
+        let clip = engine.upload(&set, interpolation).unwrap();
+        let mut all = Vec::new();
+        for frames in &frames {
+            let rotations = engine.evaluate(&set, interpolation, frames).unwrap();
+            all.extend(rotations.as_quats().iter().map(|q| q.to_array()));
+            let rotations = clip.evaluate(frames).unwrap();
+            all.extend(rotations.as_quats().iter().map(|q| q.to_array()));
+        }
+        all
+    };
+    let moved = |engine: &Engine, unit: f64, method: VectorMethod, how: Interpolation| {
+        let (set, frames) = in_unit(unit);
+        let found = frames.map(|frames| {
+            let channel = Channel::Translation;
+            let found = engine.vectors(&set, channel, method, how, &frames, Layout::TrackMajor);
+            found.unwrap().as_slice().to_vec()
+        });
+        found.concat()
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let units = [-120, -75, -64, -53, 53, 64, 75, 120].map(|power| 2f64.powi(power));
+    let different: Vec<String> = METHODS
+        .iter()
+        .flat_map(|&method| [WrapMode::Hold, WrapMode::Loop].map(|wrap| (method, wrap)))
+        .flat_map(|(method, wrap)| {
+            let interpolation = Interpolation {
+                before: wrap,
+                after: wrap,
+                ..method.into()
+            };
+            let expected = evaluated(&engine, 1.0, interpolation);
+            let is_other = |unit: &f64| evaluated(&engine, *unit, interpolation) != expected;
+            let found: Vec<f64> = units.into_iter().filter(is_other).collect();
+            (!found.is_empty()).then(|| format!("{method} {wrap:?}: {found:?}"))
+        })
+        .collect();
+    assert!(different.is_empty(), "{}", different.join("\n"));
+    for method in VectorMethod::ALL {
+        let how = Interpolation::from(method::SLERP);
+        let expected = moved(&engine, 1.0, method, how);
+        for unit in units {
+            let found = moved(&engine, unit, method, how);
+            assert!(found == expected, "{method:?} {unit:e}");
+        }
+    }
+    for device in vulkan_engines(|_| {}) {
+        for method in [method::SLERP, method::SQUAD] {
+            let expected = evaluated(&engine, 1.0, method.into());
+            for unit in [2f64.powi(-75), 2f64.powi(75)] {
+                let found = evaluated(&device, unit, method.into());
+                assert!(
+                    found == expected,
+                    "{} {method} {unit:e}",
+                    device.device_name()
+                );
             }
         }
     }

@@ -498,8 +498,76 @@ fn queues_that_cannot_do_their_work_are_refused() {
     );
 }
 
-/// An application that submits from another thread while the engine evaluates, each with the queue's lock;
-/// the validation layer would tell of two at once, and lavapipe's fences never end.
+/// The application's device has its own `vkQueueSubmit`, which looks whether the thread that calls it has the lock: two
+/// threads that submit at the same time would only sometimes be noticed.
+#[test]
+#[allow(unsafe_code)] // the device is the application's
+fn an_engine_submits_within_the_application_s_lock() {
+    use crate::application::Application;
+    use ash::vk;
+    use std::cell::Cell;
+    use std::sync::OnceLock;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use tumble::vulkan::QueueLock;
+
+    thread_local! { static HAS_LOCK: Cell<bool> = const { Cell::new(false) }; }
+    static OF_DRIVER: OnceLock<vk::PFN_vkQueueSubmit> = OnceLock::new();
+    static WITH_LOCK: AtomicUsize = AtomicUsize::new(0);
+    static WITHOUT: AtomicUsize = AtomicUsize::new(0);
+    unsafe extern "system" fn submit(
+        queue: vk::Queue,
+        count: u32,
+        submits: *const vk::SubmitInfo<'_>,
+        fence: vk::Fence,
+    ) -> vk::Result {
+        let counter = if HAS_LOCK.get() { &WITH_LOCK } else { &WITHOUT };
+        counter.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the arguments of the caller.
+        unsafe { OF_DRIVER.get().unwrap()(queue, count, submits, fence) }
+    }
+
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let device = &application.device;
+    let mut functions = device.fp_v1_0().clone();
+    OF_DRIVER.set(functions.queue_submit).unwrap();
+    functions.queue_submit = submit;
+    let mut handles = application.handles();
+    handles.device = ash::Device::from_parts_1_3(
+        device.handle(),
+        functions,
+        device.fp_v1_1().clone(),
+        device.fp_v1_2().clone(),
+        device.fp_v1_3().clone(),
+    );
+    handles.copy_queue = None; // engines use it alone, without a lock
+    handles.queue_lock = Some(QueueLock::new(|work| {
+        HAS_LOCK.set(true);
+        work();
+        HAS_LOCK.set(false);
+    }));
+    // SAFETY: the handles belong together and outlive the engine.
+    let engine = unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap();
+    let set = hostile_set(3, 40);
+    for frames in [
+        SampleTimes::fps(60).between(0.0, 5.0),
+        SampleTimes::at(vec![0.3]),
+    ] {
+        for method in [method::SLERP, method::C2] {
+            let before = WITH_LOCK.load(Ordering::Relaxed);
+            engine.evaluate(&set, method, &frames).unwrap();
+            let clip = engine.upload(&set, method).unwrap();
+            clip.evaluate(&frames).unwrap();
+            assert!(WITH_LOCK.load(Ordering::Relaxed) > before);
+        }
+    }
+    assert_eq!(WITHOUT.load(Ordering::Relaxed), 0);
+}
+
+/// An application that submits from another thread while the engine evaluates, each with the queue's lock: neither waits
+/// for the other forever.
 #[test]
 fn an_application_and_an_engine_share_a_queue_by_its_lock() {
     use crate::application::{Application, Commands};
@@ -569,7 +637,7 @@ fn engines_on_one_queue_take_turns() {
     });
 }
 
-/// Handles that are null, and versions that no instance of this loader can have.
+/// Handles that are null, and versions that are too old.
 #[test]
 fn handles_that_cannot_be_are_refused() {
     use crate::application::Application;
@@ -595,27 +663,23 @@ fn handles_that_cannot_be_are_refused() {
     let cache = Some(vk::PipelineCache::null());
     let found = refused(&|handles| handles.pipeline_cache = cache);
     assert_eq!(found, null("pipeline_cache"));
-    // SAFETY: no requirements beyond a loaded entry.
-    #[allow(unsafe_code)]
-    let loader = unsafe { application.entry.try_enumerate_instance_version() };
-    let loader = loader.unwrap().unwrap();
-    let minor = vk::api_version_minor(loader);
     for stated in [
         0,
         vk::API_VERSION_1_0,
-        vk::make_api_version(0, 1, minor + 1, 0),
         vk::make_api_version(1, 1, 1, 0),
         u32::MAX,
     ] {
         let found = refused(&|handles| handles.api_version = stated);
-        assert_eq!(found, VulkanError::ApiVersion { stated, loader });
+        assert_eq!(found, VulkanError::ApiVersion { stated });
     }
-    let newest_patch = vk::make_api_version(0, 1, minor, 4095);
-    let mut handles = application.handles();
-    handles.api_version = newest_patch;
-    // SAFETY: the handles belong together and outlive the engine.
-    #[allow(unsafe_code)]
-    unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap();
+    // An application may state a newer version than its loader has.
+    for stated in [vk::API_VERSION_1_1, vk::make_api_version(0, 1, 1000, 0)] {
+        let mut handles = application.handles();
+        handles.api_version = stated;
+        // SAFETY: the handles belong together and outlive the engine.
+        #[allow(unsafe_code)]
+        unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap();
+    }
 }
 
 /// Null buffers and ranges that end beyond their buffer, some behind 2^64, at once and recorded.

@@ -783,7 +783,8 @@ typedef struct TumbleVulkan {
    */
   uint32_t queue_family;
   /*
-   The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer.
+   The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer. If
+   it is newer than the loader's, the loader's counts.
    */
   uint32_t api_version;
   /*
@@ -1710,8 +1711,10 @@ uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *librar
                                          size_t clip);
 
 /*
- Returns the name of a joint, empty in a library of `tumble_crowd_library_new`: UTF-8, valid until the library is
- freed; null if there is no such joint.
+ Returns the name of a joint: UTF-8, valid until the library is freed; null if there is no such joint.
+
+ In a library of `tumble_crowd_library_new` names are empty until the first set is added, whose names the joints then
+ have. A joint without a name is `box1`, `box2` … by its index.
  */
 const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library,
                                             size_t joint);

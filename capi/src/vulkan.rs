@@ -35,7 +35,8 @@ pub struct TumbleVulkan {
     pub queue: *mut c_void,
     /// The family of `queue`.
     pub queue_family: u32,
-    /// The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer.
+    /// The Vulkan version for which the instance was created, `VkApplicationInfo.apiVersion`: 1.1 or newer. If
+    /// it is newer than the loader's, the loader's counts.
     pub api_version: u32,
     /// 1 if `VK_KHR_shader_float_controls` is enabled, otherwise 0; ignored from Vulkan 1.2 on.
     pub shader_float_controls: u32,

@@ -759,14 +759,6 @@ fn handles_that_do_not_belong_together_are_refused() {
             "`api_version` is 4194304, Vulkan 1.0; give the version for which the instance was made",
         ),
         (
-            TumbleVulkan {
-                api_version: vk::make_api_version(0, 1, 1000, 0),
-                ..good
-            },
-            argument,
-            "Vulkan 1.1000; give the version",
-        ),
-        (
             functions,
             argument,
             "does not know vkEnumeratePhysicalDevices",

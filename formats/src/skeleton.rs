@@ -93,11 +93,15 @@ impl ClipSkeleton {
         names: [&str; 2],
     ) -> Result<Self, JointMatchError> {
         let of_first = first.joints();
-        let by_index = |joints: usize| Joints::named(vec![String::new(); joints]);
-        by_index(parents.len()).order_of(&by_index(of_first.len()), names)?;
+        if parents.len() != of_first.len() {
+            return Err(JointMatchError::Count {
+                clips: names.map(str::to_owned),
+                joints: [parents.len(), of_first.len()],
+            });
+        }
         let joints = Joints::of(&first.set).with_parents(parents.to_vec());
-        let pairs: Vec<[usize; 2]> = (0..joints.len()).map(|joint| [joint; 2]).collect();
-        joints.check_parents(&of_first, &pairs, &pairs, names)?;
+        let pairs = JointPairs::in_order(joints.len());
+        joints.check_parents(&of_first, &pairs, names)?;
         let rest = parents.iter().zip(offsets).map(|(&parent, &translation)| {
             let rest = Transform {
                 translation,
@@ -135,35 +139,20 @@ impl ClipSkeleton {
     /// called in messages.
     ///
     /// # Errors
-    /// When two joints have the same name, or a joint has another parent.
+    /// When two joints have the same name, or a joint has another parent. The skeleton is then unchanged.
     pub fn extend(&mut self, clip: &Motion, names: [&str; 2]) -> Result<(), JointMatchError> {
-        let joints = clip.joints();
-        let matched = self.joints.pairs(&joints, names)?;
-        let mut index_of = vec![0; joints.len()];
-        for &[joint, track] in &matched.pairs {
-            index_of[track] = joint;
-        }
         let before = self.rest.len();
-        for (index, &track) in matched.missing[1].iter().enumerate() {
-            index_of[track] = before + index;
-        }
-        let mut rest = self.rest.clone();
-        for &track in &matched.missing[1] {
+        let indices = self.joints.extend(&clip.joints(), names)?;
+        let tracks = indices.iter().enumerate();
+        let added = tracks.filter(|&(_, &joint)| joint >= before);
+        self.rest.extend(added.map(|(track, _)| {
             let joint = clip.skeleton.get(track);
-            rest.push(Joint {
-                parent: joint.and_then(|joint| index_of.get(joint.parent?).copied()),
+            Joint {
+                parent: joint.and_then(|joint| indices.get(joint.parent?).copied()),
                 rest: joint.map(|joint| joint.rest).unwrap_or_default(),
-            });
-        }
-        let added = matched.missing[1]
-            .iter()
-            .map(|&track| &joints.names()[track]);
-        let all = Joints::named(self.joints.names().iter().chain(added));
-        let pairs: Vec<[usize; 2]> = (index_of.iter().enumerate())
-            .map(|(track, &joint)| [joint, track])
-            .collect();
-        self.set(all, rest);
-        self.joints.check_parents(&joints, &pairs, &pairs, names)
+            }
+        }));
+        Ok(())
     }
 
     /// Whether any joint has a name.
@@ -214,8 +203,7 @@ impl ClipSkeleton {
         let joints = clip.joints();
         let matched = self.joints.pairs(&joints, names)?;
         self.joints.check_extra(&joints, &matched, names)?;
-        let pairs = &matched.pairs;
-        self.joints.check_parents(&joints, pairs, pairs, names)?;
+        self.joints.check_parents(&joints, &matched, names)?;
         Ok(matched)
     }
 
@@ -281,8 +269,7 @@ impl ClipSkeleton {
             }
             order.push(track);
         }
-        let is_in_order = order.iter().copied().eq(0..all.track_count());
-        Ok(match is_in_order {
+        Ok(match all.is_in_order(&order) {
             true => all,
             false => Cow::Owned(all.select(order)?),
         })
@@ -309,5 +296,91 @@ impl ClipSkeleton {
             }
         })?;
         Ok(placed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    const LABELS: [&str; 2] = ["the clips before", "the clip"];
+
+    /// A clip whose joints have these names, and parents if there are any.
+    fn clip(names: &[&str], parents: &[Option<usize>]) -> Motion {
+        let mut clip = Motion::default();
+        for name in names {
+            clip.set.push(*name, &[0.0], &[Quat::IDENTITY]).unwrap();
+        }
+        let joint = |(joint, &parent): (usize, &Option<usize>)| Joint {
+            parent,
+            rest: Transform {
+                translation: Vec3::X * joint as f32,
+                ..Transform::default()
+            },
+        };
+        clip.skeleton = parents.iter().enumerate().map(joint).collect();
+        clip
+    }
+
+    fn parents(skeleton: &ClipSkeleton) -> Vec<Option<usize>> {
+        skeleton.joints().iter().map(|joint| joint.parent).collect()
+    }
+
+    #[test]
+    fn a_skeleton_grows_by_the_joints_that_are_new() {
+        let mut skeleton = ClipSkeleton::default();
+        let first = clip(&["hip", "arm"], &[None, Some(0)]);
+        let second = clip(&["tail", "hip", "hand"], &[Some(1), None, Some(0)]);
+        for clip in [&first, &second, &first] {
+            skeleton.extend(clip, LABELS).unwrap();
+        }
+        assert_eq!(skeleton.names(), ["hip", "arm", "tail", "hand"]);
+        assert_eq!(parents(&skeleton), [None, Some(0), Some(0), Some(2)]);
+        let rest = |joint: usize| skeleton.joints()[joint].rest.translation.x;
+        assert_eq!([0, 1, 2, 3].map(rest), [0.0, 1.0, 0.0, 2.0]);
+        assert_eq!(
+            skeleton.some_pairs(&second, LABELS).unwrap().pairs,
+            [[0, 1], [2, 0], [3, 2]]
+        );
+    }
+
+    #[test]
+    fn a_clip_that_does_not_fit_changes_nothing() {
+        let mut skeleton = ClipSkeleton::of(&clip(&["hip", "arm"], &[None, Some(0)]));
+        let wrong = clip(&["toe", "arm", "hip"], &[None, None, None]);
+        let error = skeleton.extend(&wrong, LABELS).unwrap_err();
+        let text = "`arm` has the parent `hip` in the clips before, but is a root in the clip";
+        assert_eq!(error.to_string(), text);
+        assert_eq!(skeleton.names(), ["hip", "arm"]);
+        assert_eq!(parents(&skeleton), [None, Some(0)]);
+    }
+
+    #[test]
+    fn numbered_joints_are_not_added_again() {
+        let mut skeleton = ClipSkeleton::of(&clip(&["joint0", "joint1"], &[None, Some(0)]));
+        let more = clip(&["joint0", "joint1", "tool"], &[None, Some(0), Some(1)]);
+        skeleton.extend(&more, LABELS).unwrap();
+        assert_eq!(skeleton.names(), ["joint0", "joint1", "tool"]);
+    }
+
+    #[test]
+    fn arrays_have_a_joint_for_each_track() {
+        let first = clip(&["hip", "arm"], &[None, Some(0)]);
+        let made = |parents: &[Option<usize>]| {
+            let offsets = vec![Vec3::ZERO; parents.len()];
+            ClipSkeleton::of_arrays(parents, &offsets, &first, ["arrays", "the clip"])
+        };
+        assert_eq!(made(&[None, Some(0)]).unwrap().names(), ["hip", "arm"]);
+        for (parents, text) in [
+            (&[None][..], "the clip: 2 tracks; arrays has 1 joints"),
+            (
+                &[None, None][..],
+                "`arm` is a root in arrays, but has the parent `hip` in the clip",
+            ),
+        ] {
+            assert_eq!(made(parents).unwrap_err().to_string(), text);
+        }
     }
 }

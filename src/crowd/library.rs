@@ -180,23 +180,15 @@ impl CrowdLibrary {
     ) -> Result<usize, CrowdError> {
         let (tracks, joints) = (set.track_count(), self.joint_count());
         let named = Joints::of(set);
-        let known = self.joints.as_ref();
-        let has_names = |known: &&Joints| known.is_named() || named.is_named();
-        let both_have_names = known.is_some_and(Joints::is_named) && named.is_named();
-        // With names, the joint that is missing is named.
-        if tracks != joints && !both_have_names {
-            return Err(CrowdError::Tracks { tracks, joints });
-        }
-        let order = known
-            .filter(has_names)
-            .map(|known| known.order_of(&named, ["the library", "the clip"]))
-            .transpose()?;
-        let is_shuffled = |order: &Vec<usize>| !order.iter().copied().eq(0..joints);
-        let selected = order.filter(is_shuffled).map(|order| set.select(order));
+        let order = match &self.joints {
+            Some(known) => known.order_of(&named, ["the library", "the clip"])?,
+            None if tracks == joints => (0..joints).collect(),
+            None => return Err(CrowdError::Tracks { tracks, joints }),
+        };
+        let is_shuffled = !set.is_in_order(&order);
+        let selected = is_shuffled.then(|| set.select(order)).transpose();
         // Only an index that is out of range is an error.
-        let selected = selected
-            .transpose()
-            .map_err(|_| CrowdError::Tracks { tracks, joints })?;
+        let selected = selected.map_err(|_| CrowdError::Tracks { tracks, joints })?;
         let set = selected.as_ref().unwrap_or(set);
         let clip = self.clip_count();
         if clip == MAX_CLIPS {

@@ -13,8 +13,8 @@ impl Engine {
     /// Makes an engine on an application's Vulkan device.
     ///
     /// # Errors
-    /// As [`Engine::with_options`]; also when a handle is null, [`VulkanHandles::api_version`] is below 1.1 or above
-    /// the loader's, the physical device is not the instance's, or a queue's family cannot do its work.
+    /// As [`Engine::with_options`]; also when a handle is null, [`VulkanHandles::api_version`] is below 1.1, the
+    /// physical device is not the instance's, or a queue's family cannot do its work.
     ///
     /// # Safety
     /// The handles must be valid and belong together, and must outlive the engine and all of its clips and results.

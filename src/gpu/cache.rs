@@ -102,14 +102,28 @@ impl Cache {
 }
 
 /// Whether nobody but this process's user and the system's administrator could have written a file: a driver gets the
-/// compiled kernels in it, and a checksum can be made by anybody. Where the system does not say whose the process is,
-/// only the permissions count.
+/// compiled kernels in it, and a checksum can be made by anybody.
 #[cfg(unix)]
 fn is_trusted(metadata: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
-    let user = fs::metadata("/proc/self").map(|process| process.uid());
-    let is_of_user = user.is_ok_and(|user| metadata.uid() == user) || metadata.uid() == 0;
-    (is_of_user || !cfg!(target_os = "linux")) && metadata.mode() & 0o022 == 0
+    // The folder itself belongs to root where the process must not be dumped.
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    is_private(metadata.uid(), metadata.mode(), effective_user(&status))
+}
+
+/// Whether a file's permissions let only its owner write it, and the owner is this user or the system's administrator.
+/// Where the system does not say whose the process is, only the permissions count.
+#[cfg(unix)]
+fn is_private(owner: u32, mode: u32, user: Option<u32>) -> bool {
+    let is_of_user = user.is_none_or(|user| [user, 0].contains(&owner));
+    is_of_user && mode & 0o022 == 0
+}
+
+/// The user with whose rights a process runs, from its `/proc/self/status`: the second number of the line `Uid:`.
+#[cfg(unix)]
+fn effective_user(status: &str) -> Option<u32> {
+    let users = status.lines().find_map(|line| line.strip_prefix("Uid:"))?;
+    users.split_whitespace().nth(1)?.parse().ok()
 }
 
 #[cfg(not(unix))]
@@ -206,6 +220,26 @@ mod tests {
         let path = cache.path("kernels").unwrap();
         let names = fs::read_dir(path.parent().unwrap()).unwrap();
         assert_eq!(names.count(), 2);
+    }
+
+    /// Without `/proc`, as in some sandboxes, permissions are all that is known.
+    #[cfg(unix)]
+    #[test]
+    fn a_file_counts_if_its_owner_may_be_trusted() {
+        let status = "Name:\ttumble\nUid:\t1000\t1001\t1000\t1000\nGid:\t7\t7\t7\t7\n";
+        assert_eq!(effective_user(status), Some(1001));
+        assert_eq!(effective_user(""), None);
+        for (owner, mode, user, is_trusted) in [
+            (1001, 0o100_600, Some(1001), true),
+            (0, 0o100_644, Some(1001), true),
+            (1000, 0o100_600, Some(1001), false),
+            (1001, 0o100_620, Some(1001), false),
+            (1000, 0o100_600, None, true),
+            (1000, 0o100_602, None, false),
+        ] {
+            let found = is_private(owner, mode, user);
+            assert_eq!(found, is_trusted, "{owner} {mode:o} {user:?}");
+        }
     }
 
     /// Files that others may write, or have written.

@@ -10,7 +10,7 @@ use ash::{ext, khr, vk};
 use crate::gpu::cache::Cache;
 use crate::gpu::device_queue::DeviceQueue;
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::handles::{QueueLock, VulkanQueue};
+use crate::gpu::handles::VulkanQueue;
 use crate::gpu::kernel_check::passes::Passes;
 use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
@@ -131,25 +131,25 @@ impl LogicalDevice {
             queue: queue(family, index),
             family,
         });
-        let first = queue(family, 0);
+        let first = DeviceQueue::new(queue(family, 0), family, None);
         let pipelines = PipelineCache::new(&raw, &physical, &options.cache_files);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
         let exports = exports.then(|| khr::external_memory_fd::Device::new(instance, &raw));
         let exports_timelines =
             exports_timelines.then(|| khr::external_semaphore_fd::Device::new(instance, &raw));
-        let mut device =
-            Self::with_queues(physical, raw, (first, None), copy_queue, pipelines, options);
+        let mut device = Self::with_queues(physical, raw, first, copy_queue, pipelines, options);
         (device.owned, device.borrows) = (true, borrows);
         (device.exports, device.exports_timelines) = (exports, exports_timelines);
         device.copies_apart = copies_apart;
         Ok(Arc::new(device))
     }
 
-    /// A device of an application, which must destroy it. Staged results are copied by `copy_queue`, if there is one.
+    /// A device that its caller must destroy, and which computes on `queue`. Staged results are copied by `copy_queue`,
+    /// if there is one.
     pub(crate) fn with_queues(
         physical: PhysicalDevice,
         raw: ash::Device,
-        (queue, queue_lock): (vk::Queue, Option<QueueLock>),
+        queue: DeviceQueue,
         copy_queue: Option<VulkanQueue>,
         pipelines: PipelineCache,
         options: &EngineOptions,
@@ -169,7 +169,7 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: DeviceQueue::new(queue, physical.queue_family, queue_lock),
+            queue,
             copy_queue: named.map(|named| DeviceQueue::new(named.queue, named.family, None)),
             copies_apart: named.is_some(),
             physical,

@@ -75,6 +75,23 @@ mod tests {
     }
 
     #[test]
+    fn work_is_done_within_the_locks_of_engines_and_application() {
+        let shared = Arc::new(Mutex::new(()));
+        let raw = vk::Queue::from_raw(u64::MAX - 3);
+        let one = DeviceQueue::new(raw, 0, Some(QueueLock::from(Arc::clone(&shared))));
+        let again = queue(3);
+        let are_free = || {
+            [
+                shared.try_lock().is_ok(),
+                again.of_engines.try_lock().is_ok(),
+            ]
+        };
+        assert_eq!(one.with(|_| are_free()), Some([false; 2]));
+        assert_eq!(again.with(|_| are_free()), Some([true, false]));
+        assert_eq!(are_free(), [true; 2]);
+    }
+
+    #[test]
     fn a_queue_has_one_lock_as_long_as_an_engine_uses_it() {
         let (one, again, other) = (queue(1), queue(1), queue(2));
         assert!(Arc::ptr_eq(&one.of_engines, &again.of_engines));

@@ -76,15 +76,13 @@ pub enum VulkanError {
         /// The handle's name: the field of `VulkanHandles` or `VulkanBuffer`.
         name: &'static str,
     },
-    /// The version that an application states of its instance is below 1.1, or above the loader's.
+    /// The version that an application states of its instance is below 1.1.
     #[error(
-        "`api_version` is {stated}, Vulkan {}; give the version for which the instance was made (VkApplicationInfo::apiVersion), 1.1 to the loader's {}", version(*.stated), version(*.loader)
+        "`api_version` is {stated}, Vulkan {}; give the version for which the instance was made (VkApplicationInfo::apiVersion), 1.1 or newer", version(*.stated)
     )]
     ApiVersion {
         /// The stated version.
         stated: u32,
-        /// The loader's version.
-        loader: u32,
     },
     /// A physical device that the application's instance does not have.
     #[error("`physical_device` is none of the {count} of `instance`")]

@@ -18,7 +18,8 @@ pub struct VulkanHandles {
     pub entry: ash::Entry,
     /// The instance, of Vulkan 1.1 or newer.
     pub instance: ash::Instance,
-    /// The Vulkan version for which the instance was made (`VkApplicationInfo::apiVersion`).
+    /// The Vulkan version for which the instance was made (`VkApplicationInfo::apiVersion`), 1.1 or newer. If it is
+    /// newer than the loader's, the loader's counts.
     pub api_version: u32,
     /// The physical device of `device`.
     pub physical_device: vk::PhysicalDevice,
@@ -57,8 +58,8 @@ pub struct VulkanHandles {
 }
 
 impl VulkanHandles {
-    /// Refuses handles that are null, and a version that the instance cannot have.
-    pub(crate) fn check(&self) -> Result<(), VulkanError> {
+    /// Refuses handles that are null, and a version that is too old. Returns the version of which functions may be used.
+    pub(crate) fn check(&self) -> Result<u32, VulkanError> {
         let handles = [
             ("instance", self.instance.handle().as_raw()),
             ("physical_device", self.physical_device.as_raw()),
@@ -76,20 +77,21 @@ impl VulkanHandles {
         if let Some((name, _)) = handles.iter().find(|(_, handle)| *handle == 0) {
             return Err(VulkanError::NullHandle { name });
         }
-        // Vulkan does not tell for which version an instance was made; no instance has a newer one than its loader.
         // SAFETY: no requirements beyond a loaded entry.
         let loader = unsafe { self.entry.try_enumerate_instance_version() }
             .named("vkEnumerateInstanceVersion")?
             .unwrap_or(vk::API_VERSION_1_0);
-        let without_patch = |version: u32| version >> 12;
-        match without_patch(vk::API_VERSION_1_1)..=without_patch(loader) {
-            known if known.contains(&without_patch(self.api_version)) => Ok(()),
-            _ => Err(VulkanError::ApiVersion {
-                stated: self.api_version,
-                loader,
-            }),
-        }
+        let stated = self.api_version;
+        usable_version(stated, loader).ok_or(VulkanError::ApiVersion { stated })
     }
+}
+
+/// The version of an instance that was made for the version `stated`, by a loader of the version `loader`; `None` if it
+/// is older than 1.1. An application may state a newer version than its loader's, which then counts: Vulkan tells for
+/// which version an instance was made to nobody, so that a mistake cannot be told from this.
+fn usable_version(stated: u32, loader: u32) -> Option<u32> {
+    let is_vulkan = vk::api_version_variant(stated) == 0; // others are other interfaces, such as Vulkan SC
+    (is_vulkan && stated >= vk::API_VERSION_1_1).then_some(stated.min(loader))
 }
 
 /// A lock for a queue that an application and an engine share. The application implements it with a lock of any kind.
@@ -180,6 +182,28 @@ impl VulkanBuffer {
                 size: self.size,
                 memory,
             }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_newer_version_than_the_loader_s_is_the_loader_s() {
+        let version = |minor, patch| vk::make_api_version(0, 1, minor, patch);
+        for (stated, loader, usable) in [
+            (version(1, 0), version(3, 280), Some(version(1, 0))),
+            (version(3, 0), version(3, 280), Some(version(3, 0))),
+            (version(4, 0), version(1, 70), Some(version(1, 70))),
+            (version(1000, 0), version(3, 280), Some(version(3, 280))),
+            (version(0, 4095), version(3, 280), None),
+            (0, version(3, 280), None),
+            (vk::make_api_version(1, 1, 1, 0), version(3, 280), None),
+            (u32::MAX, version(3, 280), None),
+        ] {
+            assert_eq!(usable_version(stated, loader), usable, "{stated} {loader}");
         }
     }
 }

@@ -30,6 +30,47 @@ pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
     }
 }
 
+/// The parameter of a time within a span as a function of the seconds from the span's start.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InSeconds {
+    /// A power of two, by which seconds are multiplied before they are rounded to f32. It is 1 unless the span is so
+    /// short that [`round_f32`] would make 0 of its seconds, or so long that it would make 0 of the scale: then all
+    /// samples would be at the middle.
+    pub(crate) unit: f64,
+    /// Half the span's length, in seconds times `unit`.
+    pub(crate) half: f64,
+    /// parameter = (seconds × unit - half) × scale
+    pub(crate) scale: f32,
+}
+
+/// The constants of a span of this length.
+#[inline(always)]
+pub(crate) fn in_seconds(seconds: f64) -> InSeconds {
+    let unit = match (SHORT..=LONG).contains(&seconds) {
+        true => 1.0,
+        false => reciprocal_power_of_two(seconds),
+    };
+    let length = seconds * unit;
+    InSeconds {
+        unit,
+        half: length * 0.5,
+        scale: finite_scale(1.0 / length),
+    }
+}
+
+/// Spans of 2^-40 s to 2^62 s keep the unit of a second: their reciprocals are at least 2^-62, and the 2^-64 s around the
+/// middle that become 0 are less than a rounding of the parameter.
+const SHORT: f64 = 1.0 / (1u64 << 40) as f64;
+const LONG: f64 = (1u64 << 62) as f64;
+
+/// One divided by the largest power of two that does not exceed `x`, which is positive; at most 2^1023.
+#[cold]
+fn reciprocal_power_of_two(x: f64) -> f64 {
+    const BIAS: u64 = 1023;
+    let exponent = x.to_bits() >> 52;
+    f64::from_bits((2 * BIAS - exponent.min(2 * BIAS - 1)) << 52)
+}
+
 /// Rounds a scale to a finite f32. Only a segment much shorter than a frame exceeds f32; it contains at most the
 /// frame at distance 0, for which an infinite scale would give NaN.
 #[inline(always)]

@@ -98,8 +98,9 @@ pub(crate) enum Distance {
     Near { first: f32 },
     /// As `Near`, for numbers of frames that may be inexact in f32.
     Frames { first: i32 },
-    /// Seconds from the middle, which is `half` a length after `start`, to a sample's explicit time.
-    Seconds { start: f64, half: f64 },
+    /// From the middle to a sample's explicit time, in seconds times `unit`; the middle is `half` after `start`, in
+    /// seconds times `unit` ([`InSeconds`](crate::time::frame_clock::InSeconds)).
+    Seconds { start: f64, unit: f64, half: f64 },
 }
 
 impl Distance {
@@ -110,7 +111,7 @@ impl Distance {
             Self::Near { first } => first + j as f32,
             // An integer converts with one rounding, like the shader's sum of two exact halves.
             Self::Frames { first } => first.wrapping_add(j as i32) as f32,
-            Self::Seconds { start, half } => round_f32((time() - start) - half),
+            Self::Seconds { start, unit, half } => round_f32((time() - start) * unit - half),
         }
     }
 }

@@ -7,7 +7,7 @@ use bytemuck::Zeroable as _;
 
 use crate::math::canonical::round_f32;
 use crate::time::error::SampleTimesError;
-use crate::time::frame_clock::{CopyPosition, FrameClock, TrackCopy, finite_scale};
+use crate::time::frame_clock::{CopyPosition, FrameClock, InSeconds, TrackCopy, in_seconds};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::moment::Moment;
 use crate::time::runs::{
@@ -459,9 +459,9 @@ impl Spans {
                 RunSource::Exact { index, parameter }
             }
             SpanSource::Segment(index) => {
-                let half = seconds * 0.5;
-                let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
-                let distance = Distance::Seconds { start, half };
+                let InSeconds { unit, half, scale } = in_seconds(seconds);
+                let distance = Distance::Seconds { start, unit, half };
+                let offset = 0.0;
                 RunSource::Segment(index, distance, Affine { scale, offset })
             }
         }

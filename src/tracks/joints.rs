@@ -1,14 +1,15 @@
 //! Which joints of two clips are the same. All that combines clips of a skeleton matches their joints here.
 
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 
 use crate::tracks::set::{TrackSet, default_name};
 
 /// The names of a clip's joints, and their parents where these are known.
 ///
 /// Joints of two clips are the same if their names are equal. Joints without names are called `box1`, `box2` … by their
-/// index, so that joints of two clips without any names are matched by index. `joint0`, `joint1` …, as BVH files call joints
-/// without names, are the same names if all joints have them.
+/// index, so that joints of two clips without any names are matched by index. If all joints of one clip have such names,
+/// and those of the other are `joint0`, `joint1` …, as BVH files call joints without names, they are matched by number.
 ///
 /// ```
 /// use tumble::Joints;
@@ -23,16 +24,17 @@ use crate::tracks::set::{TrackSet, default_name};
 /// );
 /// # Ok::<(), tumble::JointMatchError>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Joints {
     /// A name for each joint, also for those without one.
     names: Vec<String>,
-    /// The names by which joints are matched.
-    keys: Vec<String>,
     /// Whether any joint has a name.
     is_named: bool,
     /// The index of each joint's parent; `None` if the parents are not known.
     parents: Option<Vec<Option<usize>>>,
+    /// The index of each joint by its name, kept by [`Joints::extend`]: without it, each of thousands of clips would
+    /// look at all joints of those before. Empty until it is needed.
+    by_name: HashMap<String, usize>,
 }
 
 /// Pairs of joints of two clips that are the same.
@@ -43,6 +45,17 @@ pub struct JointPairs {
     pub pairs: Vec<[usize; 2]>,
     /// The joints that only the first clip has, and those that only the second has.
     pub missing: [Vec<usize>; 2],
+}
+
+impl JointPairs {
+    /// The joints of two clips that have the same `count` joints in the same order.
+    #[must_use]
+    pub fn in_order(count: usize) -> Self {
+        Self {
+            pairs: (0..count).map(|joint| [joint; 2]).collect(),
+            ..Self::default()
+        }
+    }
 }
 
 /// Why joints of two clips are not the same.
@@ -137,15 +150,10 @@ impl Joints {
                 *name = default_name(joint);
             }
         }
-        let keys = match &numbered(&names)[..] {
-            [] => names.clone(),
-            numbers => numbers.iter().map(|&number| default_name(number)).collect(),
-        };
         Self {
             names,
-            keys,
             is_named,
-            parents: None,
+            ..Self::default()
         }
     }
 
@@ -187,15 +195,14 @@ impl Joints {
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
     pub fn pairs(&self, other: &Self, clips: [&str; 2]) -> Result<JointPairs, JointMatchError> {
-        if self.keys == other.keys {
-            return Ok(JointPairs {
-                pairs: (0..self.len()).map(|joint| [joint; 2]).collect(),
-                ..JointPairs::default()
-            });
+        let others = self.names_of(other);
+        if self.names == *others {
+            return Ok(JointPairs::in_order(self.len()));
         }
-        let [of_first, of_second] = [self.by_name(clips[0])?, other.by_name(clips[1])?];
-        let partner = |joint: usize| of_second.get(&*self.keys[joint]);
-        let lone = |joint: &usize| !of_first.contains_key(&*other.keys[*joint]);
+        let of_first = by_name(&self.names, clips[0])?;
+        let of_second = by_name(&others, clips[1])?;
+        let partner = |joint: usize| of_second.get(&*self.names[joint]);
+        let lone = |joint: &usize| !of_first.contains_key(&*others[*joint]);
         Ok(JointPairs {
             pairs: (0..self.len())
                 .filter_map(|joint| Some([joint, *partner(joint)?]))
@@ -207,6 +214,74 @@ impl Joints {
                 (0..other.len()).filter(lone).collect(),
             ],
         })
+    }
+
+    /// Adds the joints of the other clip that this one does not have, behind those that it has, and returns the index
+    /// here of each joint of the other. `clips` are what this clip and the other are called in messages. Joints whose
+    /// parents are not known become roots.
+    ///
+    /// # Errors
+    /// As [`Joints::pairs`]; also when a joint of both has another parent in the other clip. The joints are then unchanged.
+    pub fn extend(
+        &mut self,
+        other: &Self,
+        clips: [&str; 2],
+    ) -> Result<Vec<usize>, JointMatchError> {
+        let (before, others) = (self.len(), self.names_of(other));
+        let mut added: Vec<String> = Vec::new();
+        let indices: Vec<usize> = if self.names == *others {
+            (0..before).collect()
+        } else {
+            if self.by_name.len() < before {
+                let known = by_name(&self.names, clips[0])?.into_iter();
+                self.by_name = known
+                    .map(|(name, joint)| (name.to_owned(), joint))
+                    .collect();
+            }
+            by_name(&others, clips[1])?;
+            let index_of = |name: &String| {
+                self.by_name.get(name).copied().unwrap_or_else(|| {
+                    added.push(name.clone());
+                    before + added.len() - 1
+                })
+            };
+            others.iter().map(index_of).collect()
+        };
+        let tracks = indices.iter().enumerate();
+        let shared = tracks.filter(|&(_, &joint)| joint < before);
+        let shared = JointPairs {
+            pairs: shared.map(|(track, &joint)| [joint, track]).collect(),
+            ..JointPairs::default()
+        };
+        self.check_parents(other, &shared, clips)?;
+        let parents = self.parents.get_or_insert_default();
+        parents.resize(before, None);
+        let is_added = |track: &usize| indices[*track] >= before;
+        parents.extend((0..other.len()).filter(is_added).map(|track| {
+            let parent = other.parents.as_ref()?.get(track).copied().flatten()?;
+            indices.get(parent).copied()
+        }));
+        let numbered = (before..).zip(&added);
+        (self.by_name).extend(numbered.map(|(joint, name)| (name.clone(), joint)));
+        self.names.append(&mut added);
+        self.is_named |= other.is_named;
+        Ok(indices)
+    }
+
+    /// The names of the other clip's joints as this clip calls them: its own, unless those of one clip are numbered and
+    /// those of the other are default names.
+    fn names_of<'a>(&self, other: &'a Self) -> Cow<'a, [String]> {
+        let renamed = [
+            (default_name as Numbering, bvh_name as Numbering),
+            (bvh_name, default_name),
+        ]
+        .into_iter()
+        .find_map(|(own, others)| {
+            let numbers = numbers_of(&other.names, others)?;
+            numbers_of(&self.names, own)?;
+            Some(numbers.into_iter().map(own).collect())
+        });
+        renamed.map_or(Cow::Borrowed(&other.names), Cow::Owned)
     }
 
     /// For each joint of this clip, the index of the same joint in the other. Both have the same joints with the same
@@ -226,7 +301,7 @@ impl Joints {
             return Err(self.missing(joint, other, clips));
         }
         self.check_extra(other, &matched, clips)?;
-        self.check_parents(other, &matched.pairs, &matched.pairs, clips)?;
+        self.check_parents(other, &matched, clips)?;
         Ok(matched.pairs.into_iter().map(|[_, joint]| joint).collect())
     }
 
@@ -246,23 +321,37 @@ impl Joints {
         })
     }
 
-    /// Refuses those of some pairs of joints whose parents are not a pair in `all`. If the parents of either clip are
-    /// not known, nothing is refused.
+    /// Refuses pairs of joints whose parents are not such a pair. If the parents of either clip are not known, nothing is
+    /// refused.
     ///
     /// # Errors
     /// The first joint with another parent.
     pub fn check_parents(
         &self,
         other: &Self,
-        some: &[[usize; 2]],
-        all: &[[usize; 2]],
+        matched: &JointPairs,
+        clips: [&str; 2],
+    ) -> Result<(), JointMatchError> {
+        self.check_parents_of(other, matched, |_| true, clips)
+    }
+
+    /// As [`Joints::check_parents`], but only refuses pairs for which `is_checked` is true.
+    ///
+    /// # Errors
+    /// The first of these joints with another parent.
+    pub fn check_parents_of(
+        &self,
+        other: &Self,
+        matched: &JointPairs,
+        is_checked: impl Fn([usize; 2]) -> bool,
         clips: [&str; 2],
     ) -> Result<(), JointMatchError> {
         let (Some(parents), Some(others)) = (&self.parents, &other.parents) else {
             return Ok(());
         };
-        let partners: HashMap<usize, usize> = all.iter().map(|pair| (pair[0], pair[1])).collect();
-        for &[joint, same] in some {
+        let pairs = &matched.pairs;
+        let partners: HashMap<usize, usize> = pairs.iter().map(|pair| (pair[0], pair[1])).collect();
+        for &[joint, same] in pairs.iter().filter(|&&pair| is_checked(pair)) {
             let parent = parents.get(joint).copied().flatten();
             let others = others.get(same).copied().flatten();
             let is_same = match (parent, others) {
@@ -283,20 +372,6 @@ impl Joints {
             }
         }
         Ok(())
-    }
-
-    /// The indices of joints by name.
-    fn by_name(&self, clip: &str) -> Result<HashMap<&str, usize>, JointMatchError> {
-        let mut indices = HashMap::with_capacity(self.len());
-        for (joint, name) in self.keys.iter().enumerate() {
-            if indices.insert(&**name, joint).is_some() {
-                return Err(JointMatchError::Repeated {
-                    clip: clip.to_owned(),
-                    name: name.clone(),
-                });
-            }
-        }
-        Ok(indices)
     }
 
     /// The error that the other clip has no joint like one of this clip.
@@ -325,20 +400,44 @@ impl Joints {
     }
 }
 
-/// The number of each joint if all are called `joint0`, `joint1` … in any order, as BVH files call joints without names;
-/// otherwise empty.
-fn numbered(names: &[String]) -> Vec<usize> {
-    let number = |name: &String| {
-        let number: usize = name.strip_prefix("joint")?.parse().ok()?;
-        (number < names.len()).then_some(number)
-    };
-    let numbers: Vec<usize> = names.iter().map_while(number).collect();
-    let mut is_known = vec![false; names.len()];
-    numbers.iter().for_each(|&number| is_known[number] = true);
-    match is_known.iter().all(|&known| known) {
-        true => numbers,
-        false => Vec::new(),
+/// The indices of joints by name.
+fn by_name<'a>(
+    names: &'a [String],
+    clip: &str,
+) -> Result<HashMap<&'a str, usize>, JointMatchError> {
+    let mut indices = HashMap::with_capacity(names.len());
+    for (joint, name) in names.iter().enumerate() {
+        if indices.insert(&**name, joint).is_some() {
+            return Err(JointMatchError::Repeated {
+                clip: clip.to_owned(),
+                name: name.clone(),
+            });
+        }
     }
+    Ok(indices)
+}
+
+/// A name for each joint by its index.
+type Numbering = fn(usize) -> String;
+
+/// What BVH files call a joint without a name.
+fn bvh_name(joint: usize) -> String {
+    format!("joint{joint}")
+}
+
+/// The index that each name has in a numbering; `None` if a name has none, two have the same, or there are no names.
+fn numbers_of(names: &[String], numbering: Numbering) -> Option<Vec<usize>> {
+    let mut seen = HashSet::with_capacity(names.len());
+    let number = |name: &String| {
+        let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let number: usize = digits.parse().ok()?;
+        // Numbers from 0 or from 1.
+        let indices = [Some(number), number.checked_sub(1)];
+        let index = (indices.into_iter().flatten()).find(|&index| numbering(index) == *name)?;
+        seen.insert(index).then_some(index)
+    };
+    let numbers: Vec<usize> = names.iter().map(number).collect::<Option<_>>()?;
+    (!numbers.is_empty()).then_some(numbers)
 }
 
 /// Whether two names differ only in case, in what separates their words, or in a prefix such as `mixamorig:`.
@@ -397,9 +496,87 @@ mod tests {
         let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
         assert_eq!(unnamed(3).order_of(&of_bvh, LABELS).unwrap(), [0, 2, 1]);
         assert_eq!(of_bvh.names(), ["joint0", "joint2", "joint1"]);
+        assert_eq!(of_bvh.order_of(&unnamed(3), LABELS).unwrap(), [0, 2, 1]);
+        let part = Joints::named(["joint0", "joint2"]);
+        let matched = unnamed(3).pairs(&part, LABELS).unwrap();
+        assert_eq!(matched.pairs, [[0, 0], [2, 1]]);
+        assert_eq!(matched.missing, [vec![1], vec![]]);
         let text = "b has a joint `hip`, but the joints of a have no names; name both, or neither to match them by \
                     index";
         refused(&unnamed(2), &chain(&["hip", "arm"]), text);
+    }
+
+    /// Names like those that BVH files give are names as any others beside clips that have names.
+    #[test]
+    fn numbered_names_match_where_they_are_equal() {
+        let two = Joints::named(["joint0", "joint1"]);
+        for (other, more) in [
+            (["joint0", "joint1", "tool"], 2),
+            (["tool", "joint0", "joint1"], 0),
+            (["joint0", "joint1", "joint2"], 2),
+        ] {
+            let other = Joints::named(other);
+            let matched = two.pairs(&other, LABELS).unwrap();
+            let first = usize::from(more == 0);
+            assert_eq!(matched.pairs, [[0, first], [1, first + 1]]);
+            assert_eq!(matched.missing, [vec![], vec![more]]);
+            let back = other.pairs(&two, LABELS).unwrap();
+            assert_eq!(back.pairs, [[first, 0], [first + 1, 1]]);
+        }
+        let gap = Joints::named(["joint0", "joint2"]);
+        let matched = two.pairs(&gap, LABELS).unwrap();
+        assert_eq!(matched.pairs, [[0, 0]]);
+        assert_eq!(matched.missing, [vec![1], vec![1]]);
+        refused(
+            &two,
+            &gap,
+            "a has a joint `joint1`, b has none of that name",
+        );
+        // Only exact numbers are numbers.
+        let padded = Joints::named(["joint00", "joint1"]);
+        let text = "b has a joint `joint00`, but the joints of a have no names; name both, or neither to match them by \
+                    index";
+        refused(&Joints::named(["", ""]), &padded, text);
+    }
+
+    #[test]
+    fn joints_that_are_new_follow_the_others() {
+        let mut all = chain(&["hip", "arm"]);
+        let tree = |names: [&str; 3], parents: [Option<usize>; 3]| {
+            Joints::named(names).with_parents(parents.to_vec())
+        };
+        let other = tree(["tail", "hip", "hand"], [Some(1), None, Some(0)]);
+        assert_eq!(all.extend(&other, LABELS).unwrap(), [2, 0, 3]);
+        assert_eq!(all.names(), ["hip", "arm", "tail", "hand"]);
+        assert_eq!(
+            all.parents.as_deref().unwrap(),
+            [None, Some(0), Some(0), Some(2)]
+        );
+        assert_eq!(all.extend(&other, LABELS).unwrap(), [2, 0, 3]);
+        // After an error nothing has changed.
+        let wrong = tree(["toe", "arm", "hip"], [Some(1), None, None]);
+        let error = all.extend(&wrong, LABELS).unwrap_err();
+        let text = "`arm` has the parent `hip` in a, but is a root in b";
+        assert_eq!(error.to_string(), text);
+        let twice = chain(&["hip", "toe", "toe"]);
+        assert!(all.extend(&twice, LABELS).is_err());
+        assert_eq!((all.len(), all.by_name.len()), (4, 4));
+        assert_eq!(all.parents.as_ref().map(Vec::len), Some(4));
+        // Joints without names are numbered as those before, and stay without names.
+        let mut unnamed = Joints::named(["", ""]);
+        let of_bvh = Joints::named(["joint2", "joint0", "joint1"]);
+        assert_eq!(unnamed.extend(&of_bvh, LABELS).unwrap(), [2, 0, 1]);
+        assert_eq!(unnamed.names(), ["box1", "box2", "box3"]);
+        let mut unnamed = Joints::named([""]);
+        assert_eq!(
+            unnamed.extend(&Joints::named(["", ""]), LABELS).unwrap(),
+            [0, 1]
+        );
+        assert!(!unnamed.is_named());
+        // Of names that occur twice, only equal lists can be matched.
+        let mut twice = chain(&["hip", "toe", "toe"]);
+        assert_eq!(twice.extend(&twice.clone(), LABELS).unwrap(), [0, 1, 2]);
+        assert!(twice.extend(&chain(&["hip", "toe"]), LABELS).is_err());
     }
 
     #[test]

@@ -297,6 +297,12 @@ impl TrackSet {
         self.span
     }
 
+    /// Whether these are all tracks in their order, so that [`TrackSet::select`] would make an equal set.
+    #[must_use]
+    pub fn is_in_order(&self, tracks: &[usize]) -> bool {
+        tracks.iter().copied().eq(0..self.track_count())
+    }
+
     /// Makes a set of some tracks, such as `0..10` or a list, in this order.
     ///
     /// # Errors

@@ -38,6 +38,20 @@ fn libraries_refuse_what_does_not_fit() {
             joints: 1
         }
     );
+    // Joints without names are counted, also once a clip has determined them.
+    let mut unnamed = CrowdLibrary::new(&single).unwrap();
+    unnamed.push(&one(1.0), method::SLERP, linear).unwrap();
+    let mut two = one(1.0);
+    let keys = two.track(0).keys.to_vec();
+    let times = two.track(0).times.to_vec();
+    two.push("", &times, &keys).unwrap();
+    assert_eq!(
+        unnamed.push(&two, method::SLERP, linear).unwrap_err(),
+        CrowdError::Tracks {
+            tracks: 2,
+            joints: 1
+        }
+    );
     let refused = library.push(&one(1e6), method::SLERP, linear).unwrap_err();
     assert!(matches!(refused, CrowdError::TooLong { .. }), "{refused}");
     let velocity = Interpolation {

@@ -1,7 +1,7 @@
 //! Libraries of clips for one skeleton.
 
 use std::ffi::{CString, c_char};
-use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{OnceLock, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use glam::{Affine3A, Mat3A, Vec3A};
 use tumble::crowd::CrowdLibrary;
@@ -22,8 +22,8 @@ use crate::skeleton::joints;
 pub struct TumbleCrowdLibrary {
     inner: RwLock<CrowdLibrary>,
     pub(crate) skeleton: ClipSkeleton,
-    /// The names of the joints; empty in libraries that were made from arrays.
-    names: Vec<CString>,
+    /// The names of the joints; unset until the library knows them. They stay where they are, because C reads them.
+    names: OnceLock<Vec<CString>>,
 }
 
 impl Object for TumbleCrowdLibrary {
@@ -37,9 +37,7 @@ impl TumbleCrowdLibrary {
         let parents = rest.clone().map(|joint| joint.parent).collect();
         let offsets = rest.map(|joint| joint.rest.translation).collect();
         let mut skeleton = Skeleton::new(parents, offsets)?;
-        let mut names = vec![CString::default(); skeleton.len()];
         if joints.is_named() {
-            names = joints.names().iter().map(|name| c_text(name)).collect();
             skeleton = skeleton.with_names(joints.names())?;
         }
         let library = match ticks_per_second {
@@ -49,8 +47,19 @@ impl TumbleCrowdLibrary {
         Ok(Self {
             inner: RwLock::new(library),
             skeleton: joints,
-            names,
+            names: OnceLock::new(),
         })
+    }
+
+    /// The names of the joints; `None` until the skeleton or the first clip determines them.
+    fn names(&self) -> Result<Option<&[CString]>, Failure> {
+        if self.names.get().is_none()
+            && let names @ [_, ..] = self.read()?.joint_names()
+        {
+            let names = names.iter().map(|name| c_text(name)).collect();
+            self.names.get_or_init(|| names);
+        }
+        Ok(self.names.get().map(Vec::as_slice))
     }
 
     pub(crate) fn read(&self) -> Result<RwLockReadGuard<'_, CrowdLibrary>, Failure> {
@@ -257,7 +266,7 @@ pub extern "C" fn tumble_crowd_library_set_reference(
 /// Returns the number of joints; 0 if the handle is invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_count(library: *const TumbleCrowdLibrary) -> usize {
-    guarded(|| Ok(handle::get(library)?.names.len())).unwrap_or(0)
+    guarded(|| Ok(handle::get(library)?.skeleton.joints().len())).unwrap_or(0)
 }
 
 /// Returns the number of clips; 0 if the handle is invalid.
@@ -291,8 +300,10 @@ pub extern "C" fn tumble_crowd_library_clip_ticks(
     ticks.unwrap_or(0)
 }
 
-/// Returns the name of a joint, empty in a library of `tumble_crowd_library_new`: UTF-8, valid until the library is
-/// freed; null if there is no such joint.
+/// Returns the name of a joint: UTF-8, valid until the library is freed; null if there is no such joint.
+///
+/// In a library of `tumble_crowd_library_new` names are empty until the first set is added, whose names the joints then
+/// have. A joint without a name is `box1`, `box2` … by its index.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_name(
     library: *const TumbleCrowdLibrary,
@@ -300,12 +311,13 @@ pub extern "C" fn tumble_crowd_library_joint_name(
 ) -> *const c_char {
     let name = guarded(|| {
         let library = handle::get(library)?;
-        let count = library.names.len();
-        let found = library.names.get(joint).map(|name| name.as_ptr());
-        found.ok_or_else(|| {
+        let count = library.skeleton.joints().len();
+        if joint >= count {
             let message = format!("there is no joint {joint}; the library has {count}");
-            Failure::new(TumbleResult::OutOfRange, message)
-        })
+            return Err(Failure::new(TumbleResult::OutOfRange, message));
+        }
+        let name = library.names()?.and_then(|names| names.get(joint));
+        Ok(name.map_or(c"", CString::as_c_str).as_ptr())
     });
     name.unwrap_or(std::ptr::null())
 }
@@ -326,7 +338,7 @@ pub unsafe extern "C" fn tumble_crowd_library_parents(
 ) -> TumbleResult {
     code(|| {
         let library = handle::get(library)?;
-        let joints = library.names.len();
+        let joints = library.skeleton.joints().len();
         if joint_count != joints {
             let message =
                 format!("`joint_count` is {joint_count}; the library has {joints} joints");

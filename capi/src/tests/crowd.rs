@@ -1,13 +1,13 @@
 //! Crowds through the interface of C: the bits of the engine's own.
 
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, CString, c_char};
 use std::ptr::{null, null_mut};
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
 use tumble::crowd::{Crowd, CrowdFade, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
 use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
-use super::{cpu, defaults, words};
+use super::{cpu, defaults, fails, words};
 use crate::crowd::fade::*;
 use crate::crowd::layer::*;
 use crate::crowd::library::*;
@@ -78,14 +78,19 @@ fn c_set(tracks: &TrackSet) -> *mut TumbleSet {
         for track in tracks.tracks() {
             let keys: Vec<[f32; 4]> = track.keys.iter().map(Quat::to_array).collect();
             let (times, keys) = (track.times.as_ptr(), keys.as_ptr().cast());
-            done(tumble_set_push(set, null(), times, keys, track.times.len()));
+            let name = track.name.map(|name| CString::new(name).unwrap());
+            let name = name.as_ref().map_or(null(), |name| name.as_ptr());
+            done(tumble_set_push(set, name, times, keys, track.times.len()));
         }
-        let channels: [(_, _, unsafe extern "C" fn(_, _, _, _, _, _) -> _); 2] = [
-            (tumble::Channel::Translation, 1, tumble_set_translations),
-            (tumble::Channel::Scale, 0, tumble_set_scales),
+        let channels: [(_, unsafe extern "C" fn(_, _, _, _, _, _) -> _); 2] = [
+            (tumble::Channel::Translation, tumble_set_translations),
+            (tumble::Channel::Scale, tumble_set_scales),
         ];
-        for (channel, track, give) in channels {
-            let vectors = tracks.vector_keys(channel, track).unwrap();
+        let all = (0..tracks.track_count()).flat_map(|track| channels.map(|it| (track, it)));
+        for (track, (channel, give)) in all {
+            let Some(vectors) = tracks.vector_keys(channel, track) else {
+                continue;
+            };
             let keys: Vec<[f32; 3]> = vectors.keys.iter().map(Vec3::to_array).collect();
             let tangents: Vec<[[f32; 3]; 2]> =
                 (vectors.tangents.iter().map(|both| both.map(Vec3::into))).collect();
@@ -537,4 +542,88 @@ fn fades_and_lists_are_those_of_the_engine() {
         done(tumble_engine_free(engine));
     }
     done(tumble_crowd_library_free(library));
+}
+
+/// Tracks with other names than the library's joints, or in another order.
+#[test]
+fn sets_are_matched_to_the_joints_by_name() {
+    const NAMES: [&str; 4] = ["knee", "hip", "arm", "crate"];
+    let [first, second] = [0, 1].map(set);
+    let named = |set: &TrackSet, names: [&str; 4]| {
+        let mut set = set.clone();
+        for (track, name) in names.into_iter().enumerate() {
+            set.set_name(track, name).unwrap();
+        }
+        set
+    };
+    let order = [3, 1, 0, 2];
+    let mut library = null_mut();
+    let (parents, offsets) = (PARENTS.as_ptr(), OFFSETS.as_ptr().cast());
+    // SAFETY: pointers to as many numbers as stated, and room for the handle.
+    done(unsafe { tumble_crowd_library_new(parents, offsets, 4, 0, &raw mut library) });
+    let name = |joint: usize| {
+        let name = tumble_crowd_library_joint_name(library, joint);
+        // SAFETY: the library is alive.
+        unsafe { CStr::from_ptr(name) }.to_str().unwrap()
+    };
+    assert_eq!([0, 1, 2, 3].map(name), [""; 4]);
+    // The first set names the joints, whose order it has; the second has its tracks in another one.
+    let shuffled = named(&second, NAMES).select(order).unwrap();
+    for tracks in [&named(&first, NAMES), &shuffled] {
+        let set = c_set(tracks);
+        done(push(library, set, None));
+        done(tumble_set_free(set));
+    }
+    assert_eq!([0, 1, 2, 3].map(name), NAMES);
+    let refused = |tracks: &TrackSet, says: &str| {
+        let set = c_set(tracks);
+        fails(push(library, set, None), TumbleResult::InvalidInput, says);
+        done(tumble_set_free(set));
+    };
+    refused(
+        &named(&second, NAMES).select(0..3).unwrap(),
+        "the library has a joint `crate`, the clip has none of that name",
+    );
+    refused(
+        &named(&second, ["knee", "Root", "arm", "crate"]),
+        "the library has a joint `hip`, the clip has none of that name",
+    );
+    refused(
+        &second,
+        "the library has a joint `knee`, but the joints of the clip have no names",
+    );
+    assert_eq!(tumble_crowd_library_clip_count(library), 2);
+    // The same clips with their tracks in the order of the joints.
+    let parents = PARENTS.map(|parent| usize::try_from(parent).ok());
+    let skeleton = Skeleton::new(parents.to_vec(), OFFSETS.map(Vec3::from).to_vec()).unwrap();
+    let mut rust_library = CrowdLibrary::new(&skeleton).unwrap();
+    for set in [&first, &second] {
+        let pushed = rust_library.push(set, method::SLERP, VectorMethod::Linear);
+        pushed.unwrap();
+    }
+    let engine = cpu();
+    let crowd = c_crowd(engine, library, (2, 1));
+    let mut rust_crowd = rust_crowd(&rust_library, (2, 1));
+    let clips = [0, 1].map(|clip| TumbleCrowdLayer {
+        instance: clip,
+        clip,
+        time: 500_000,
+        ..still()
+    });
+    done(set_layers(crowd, &clips));
+    for (instance, plays) in clips.iter().enumerate() {
+        let layer = CrowdLayer {
+            speed: plays.speed,
+            ..CrowdLayer::new(plays.clip).at(plays.time)
+        };
+        rust_crowd.set(instance, 0, layer).unwrap();
+    }
+    let output = CrowdOutput::from(CrowdValues::Model);
+    assert_eq!(
+        bits(crowd, output, false),
+        rust_bits(&mut rust_crowd, output)
+    );
+    done(tumble_crowd_free(crowd));
+    done(tumble_crowd_library_free(library));
+    done(tumble_engine_free(engine));
 }

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::reference::angle_between;
-use tumble::{Channel, Engine, FrameRate, JointMatchError, Joints, SampleTimes};
+use tumble::{Channel, Engine, FrameRate, JointMatchError, JointPairs, Joints, SampleTimes};
 
 use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
@@ -15,7 +15,7 @@ use crate::sample::{ChannelMethods, Samples};
 use crate::world::world;
 
 /// Time spans whose ends differ by less than this are equal, in seconds: f32 times of some hours are not more exact.
-const SAME_TIME: f64 = 1e-3;
+const SAME_END: f64 = 1e-3;
 
 /// Two clips to compare.
 #[derive(Debug, Clone, Copy)]
@@ -144,7 +144,7 @@ impl ClipPair<'_> {
         let on_clock = |span: [f64; 2]| span.map(|time| time + clock);
         let start = spans[0][0].max(spans[1][0]);
         let end = spans[0][1].min(spans[1][1]);
-        let differs = |end: usize| (spans[0][end] - spans[1][end]).abs() > SAME_TIME;
+        let differs = |end: usize| (spans[0][end] - spans[1][end]).abs() > SAME_END;
         let is_longer = differs(0) || differs(1);
         if is_longer && start > end {
             return Err(CompareError::NoTimeInBoth {
@@ -221,7 +221,7 @@ impl ClipPair<'_> {
         let times: Vec<f64> = times.collect();
         let low = times.iter().copied().fold(f64::INFINITY, f64::min);
         let high = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let within = common.start - SAME_TIME..=common.end + SAME_TIME;
+        let within = common.start - SAME_END..=common.end + SAME_END;
         let shared: Vec<f64> = times.into_iter().filter(|it| within.contains(it)).collect();
         match shared.is_empty() {
             true => Err(self.no_common_time(common, low, high)),
@@ -251,11 +251,15 @@ impl ClipPair<'_> {
         in_world: bool,
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
-        let (pairs, missing) = self.tracks()?;
+        let found = self.matched_joints()?;
+        self.check_any_pair(&found)?;
         if !in_world {
-            self.check_parents(motions)?;
+            let [first, second] = &found.joints;
+            first.check_parents(second, &found.matched, inputs)?;
             self.check_spaces()?;
         }
+        let missing = found.missing();
+        let pairs = found.matched.pairs;
         let (first, of_first) = poses(engine, inputs[0], motions[0], frames, in_world)?;
         let shift = self.shift();
         let moved;
@@ -411,66 +415,70 @@ impl ClipPair<'_> {
     /// # Errors
     /// The first track with another parent.
     pub fn check_parents(&self, parts: [&Motion; 2]) -> Result<(), CompareError> {
-        let joints = self.clips.map(Motion::joints);
+        let MatchedJoints { joints, matched } = self.matched_joints()?;
         let selected = parts.map(|part| -> HashSet<String> {
             let tracks = 0..part.set.track_count();
             tracks.map(|track| part.set.track_name(track)).collect()
         });
-        let (all, _) = self.pairs(&joints)?;
-        let is_selected = |pair: &&[usize; 2]| {
+        let is_selected = |pair: [usize; 2]| {
             (0..2).all(|side| selected[side].contains(&joints[side].names()[pair[side]]))
         };
-        let some: Vec<[usize; 2]> = all.iter().filter(is_selected).copied().collect();
-        joints[0].check_parents(&joints[1], &some, &all, self.inputs)?;
+        let [first, second] = &joints;
+        first.check_parents_of(second, &matched, is_selected, self.inputs)?;
         Ok(())
     }
 
-    /// Pairs of corresponding tracks, and the tracks that only one clip has.
-    fn pairs(&self, joints: &[Joints; 2]) -> Result<TrackPairs, JointMatchError> {
-        let none = || [Vec::new(), Vec::new()];
+    /// The tracks of both clips, matched.
+    fn matched_joints(&self) -> Result<MatchedJoints, JointMatchError> {
+        let joints = self.clips.map(Motion::joints);
         // Two tracks need no name to tell them apart.
-        if joints.iter().all(|side| side.len() == 1) {
-            return Ok((vec![[0, 0]], none()));
-        }
-        // Formats without room for a name that occurs twice number it.
-        let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
-        if first == second {
-            return Ok(((0..first.len()).map(|track| [track; 2]).collect(), none()));
-        }
-        let found = joints[0].pairs(&joints[1], self.inputs)?;
-        Ok((found.pairs, found.missing))
+        let matched = if joints.iter().all(|side| side.len() == 1) {
+            JointPairs::in_order(1)
+        } else {
+            // Formats without room for a name that occurs twice number it.
+            let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
+            match first == second {
+                true => JointPairs::in_order(first.len()),
+                false => joints[0].pairs(&joints[1], self.inputs)?,
+            }
+        };
+        Ok(MatchedJoints { joints, matched })
     }
 
-    /// Pairs of tracks of the same name, and the names of the tracks that only one clip has.
-    #[expect(
-        clippy::type_complexity,
-        reason = "pairs, and a list of names for each side"
-    )]
-    fn tracks(&self) -> Result<(Vec<[usize; 2]>, [Vec<String>; 2]), CompareError> {
-        let joints = self.clips.map(Motion::joints);
-        let (pairs, missing) = self.pairs(&joints)?;
-        if pairs.is_empty() {
-            let error = joints[0].order_of(&joints[1], self.inputs).err();
-            return Err(CompareError::NoTrackInBoth {
-                inputs: self.inputs.map(str::to_owned),
-                tracks: joints.map(|side| side.len()),
-                near: error.and_then(|error| match error {
-                    JointMatchError::Missing { name, near, .. } => Some([name, near?]),
-                    _ => None,
-                }),
-            });
+    /// Refuses clips without a common track.
+    fn check_any_pair(&self, found: &MatchedJoints) -> Result<(), CompareError> {
+        if !found.matched.pairs.is_empty() {
+            return Ok(());
         }
-        let names = [0, 1].map(|side| {
-            let lone = missing[side].iter();
-            lone.map(|&track| joints[side].names()[track].clone())
-                .collect()
-        });
-        Ok((pairs, names))
+        let [first, second] = &found.joints;
+        let error = first.order_of(second, self.inputs).err();
+        Err(CompareError::NoTrackInBoth {
+            inputs: self.inputs.map(str::to_owned),
+            tracks: [first.len(), second.len()],
+            near: error.and_then(|error| match error {
+                JointMatchError::Missing { name, near, .. } => Some([name, near?]),
+                _ => None,
+            }),
+        })
     }
 }
 
-/// Pairs of tracks, and the tracks that only one of two clips has.
-type TrackPairs = (Vec<[usize; 2]>, [Vec<usize>; 2]);
+/// The joints of two clips, and which are the same.
+struct MatchedJoints {
+    joints: [Joints; 2],
+    matched: JointPairs,
+}
+
+impl MatchedJoints {
+    /// The names of the joints that only one clip has.
+    fn missing(&self) -> [Vec<String>; 2] {
+        [0, 1].map(|side| {
+            let lone = self.matched.missing[side].iter();
+            lone.map(|&track| self.joints[side].names()[track].clone())
+                .collect()
+        })
+    }
+}
 
 /// Numbers the frames of a clip, from 0 at its first key.
 #[derive(Debug, Clone, Copy)]

@@ -18,6 +18,7 @@ use glam::Quat;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{LogicalDevice, QueueLane};
+use crate::gpu::device_queue::DeviceQueue;
 use crate::gpu::engine::from_keys::KeyUploads;
 use crate::gpu::error::{EvaluateError, Named as _, VulkanError};
 use crate::gpu::handles::VulkanHandles;
@@ -133,7 +134,7 @@ impl VulkanEngine {
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
         use vk::QueueFlags as Flags;
-        handles.check()?;
+        let version = handles.check()?;
         let instance = Instance::borrowed(handles.entry, handles.instance);
         // SAFETY: the instance is valid, as the caller promises.
         let known = unsafe { instance.raw.enumerate_physical_devices() };
@@ -154,7 +155,7 @@ impl VulkanEngine {
                 return Err(VulkanError::SameQueue);
             }
         }
-        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
+        if version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
             // The application did not enable what the device offers.
             physical.float_controls = FloatControls::default();
         }
@@ -166,7 +167,7 @@ impl VulkanEngine {
         let device = LogicalDevice::with_queues(
             physical,
             handles.device,
-            (handles.queue, handles.queue_lock),
+            DeviceQueue::new(handles.queue, handles.queue_family, handles.queue_lock),
             handles.copy_queue,
             pipelines,
             options,
