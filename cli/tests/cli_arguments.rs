@@ -195,7 +195,7 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
 #[test]
 fn chosen_motion_outside_the_keys_causes_no_warning() {
     let folder = sample_folder();
-    for (range, chosen, told) in [
+    for (range, chosen, is_warned) in [
         ("--start=-1", "", true),
         ("--start=-1", "--before=loop", false),
         ("--start=-1", "--after=loop", true),
@@ -207,7 +207,7 @@ fn chosen_motion_outside_the_keys_causes_no_warning() {
         let warns = run.words.contains("keys lie from 0 to 2 s");
         assert_eq!(
             (run.code, warns),
-            (0, told),
+            (0, is_warned),
             "{range} {chosen}: {}",
             run.words
         );

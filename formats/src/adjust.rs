@@ -159,7 +159,7 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
 ///
 /// # Errors
 /// As [`set_offsets`]; the clips are then unchanged. When a translation with the pelvis added is not a finite f32.
-pub fn place_all(
+pub fn set_all_offsets(
     loaded: &mut Loaded,
     input: &str,
     numbers: &[Vec<f64>],

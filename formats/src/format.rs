@@ -255,7 +255,7 @@ pub struct Loaded {
 pub enum Adjustment {
     /// They were converted to another unit or up axis ([`adjust_all`](crate::adjust::adjust_all)).
     Space,
-    /// Their joints have other offsets ([`place_all`](crate::adjust::place_all)).
+    /// Their joints have other offsets ([`set_all_offsets`](crate::adjust::set_all_offsets)).
     Offsets,
 }
 

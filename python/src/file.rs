@@ -7,7 +7,7 @@ use std::sync::Arc;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, place_all};
+use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
@@ -381,7 +381,7 @@ impl ReadRequest {
         if let Some(offsets) = &self.offsets {
             let of_clips = loaded.clips.iter().map(|clip| offsets.of_clip(clip));
             let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = of_clips.collect();
-            let placed = of_clips.and_then(|numbers| place_all(&mut loaded, &name, &numbers));
+            let placed = of_clips.and_then(|numbers| set_all_offsets(&mut loaded, &name, &numbers));
             placed.map_err(|error| input(format!("offsets: {name}: {error}")))?;
         }
         if let Some(model) = &self.body_model {
@@ -389,7 +389,7 @@ impl ReadRequest {
             let of_clips: Result<Vec<Vec<f64>>, Diagnostic> =
                 loaded.clips.iter().map(of_clip).collect();
             let numbers = of_clips.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
-            let placed = place_all(&mut loaded, &name, &numbers);
+            let placed = set_all_offsets(&mut loaded, &name, &numbers);
             placed.map_err(|error| input(format!("body_model: {name}: {error}")))?;
         }
         if self.scale.is_some() || self.up.is_some() {

@@ -245,7 +245,7 @@ impl Outside {
     }
 
     /// Whether tracks hold their first and their last key outside the keys, the default.
-    pub(crate) fn holds(self) -> [bool; 2] {
+    pub(crate) fn is_default(self) -> [bool; 2] {
         [self.before, self.after].map(|it| it == OutsideArgument::default())
     }
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use tumble::FrameRate;
-use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, place_all};
+use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
@@ -280,7 +280,7 @@ impl ReadingArguments {
             let of_clips = loaded.clips.iter().map(|clip| offsets.of_clip(clip));
             let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = of_clips.collect();
             let placed =
-                of_clips.and_then(|numbers| place_all(loaded, &names::input(path), &numbers));
+                of_clips.and_then(|numbers| set_all_offsets(loaded, &names::input(path), &numbers));
             placed.map_err(|error| {
                 let message = format!("{}: {error}", names::input(path));
                 let file = file.display().to_string();
@@ -292,7 +292,7 @@ impl ReadingArguments {
             let of_clips: Result<Vec<Vec<f64>>, Diagnostic> =
                 loaded.clips.iter().map(of_clip).collect();
             let numbers = of_clips.map_err(|fault| Failure::input(&fault, ""))?;
-            place_all(loaded, &names::input(path), &numbers).map_err(|error| {
+            set_all_offsets(loaded, &names::input(path), &numbers).map_err(|error| {
                 let model = model.display().to_string();
                 let fault = Diagnostic::new(model, Code::BodyModel, error.to_string());
                 Failure::input(&fault, "")

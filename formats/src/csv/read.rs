@@ -91,8 +91,8 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     while sheet.next(&mut reader, &mut record)? {
         sheet.check_width(&record, &names)?;
         // A number of a column or a row's location.
-        let taken = budget.take(columns.len() + 1, size_of::<f64>());
-        taken.map_err(|error| Diagnostic::new(name, Code::Memory, error.to_string()))?;
+        let charged = budget.take(columns.len() + 1, size_of::<f64>());
+        charged.map_err(|error| Diagnostic::new(name, Code::Memory, error.to_string()))?;
         if starts.is_empty()
             && options.time_unit.is_none()
             && let Some((unit, warning)) = sheet.large_unit(&record, &plan)

@@ -142,8 +142,8 @@ impl<R: BufRead> Lines<R> {
         if let Some(budget) = &self.budget {
             let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b',';
             let words = self.buffer.split(is_between);
-            let taken = budget.take(words.filter(|word| !word.is_empty()).count(), NUMBER);
-            taken.map_err(|error| self.refuse_whole(Code::Memory, error.to_string()))?;
+            let charged = budget.take(words.filter(|word| !word.is_empty()).count(), NUMBER);
+            charged.map_err(|error| self.refuse_whole(Code::Memory, error.to_string()))?;
         }
         // Text by now: the check refuses all else.
         let line = String::from_utf8(std::mem::take(&mut self.buffer));
