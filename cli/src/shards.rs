@@ -112,7 +112,7 @@ impl LibraryPlan {
         let shard_bytes = words::parse_bytes(shard_bytes).map_err(Failure::usage)?;
         let mut request = EvaluationRequest::new(&arguments)?;
         if into != "files" {
-            request.options += &format!(" into={into}");
+            request.options.text += &format!(" into={into}");
         }
         let (inputs, sizes): (GatheredInputs, Vec<u64>) = match listed {
             Some(listed) => {
@@ -280,7 +280,7 @@ impl Worker {
     /// The options that determine the results, as manifests contain them.
     #[must_use]
     pub fn options(&self) -> &str {
-        &self.evaluator.request.options
+        &self.evaluator.request.options.text
     }
 
     /// The name by which the results of an input are known, from its path below the library: that of its result,
@@ -573,6 +573,7 @@ mod tests {
             input: "a.glb".to_owned(),
             input_sha256: Some("1".to_owned()),
             options: "o".to_owned(),
+            option_files: Vec::new(),
             kernels_sha256: kernels_sha256().to_owned(),
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: "CPU".to_owned(),

@@ -246,6 +246,82 @@ fn a_result_keeps_its_name_when_another_input_appears_beside_it() {
     assert!(again.words.contains("2 results skipped"), "{}", again.words);
 }
 
+/// A result is replaced if its input has changed, and not by that of another input of the same name.
+#[test]
+fn resuming_does_not_replace_the_result_of_another_input() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    for (from, to) in [
+        ("a.dat", "m1/x.dat"),
+        ("a.dat", "m2/x.dat"),
+        ("a.dat", "m3/x.txt"),
+    ] {
+        fs::create_dir_all(folder.join(to).parent().unwrap()).unwrap();
+        fs::copy(folder.join(from), folder.join(to)).unwrap();
+    }
+    let other = fs::read_to_string(folder.join("a.dat"))
+        .unwrap()
+        .replace("0.5 ", "0.625 ");
+    fs::write(folder.join("m2/x.dat"), &other).unwrap();
+    fs::write(folder.join("m3/x.txt"), &other).unwrap();
+    for (out, shard) in [("out", &[][..]), ("shards", &["--shard", "1/1"])] {
+        let batch = |input: &str, more: &[&str]| {
+            let line = [
+                "eval", input, "--from", "dat", "-o", out, "--resume", "--device", "cpu",
+            ];
+            // One named input of a directory that exists has its result in it.
+            run(folder, &[&line[..], shard, more].concat())
+        };
+        fs::create_dir(folder.join(out)).unwrap();
+        assert_eq!(batch("m1/x.dat", &[]).code, 0);
+        if !shard.is_empty() {
+            succeed(folder, &["merge", out]);
+        }
+        let before = tree(&folder.join(out));
+        for (input, remedy) in [
+            (
+                "m2/x.dat",
+                "give their directory, whose tree is kept, or --base",
+            ),
+            ("m3/x.txt", "give --names full"),
+        ] {
+            let refused = batch(input, &[]);
+            let words = format!("{input}: {out}/x.npy is the result of m1/x.dat; {remedy}");
+            assert!(
+                refused.code != 0 && refused.words.contains(&words),
+                "{}",
+                refused.words
+            );
+            assert_eq!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
+        }
+        // The same bytes make the same result, and so does the same file by another path.
+        fs::copy(folder.join("m1/x.dat"), folder.join("m1/same.dat")).unwrap();
+        fs::create_dir_all(folder.join("m4")).unwrap();
+        fs::copy(folder.join("m1/x.dat"), folder.join("m4/x.dat")).unwrap();
+        for input in ["m4/x.dat", "./m1/x.dat"] {
+            let same = batch(input, &[]);
+            assert_eq!(same.code, 0, "{}", same.words);
+        }
+        // What is asked for is done, and so is what replaces nothing.
+        assert_eq!(batch("m2/x.dat", &["--overwrite"]).code, 0);
+        assert_ne!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
+        if !shard.is_empty() {
+            succeed(folder, &["merge", out]);
+        }
+        fs::rename(folder.join("m2"), folder.join("gone")).unwrap();
+        let replaced = batch("m1/x.dat", &[]);
+        let words = format!(
+            "1 result was made from other inputs, which do not exist any more; the first is {out}/x.npy"
+        );
+        assert!(
+            replaced.code == 0 && replaced.words.contains(&words),
+            "{}",
+            replaced.words
+        );
+        fs::rename(folder.join("gone"), folder.join("m2")).unwrap();
+    }
+}
+
 /// An input that a batch has not come to is not forgotten.
 #[test]
 fn an_unfinished_batch_is_not_called_complete() {

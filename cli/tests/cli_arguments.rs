@@ -52,6 +52,9 @@ const ARGUMENTS: &str = "
 2 | eval --files-from old.npy a.dat -o -         | need a directory
 2 | eval - --files-from - -o out                 | standard input cannot be both
 2 | eval a.dat -o o.npy --resume                 | for a directory of results
+2 | eval a.dat -o o.npy --base .                 | --base is for a directory of results
+2 | eval a.dat -o o.npy --names full             | --names full is for a directory of results
+2 | eval a.dat -o o.npy --shard 1/2              | shards, need a directory
 4 | check none.jsonl                             | none.jsonl
 4 | check a.dat                                  | is not a manifest
 2 | eval a.dat -o o.npy --device vulcan          | vulkan
@@ -186,6 +189,29 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
     let run = without(&["devices"]);
     assert_eq!(run.code, 0);
     assert!(String::from_utf8_lossy(&run.out).contains("mesa-vulkan-drivers"));
+}
+
+/// A warning about times outside the keys is for those who did not say what tracks do there.
+#[test]
+fn chosen_motion_outside_the_keys_causes_no_warning() {
+    let folder = sample_folder();
+    for (range, chosen, is_warned) in [
+        ("--start=-1", "", true),
+        ("--start=-1", "--before=loop", false),
+        ("--start=-1", "--after=loop", true),
+        ("--end=9", "--after=mirror", false),
+    ] {
+        let mut line = vec!["eval", "a.dat", "-o", "o.npy", "--overwrite", range];
+        line.extend(Some(chosen).filter(|it| !it.is_empty()));
+        let run = run(folder.path(), &line);
+        let warns = run.words.contains("keys lie from 0 to 2 s");
+        assert_eq!(
+            (run.code, warns),
+            (0, is_warned),
+            "{range} {chosen}: {}",
+            run.words
+        );
+    }
 }
 
 #[test]

@@ -280,7 +280,8 @@ fn joints_are_matched_by_name_and_parent() {
         ),
         (
             "compare one.bvh a.dat",
-            "have 3 and 2 tracks, none of the same name",
+            "one.bvh has a joint `hip`, but the joints of a.dat have no names; name both, or neither to match them by \
+             index",
         ),
     ] {
         let run = run(folder, &line.split(' ').collect::<Vec<_>>());
@@ -559,6 +560,95 @@ fn walk(folder: &std::path::Path, name: &str, knee: f64) {
         );
     }
     std::fs::write(folder.join(name), text).unwrap();
+}
+
+/// A table has no parents: its rotations relative to parents are none in the world.
+#[test]
+fn rotations_of_unknown_parents_are_not_compared_in_the_world() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    walk(folder, "walk.bvh", 0.0);
+    succeed(folder, &["convert", "walk.bvh", "-o", "walk.csv"]);
+    succeed(
+        folder,
+        &["compare", "walk.bvh", "walk.csv", "--tolerance", "1"],
+    );
+    for pair in [["walk.bvh", "walk.csv"], ["walk.csv", "walk.bvh"]] {
+        let refused = run(folder, &[&["compare"][..], &pair, &["--world"]].concat());
+        let words = "`knee` has a parent in walk.bvh, and walk.csv has no skeleton, so its poses in the world are not \
+                     known; give walk.csv in a format that stores parents";
+        assert!(
+            refused.code == 4 && refused.words.contains(words),
+            "{}",
+            refused.words
+        );
+        let path = [&["compare"][..], &pair, &["--ape", "--tracks", "knee"]].concat();
+        let refused = run(folder, &path);
+        assert!(
+            refused.code == 4 && refused.words.contains(words),
+            "{}",
+            refused.words
+        );
+    }
+    // Without a joint that has a parent, nothing is assumed.
+    succeed(
+        folder,
+        &[
+            "compare", "walk.bvh", "walk.csv", "--world", "--tracks", "hip",
+        ],
+    );
+    // With the parents, the table is where the skeleton is.
+    let world = ["-m", "slerp", "--output", "world", "-o"];
+    let parents = ["--parents", "-1,0"];
+    succeed(
+        folder,
+        &[&["eval", "walk.bvh"][..], &world, &["bvh.npy"]].concat(),
+    );
+    succeed(
+        folder,
+        &[&["eval", "walk.csv"][..], &parents, &world, &["csv.npy"]].concat(),
+    );
+    succeed(
+        folder,
+        &["compare", "bvh.npy", "csv.npy", "--tolerance", "1e-5"],
+    );
+    let again = run(
+        folder,
+        &[&["eval", "walk.bvh"][..], &parents, &world, &["no.npy"]].concat(),
+    );
+    assert!(
+        again
+            .words
+            .contains("has a skeleton, or poses in the world, already"),
+        "{}",
+        again.words
+    );
+}
+
+/// The names of two joints that are called alike say nothing but their order.
+#[test]
+fn joints_of_one_name_are_told_to_be_matched_by_their_order() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let leg = |inside: &str| {
+        format!(
+            "JOINT Leg\n{{\nOFFSET 1 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n{inside}}}\n"
+        )
+    };
+    let write = |name: &str, legs: String| {
+        let rows = "MOTION\nFrames: 2\nFrame Time: 0.5\n0 0 0 0 0 0 0 0 0\n9 0 0 5 0 0 7 0 0\n";
+        let root =
+            "HIERARCHY\nROOT hip\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n";
+        std::fs::write(folder.join(name), format!("{root}{legs}}}\n{rows}")).unwrap();
+    };
+    write("beside.bvh", leg("") + &leg(""));
+    write("chain.bvh", leg(&leg("")));
+    let words = "several joints are called `Leg`; they are matched with those of other clips by their order in the file";
+    let beside = succeed(folder, &["compare", "beside.bvh", "beside.bvh"]);
+    assert!(beside.words.contains(words), "{}", beside.words);
+    // Their parents tell these apart.
+    let chain = succeed(folder, &["compare", "chain.bvh", "chain.bvh"]);
+    assert!(!chain.words.contains(words), "{}", chain.words);
 }
 
 /// The checks that the guides and the help propose hold: a conversion is a copy, between the keys too, and few keys

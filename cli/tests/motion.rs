@@ -220,11 +220,240 @@ fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
     assert!((distance - 0.1).abs() < 1e-6, "{distance}");
 }
 
+/// Legs a unit beside the hip, in three frames.
+const WALK: &str = "\
+HIERARCHY
+ROOT hip
+{
+ OFFSET 0 0 0
+ CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+ JOINT left
+ {
+  OFFSET 1 0 0
+  CHANNELS 3 Zrotation Xrotation Yrotation
+ }
+ JOINT right
+ {
+  OFFSET -1 0 0
+  CHANNELS 3 Zrotation Xrotation Yrotation
+ }
+}
+MOTION
+Frames: 3
+Frame Time: 0.1
+0 1 0 0 0 0 0 10 0 0 20 0
+0 1.1 0 0 5 0 0 15 0 0 10 0
+0 1.2 0 0 9 0 0 20 0 0 5 0
+";
+
+/// The numbers of a CSV's first row, by the names of their columns.
+fn first_row(folder: &Path, file: &str) -> std::collections::HashMap<String, f64> {
+    let line = [
+        "eval",
+        file,
+        "--fps",
+        "10",
+        "--output",
+        "transform",
+        "--to",
+        "csv",
+        "-o",
+        "-",
+    ];
+    let table = String::from_utf8(succeed(folder, &line).out).unwrap();
+    let mut rows = table.lines().map(|row| row.split(','));
+    let names = rows.next().unwrap().map(str::to_owned);
+    let numbers = rows.next().unwrap().map(|cell| cell.parse().unwrap());
+    names.zip(numbers).collect()
+}
+
+/// Offsets are in every result, whatever command and format it is of, and replaced offsets are told of.
+#[test]
+fn other_offsets_are_written_into_the_format_of_the_input_too() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("walk.bvh"), WALK).unwrap();
+    for format in ["glb", "gltf", "npz"] {
+        line(folder, &format!("convert walk.bvh -o walk.{format}"));
+    }
+    fs::write(
+        folder.join("far.txt"),
+        "left 2 0 0\nhip 0 0 0\nright -2 0 0\n",
+    )
+    .unwrap();
+    let commands = ["eval --fps 20", "convert", "smooth --fps 20", "reduce"];
+    for (command, format) in commands
+        .iter()
+        .flat_map(|command| ["glb", "gltf", "npz", "bvh"].map(|format| (command, format)))
+    {
+        let (name, options) = command.split_once(' ').unwrap_or((command, ""));
+        let wide =
+            format!("{name} walk.{format} --offsets far.txt -o far.{format} --overwrite {options}");
+        let run = line(folder, wide.trim_end());
+        assert!(
+            run.words.contains("W212]: the offsets of 2 joints in the file are replaced: that of `left` is 1 0 0 there, and now 2 0 0"),
+            "{wide}: {}",
+            run.words
+        );
+        let row = first_row(folder, &format!("far.{format}"));
+        assert_eq!((row["left.tx"], row["right.tx"]), (2.0, -2.0), "{wide}");
+    }
+    // The same offsets change nothing: the file is written again as it is.
+    fs::write(
+        folder.join("same.txt"),
+        "left 1 0 0\nhip 0 0 0\nright -1 0 0\n",
+    )
+    .unwrap();
+    let same = line(folder, "convert walk.glb --offsets same.txt -o same.glb");
+    assert!(!same.words.contains("W212"), "{}", same.words);
+    // What a new file does not have is named.
+    fs::write(
+        folder.join("fox.gltf"),
+        two_animations().replace("\"scenes\"", "\"cameras\":[{}],\"scenes\""),
+    )
+    .unwrap();
+    fs::write(folder.join("hip.txt"), "hip 0 3 0\n").unwrap();
+    let new = line(
+        folder,
+        "eval fox.gltf --offsets hip.txt --fps 30 -o fox30.gltf",
+    );
+    assert!(
+        new.words
+            .contains("other offsets make a new file; not copied: cameras"),
+        "{}",
+        new.words
+    );
+}
+
+/// A body without offsets has none either in the formats that need some.
+#[test]
+fn joints_without_offsets_are_not_read_as_joints_in_one_point() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fixture(folder, "npz/smpl.npz", "body.npz");
+    fs::write(folder.join("offsets.txt"), "0 0.1 0\n".repeat(24)).unwrap();
+    for format in ["glb", "gltf", "bvh", "npz", "parquet"] {
+        line(folder, &format!("eval body.npz --fps 30 -o first.{format}"));
+        // Written again: the input's file with other keys.
+        line(
+            folder,
+            &format!("eval first.{format} --fps 30 -o body.{format} --overwrite"),
+        );
+        let world = format!("eval body.{format} --output world -o world.npy --overwrite");
+        let without = refused(folder, &world);
+        assert!(
+            without.words.contains("--offsets"),
+            "{format}: {}",
+            without.words
+        );
+        line(folder, &format!("{world} --offsets offsets.txt"));
+    }
+}
+
+/// An SMPL body with offsets is written as a clip that has them, not in the layout of the input, which has no room
+/// for them.
+#[test]
+fn offsets_of_a_body_are_written_to_npz() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fixture(folder, "npz/smpl.npz", "body.npz");
+    fs::write(folder.join("offsets.txt"), "0 0.1 0\n".repeat(24)).unwrap();
+    for command in ["eval --fps 20", "convert"] {
+        let (name, options) = command.split_once(' ').unwrap_or((command, ""));
+        let wide =
+            format!("{name} body.npz --offsets offsets.txt -o placed.npz --overwrite {options}");
+        line(folder, wide.trim_end());
+        line(
+            folder,
+            "eval placed.npz --output world -o world.npy --overwrite",
+        );
+        let row = first_row(folder, "placed.npz");
+        assert_eq!(row["left_hip.ty"], 0.1, "{wide}");
+    }
+}
+
+/// A file that an option names is as much a part of a result as its input is.
+#[test]
+fn a_check_finds_changed_files_of_options() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("walk.bvh"), WALK).unwrap();
+    fs::write(
+        folder.join("far.txt"),
+        "hip 0 0 0\nleft 2 0 0\nright -2 0 0\n",
+    )
+    .unwrap();
+    fs::create_dir(folder.join("in")).unwrap();
+    fs::rename(folder.join("walk.bvh"), folder.join("in/walk.bvh")).unwrap();
+    for (option, file) in [("offsets", "far.txt"), ("times", "t.txt")] {
+        let batch = format!("eval in -o {option} --to glb --{option} {file} --resume");
+        line(folder, &batch);
+        line(folder, &format!("check {option}"));
+        let text = fs::read_to_string(folder.join(file)).unwrap();
+        fs::write(
+            folder.join(file),
+            text.replace('1', "0.5").replace('2', "3"),
+        )
+        .unwrap();
+        let changed = run(folder, &["check", option]);
+        let words = format!("its file {file} of --{option} has changed since it was written");
+        assert!(
+            changed.code == 8 && changed.words.contains(&words),
+            "{}",
+            changed.words
+        );
+        line(folder, &batch);
+        line(folder, &format!("check {option}"));
+        fs::remove_file(folder.join(file)).unwrap();
+        line(folder, &format!("check {option}"));
+    }
+}
+
+/// Every reader asks the budget for its keys; without an option only those of compressed data can pass it.
+#[test]
+fn the_memory_limit_holds_for_every_format() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("walk.bvh"), WALK).unwrap();
+    for format in ["glb", "npz", "csv", "parquet", "arrow"] {
+        line(folder, &format!("convert walk.bvh -o walk.{format}"));
+    }
+    line(folder, "eval walk.bvh -o walk.npy");
+    for format in ["tum", "euroc", "kitti"] {
+        line(
+            folder,
+            &format!("eval walk.bvh --tracks hip --fps 10 -o path.{format}"),
+        );
+    }
+    let of_format = |format: &str| match format {
+        "dat" => "info a.dat".to_owned(),
+        "npy" => "info walk.npy --source-fps 25 --map rotations=arr_0:track".to_owned(),
+        "kitti" => "info path.kitti --source-fps 10".to_owned(),
+        "tum" | "euroc" => format!("info path.{format} --from {format}"),
+        format => format!("info walk.{format}"),
+    };
+    for format in [
+        "bvh", "glb", "npz", "csv", "parquet", "arrow", "npy", "dat", "tum", "euroc", "kitti",
+    ] {
+        let read = of_format(format);
+        line(folder, &format!("{read} --max-memory 1MiB"));
+        let run = refused(folder, &format!("{read} --max-memory 10B"));
+        assert!(
+            run.words.contains("E034") && run.words.contains("the limit is 10 (--max-memory)"),
+            "{format}: {}",
+            run.words
+        );
+    }
+}
+
 #[test]
 fn the_page_has_a_menu_of_a_files_animations() {
     let temporary = sample_folder();
     let folder = temporary.path();
     fs::write(folder.join("fox.gltf"), two_animations()).unwrap();
+    line(folder, "plot fox.gltf --animation Run -o run.svg");
+    let picture = fs::read_to_string(folder.join("run.svg")).unwrap();
+    assert!(picture.contains("fox.gltf: Run: components"), "{picture}");
     line(folder, "view fox.gltf -o view.html");
     let Some(mut page) = crate::browser::Page::open(&folder.join("view.html")) else {
         return;

@@ -222,7 +222,7 @@ fn panels_have_the_names_of_joints() {
         long.replace(' ', "_")
     );
     fs::write(folder.path().join("a.dat"), text).unwrap();
-    let hand = "…nel_has_room_for:_left_hand";
+    let hand = "…acters_than_a_panel_has_room_for:_left_hand";
     for show in ["speed", "error", "sphere"] {
         let marks = plot(folder.path(), &["--show", show]);
         assert!(marks.says("hips") && marks.says(hand), "{:?}", marks.texts);
@@ -386,6 +386,7 @@ fn speed_error_and_sphere_are_drawn_for_each_box() {
     let marks = plot(folder.path(), &both("speed"));
     assert!(marks.says("angular speed, rad/s") && marks.says("box 2"));
     assert_eq!(marks.curves(SLERP).len(), 2);
+    assert!(marks.says("key"), "the legend has the lines of the keys");
     // Slerp's speed: four plateaus, so five heights or fewer but more than one.
     let mut heights: Vec<i64> = marks.curves(SLERP)[0]
         .iter()

@@ -1,4 +1,4 @@
-//! Converts clips to another unit of length or another up axis.
+//! Converts clips to another unit of length or another up axis, and places their joints.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::io::BufRead;
@@ -8,8 +8,8 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, JointMatchError, Joints, TrackError};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Loaded, Space};
-use crate::motion::{Body, Motion, Transform, carry_key_data};
+use crate::format::{Adjustment, Loaded, Space};
+use crate::motion::{Body, Joint, Motion, Transform, carry_key_data};
 use crate::source::Source;
 use crate::text::lines::{Limits, Lines, tokens};
 use crate::text::number;
@@ -83,7 +83,7 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
         },
         metres: space.metres / scale,
     });
-    loaded.is_adjusted = true;
+    loaded.adjustment = Some(Adjustment::Space);
     Ok(())
 }
 
@@ -154,13 +154,65 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
     Ok(adjusted)
 }
 
+/// Sets the offsets of the joints of all clips of a file by [`set_offsets`]; `numbers` has those of each clip. If they
+/// replace offsets in the file, a warning is added to [`Loaded::warnings`]; `input` is the name of the file in it.
+///
+/// # Errors
+/// As [`set_offsets`]; the clips are then unchanged. When a translation with the pelvis added is not a finite f32.
+pub fn set_all_offsets(
+    loaded: &mut Loaded,
+    input: &str,
+    numbers: &[Vec<f64>],
+) -> Result<(), OffsetsError> {
+    let mut placed = loaded.clips.clone();
+    for (clip, numbers) in placed.iter_mut().zip(numbers) {
+        set_offsets(clip, numbers)?;
+    }
+    let clips = loaded.clips.iter().zip(&placed);
+    let replaced = clips.clone().find_map(|(before, after)| {
+        let moved = replaced_offsets(before, after);
+        let &first = moved.first()?;
+        let [was, is] = [before, after].map(|clip| clip.rest_position(first).to_array());
+        let ([x, y, z], [a, b, c]) = (was, is);
+        let joints = match moved.len() {
+            1 => "1 joint".to_owned(),
+            count => format!("{count} joints"),
+        };
+        Some(format!(
+            "the offsets of {joints} in the file are replaced: that of `{}` is {x} {y} {z} there, and now {a} {b} {c}",
+            before.set.track_name(first)
+        ))
+    });
+    let is_other = |(before, after): (&Motion, &Motion)| {
+        before.body != after.body
+            || (0..after.skeleton.len())
+                .any(|joint| before.rest_position(joint) != after.rest_position(joint))
+    };
+    if clips.into_iter().any(is_other) {
+        loaded.adjustment = loaded.adjustment.or(Some(Adjustment::Offsets));
+    }
+    loaded.clips = placed;
+    let warning = replaced.map(|message| Diagnostic::new(input, Code::OffsetsReplaced, message));
+    loaded.warnings.extend(warning);
+    Ok(())
+}
+
+/// The joints with an offset, other than 0, in the first clip that is another one in the second.
+fn replaced_offsets(before: &Motion, after: &Motion) -> Vec<usize> {
+    let is_replaced = |&joint: &usize| {
+        let offset = before.rest_position(joint);
+        offset != DVec3::ZERO && offset != after.rest_position(joint)
+    };
+    (0..before.skeleton.len()).filter(is_replaced).collect()
+}
+
 /// Sets where each joint rests relative to its parent, for files that do not contain this: motion of SMPL bodies,
 /// whose joint positions depend on the shape of the body. `numbers` are x, y, z of each joint, in the order of the
 /// tracks. For an SMPL body, the first offset is the position of the pelvis when `trans` is 0; it is added to the
 /// translations of the first track.
 ///
 /// # Errors
-/// When there are not three numbers for each joint of the clip, or a joint with a parent has translation keys; the
+/// When there are not three numbers for each joint of the clip, or a joint with a parent is moved by translation keys; the
 /// clip is then unchanged. When a translation with the pelvis added is not a finite f32.
 pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsError> {
     let joints = clip.skeleton.len();
@@ -169,9 +221,12 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         let numbers = numbers.len();
         return Err(OffsetsError::Numbers { numbers, joints });
     }
+    // Some formats have keys for all joints, of those that stay at their offsets too.
     let moves = |joint: &usize| {
-        let hangs = clip.skeleton[*joint].parent.is_some();
-        hangs && clip.set.vector_keys(Channel::Translation, *joint).is_some()
+        let Joint { parent, rest } = clip.skeleton[*joint];
+        let keys = clip.set.vector_keys(Channel::Translation, *joint);
+        parent.is_some()
+            && keys.is_some_and(|keys| keys.keys.iter().any(|&key| key != rest.translation))
     };
     if let Some(joint) = (0..joints).find(moves) {
         let name = clip.set.track_name(joint);
@@ -202,6 +257,13 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         let parent = clip.skeleton[track].parent;
         let rest = clip.resting_at(track, parent, DVec3::from_array(offset));
         clip.skeleton[track].rest.translation = rest;
+        if parent.is_some()
+            && let Some(keys) = clip.set.vector_keys(Channel::Translation, track)
+        {
+            let times = keys.times.to_vec();
+            let keys = vec![rest; times.len()];
+            clip.set.set_translations(track, &times, &keys, &[])?;
+        }
     }
     Ok(())
 }
@@ -216,6 +278,25 @@ pub struct JointOffsets {
 }
 
 impl JointOffsets {
+    /// Offsets without names, in the order of the joints: x, y, z of each.
+    #[must_use]
+    pub fn in_order(numbers: Vec<f64>) -> Self {
+        Self {
+            names: Vec::new(),
+            numbers,
+        }
+    }
+
+    /// Offsets of named joints, in any order.
+    #[must_use]
+    pub fn named(joints: Vec<(String, [f64; 3])>) -> Self {
+        let (names, offsets): (_, Vec<[f64; 3]>) = joints.into_iter().unzip();
+        Self {
+            names,
+            numbers: offsets.into_flattened(),
+        }
+    }
+
     /// Reads the offsets of joints: a line with x y z for each, in the order of the tracks; or `name x y z`, in any
     /// order. `#` begins a comment; `-` is standard input.
     ///
@@ -263,19 +344,21 @@ impl JointOffsets {
         }
     }
 
-    /// Sets them in a clip, as [`set_offsets`]; those with names by the names of the joints, else by their order.
+    /// The numbers for [`set_offsets`] of a clip. Offsets with names are those of the joints of these names, others are
+    /// in the order of the joints.
     ///
     /// # Errors
-    /// As [`set_offsets`]; also when the names are not those of the clip.
-    pub fn set(&self, clip: &mut Motion) -> Result<(), OffsetsError> {
+    /// When the names are not those of the clip.
+    pub fn of_clip(&self, clip: &Motion) -> Result<Vec<f64>, OffsetsError> {
         if self.names.is_empty() {
-            return set_offsets(clip, &self.numbers);
+            return Ok(self.numbers.clone());
         }
         let joints = Joints::named(&self.names);
-        let order = clip.joints().order_of(&joints, ["the clip", "the file"])?;
+        let order = clip
+            .joints()
+            .order_of(&joints, ["the clip", "the list of offsets"])?;
         let (offsets, _) = self.numbers.as_chunks::<3>();
-        let numbers: Vec<f64> = order.iter().flat_map(|&line| offsets[line]).collect();
-        set_offsets(clip, &numbers)
+        Ok(order.iter().flat_map(|&line| offsets[line]).collect())
     }
 }
 
@@ -291,9 +374,9 @@ pub enum OffsetsError {
         /// Number of joints of the clip.
         joints: usize,
     },
-    /// A joint with a parent has translation keys, which already determine its position.
+    /// A joint with a parent has translation keys other than its offset, which already determine its position.
     #[error(
-        "joint {joint} (`{name}`) has translation keys, and an offset is only for joints without them"
+        "joint {joint} (`{name}`) is moved by translation keys, and an offset is only for joints that stay at it"
     )]
     Moved {
         /// Index of the first such joint, from 0.
@@ -312,7 +395,6 @@ pub enum OffsetsError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Joint;
 
     #[test]
     fn offsets_with_names_are_matched_by_name() {
@@ -329,8 +411,8 @@ mod tests {
         let read = |text: &str| JointOffsets::read("offsets", text.as_bytes());
         let placed = |text: &str| {
             let mut placed = clip.clone();
-            let set = read(text).unwrap().set(&mut placed);
-            set.map(|()| {
+            let numbers = read(text).unwrap().of_clip(&placed)?;
+            set_offsets(&mut placed, &numbers).map(|()| {
                 placed
                     .skeleton
                     .iter()
@@ -347,7 +429,7 @@ mod tests {
         let error = placed("hip 0 0 0\nLeftKnee 1 0 0\nright knee 0 0 0").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "the clip has a joint `left knee`, the file has none of that name; `LeftKnee` is near, but only equal names \
+            "the clip has a joint `left knee`, the list of offsets has none of that name; `LeftKnee` is near, but only equal names \
              match"
         );
         for (text, line) in [

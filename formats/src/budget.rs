@@ -27,13 +27,24 @@ pub(crate) struct Budget {
 
 /// An input needs more memory than its budget.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it states more \
-     than it contains"
-)]
+#[error("reading it takes {needed} bytes of memory at least, and {}", self.allowance())]
 pub(crate) struct OverBudget {
     needed: u64,
     limit: u64,
+    /// Whether the limit is [`Limits::memory`], rather than that of an input of this length.
+    is_requested: bool,
+}
+
+impl OverBudget {
+    fn allowance(&self) -> String {
+        let limit = self.limit;
+        match self.is_requested {
+            true => format!("the limit is {limit}"),
+            false => {
+                format!("an input of this length gets {limit}; it states more than it contains")
+            }
+        }
+    }
 }
 
 impl Budget {
@@ -84,7 +95,11 @@ impl Budget {
             return Ok(());
         }
         used.fetch_sub(requested, Ordering::Relaxed);
-        Err(OverBudget { needed, limit })
+        Err(OverBudget {
+            needed,
+            limit,
+            is_requested: !self.grows,
+        })
     }
 
     /// Takes memory that is returned to the budget when the value is dropped.

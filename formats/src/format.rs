@@ -259,11 +259,31 @@ pub struct Loaded {
     pub warnings: Vec<Diagnostic>,
     /// The file itself, if it can be written again with other keys and everything else kept.
     pub document: Option<Arc<dyn Document>>,
-    /// Whether the clips were converted to another unit or up axis ([`adjust_all`](crate::adjust::adjust_all)). The
-    /// rest of the file was not converted, so that `document` is not written again.
-    pub is_adjusted: bool,
+    /// How the clips were changed after reading, if they were. The rest of the file was not changed, so that
+    /// `document` is not written again.
+    pub adjustment: Option<Adjustment>,
     /// The unit and the up axis of the clips, if the file specifies them.
     pub space: Option<Space>,
+}
+
+/// How the clips of a file differ from the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Adjustment {
+    /// They were converted to another unit or up axis ([`adjust_all`](crate::adjust::adjust_all)).
+    Space,
+    /// Their joints have other offsets ([`set_all_offsets`](crate::adjust::set_all_offsets)).
+    Offsets,
+}
+
+impl Adjustment {
+    /// Why a new file is made of the clips, as [`left_behind`] begins its message.
+    #[must_use]
+    pub fn makes_new(self) -> &'static str {
+        match self {
+            Self::Space => "other units or axes make",
+            Self::Offsets => "other offsets make",
+        }
+    }
 }
 
 /// The unit of length and the up axis.
@@ -276,6 +296,13 @@ pub struct Space {
 }
 
 impl Loaded {
+    /// The file, if its meshes are in the unit and the axes of the clips.
+    #[must_use]
+    pub fn document_in_place(&self) -> Option<Arc<dyn Document>> {
+        let is_converted = self.adjustment == Some(Adjustment::Space);
+        self.document.clone().filter(|_| !is_converted)
+    }
+
     /// The contents of a file with one clip.
     #[must_use]
     pub fn of(clip: Motion, warnings: Vec<Diagnostic>) -> Self {

@@ -12,6 +12,7 @@ use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
 use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
+use crate::names::same_named;
 use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
@@ -118,6 +119,21 @@ impl Motion {
         }
     }
 
+    /// The assumption by which some joints are matched with those of other clips, for a warning: several joints of one
+    /// parent have one name in the file, so that only their order tells them apart. `None` if nothing is assumed.
+    #[must_use]
+    pub fn order_assumption(&self, input: &str) -> Option<String> {
+        let tracks = 0..self.set.track_count();
+        let names: Vec<String> = tracks.map(|track| self.set.track_name(track)).collect();
+        let parents: Vec<Option<usize>> = self.skeleton.iter().map(|joint| joint.parent).collect();
+        let [first, second] = same_named(&names, &parents)?;
+        Some(format!(
+            "{input}: several joints are called `{}`; they are matched with those of other clips by their order in the \
+             file (track {first}, track {second}): give them different names",
+            names[first]
+        ))
+    }
+
     /// Whether the clip has parents, but no offsets, so that the positions of joints in the world are unknown. An SMPL
     /// body without a model of its shape is such a clip. Its rotations in the world are known.
     #[must_use]
@@ -172,6 +188,12 @@ impl Motion {
     #[must_use]
     pub fn origin(&self, track: usize) -> DVec3 {
         self.origins.get(track).copied().unwrap_or_default()
+    }
+
+    /// Where a joint rests relative to its parent: its rest translation with its [origin](Self::origins).
+    #[must_use]
+    pub fn rest_position(&self, track: usize) -> DVec3 {
+        self.origin(track) + self.rest(Channel::Translation, track).as_dvec3()
     }
 
     /// Sets the vector to add to a track's translations.

@@ -1,6 +1,6 @@
 //! Names of joints that are unique and that all programs can read.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use tumble::TrackSet;
 
@@ -31,6 +31,28 @@ pub(crate) fn unique_name(mut name: String, index: usize, used: &mut HashSet<Str
     name
 }
 
+/// The first two tracks that have one name beside each other, under one parent, or that had one until a reader appended
+/// a number to the second ([`unique_name`]). `parents` has the parent of each track; it is empty if there are none.
+pub(crate) fn same_named(names: &[String], parents: &[Option<usize>]) -> Option<[usize; 2]> {
+    let known: HashSet<&str> = names.iter().map(String::as_str).collect();
+    let stated = |mut name: &str| {
+        while let Some((base, number)) = name.trim_end_matches('_').rsplit_once('#')
+            && known.contains(base)
+            && !number.is_empty()
+            && number.bytes().all(|digit| digit.is_ascii_digit())
+        {
+            name = base;
+        }
+        name.to_owned()
+    };
+    let mut tracks: HashMap<(Option<usize>, String), usize> = HashMap::new();
+    names.iter().enumerate().find_map(|(track, name)| {
+        let parent = parents.get(track).copied().flatten();
+        let first = tracks.insert((parent, stated(name)), track)?;
+        Some([first, track])
+    })
+}
+
 /// The unique names of a set's tracks: a repeated name gets the track's number after it.
 pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
     let mut used = HashSet::new();
@@ -42,6 +64,25 @@ pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_that_were_one_are_found_unless_their_parents_differ() {
+        let found = |names: &[&str], parents: &[Option<usize>]| {
+            let names: Vec<String> = names.iter().copied().map(str::to_owned).collect();
+            same_named(&names, parents)
+        };
+        let siblings = [None, Some(0), Some(0)];
+        assert_eq!(found(&["hip", "leg", "leg#2"], &siblings), Some([1, 2]));
+        assert_eq!(found(&["hip", "leg", "leg#2_"], &siblings), Some([1, 2]));
+        assert_eq!(found(&["hip", "leg", "leg"], &[]), Some([1, 2]));
+        assert_eq!(
+            found(&["hip", "leg", "leg#2"], &[None, Some(0), Some(1)]),
+            None
+        );
+        assert_eq!(found(&["hip", "leg", "arm#2"], &siblings), None);
+        assert_eq!(found(&["hip", "leg", "leg#b"], &siblings), None);
+        assert_eq!(found(&["leg", "leg#1", "leg#1#2"], &[]), Some([0, 1]));
+    }
 
     #[test]
     fn names_become_lines_that_differ() {

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use tumble::{Channel, Layout};
 use tumble_formats::Diagnostic;
-use tumble_formats::format::Document;
+use tumble_formats::format::{Adjustment, Document};
 use tumble_formats::motion::Motion;
 
 use crate::arrays::{ListArgument, Order};
@@ -66,8 +66,8 @@ pub(crate) struct Source {
     pub(crate) box_length: Option<f64>,
     /// What was said of it when it was read.
     pub(crate) warnings: Vec<Diagnostic>,
-    /// The clip is in other units or about other axes than the file.
-    pub(crate) is_adjusted: bool,
+    /// How the clip differs from the file in its units, axes or offsets.
+    pub(crate) adjustment: Option<Adjustment>,
     /// The clip has other keys than the file.
     pub(crate) is_changed: bool,
 }

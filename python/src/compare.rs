@@ -511,7 +511,7 @@ fn of_clips(
             ));
         }
     };
-    let warnings = warning.into_iter().chain(pair.assumption()).collect();
+    let warnings = warning.into_iter().chain(pair.assumptions()).collect();
     let found = pair.differences(engine, &frames, world);
     let found = found.map_err(of_compare)?;
     let [first, second] = found.missing;

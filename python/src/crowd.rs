@@ -10,8 +10,8 @@ use tumble::{ComponentType, WrapMode};
 use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
-use crate::errors::{guarded, input};
-use crate::motions::{ChosenSkeleton, SharedSkeleton, of_crowd, push};
+use crate::errors::{guarded, input, warn_of};
+use crate::motions::{ChosenSkeleton, SharedSkeleton, of_crowd, order_assumption, push};
 use crate::options::{method_named, one_of, option_named};
 use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
@@ -134,6 +134,7 @@ impl Crowd {
                 "clips[0]: it has no skeleton; give `parents` and `offsets`",
             ));
         };
+        warn_of(py, order_assumption(&clips).as_slice())?;
         let skeleton = shared.of_engine()?;
         let unplaced =
             (clips.iter().enumerate()).find_map(|(index, it)| shared.unplaced(index, it));

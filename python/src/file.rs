@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
-use pyo3::types::{PyString, PyTuple};
-use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
+use pyo3::types::{PyDict, PyString, PyTuple};
+use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
-use crate::arrays::{ArrayValues, ListArgument, doubles};
+use crate::arrays::{ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{expected, input, of_diagnostic, of_track, warn};
 use crate::options::{frame_rate, one_of, option_of, unknown_name};
@@ -192,7 +192,8 @@ impl File {
 /// `raw_times`: keep times as stored, instead of moving them to exact frame times. `bridge_gaps`: skip keys with
 /// missing numbers in a table, a trajectory or a log, instead of refusing it. `keyframes`: read only the keys of an FBX file at its key
 /// times, instead of adding keys until its curves are followed. `offsets`: the positions of joints relative to their
-/// parents, (joints, 3), for files that do not store them, such as those of AMASS. `body_model`: computes the offsets
+/// parents, (joints, 3), or a dict of x, y, z by the names of joints, for files that do not store them, such as those of
+/// AMASS; offsets in the file are replaced, with a warning. `body_model`: computes the offsets
 /// from a model of SMPL, SMPL-H or SMPL-X as NPZ, or from a folder with one per gender. `scale`: a factor for
 /// translations and the length of boxes; "metres" converts from the unit that an FBX file states. `up`: rotate so
 /// that "y" or "z" is up, from the up axis that an FBX file states, otherwise from the other of the two.
@@ -288,16 +289,7 @@ pub(crate) fn load(
             "offsets and body_model both place the joints; give one",
         ));
     }
-    let offsets = offsets.map(|value| doubles(value, "offsets")).transpose()?;
-    if let Some(offsets) = offsets
-        .as_ref()
-        .filter(|offsets| offsets.shape.get(1) != Some(&3))
-    {
-        return Err(input(format!(
-            "offsets: the shape is {:?}; give (joints, 3)",
-            offsets.shape
-        )));
-    }
+    let offsets = offsets.map(joint_offsets).transpose()?;
     let request = ReadRequest {
         format,
         options,
@@ -348,7 +340,7 @@ struct ReadRequest {
     format: Option<&'static Format>,
     options: ReadOptions,
     source_times: Option<PathBuf>,
-    offsets: Option<ArrayValues<f64>>,
+    offsets: Option<JointOffsets>,
     body_model: Option<PathBuf>,
     scale: Option<Scale>,
     up: Option<UpAxis>,
@@ -385,20 +377,20 @@ impl ReadRequest {
         }
         let read = format.open(file, &self.options);
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+        let name = file.display().to_string();
         if let Some(offsets) = &self.offsets {
-            for clip in &mut loaded.clips {
-                let placed = set_offsets(clip, &offsets.values);
-                placed.map_err(|error| input(format!("offsets: {}: {error}", file.display())))?;
-            }
+            let of_clips = loaded.clips.iter().map(|clip| offsets.of_clip(clip));
+            let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = of_clips.collect();
+            let placed = of_clips.and_then(|numbers| set_all_offsets(&mut loaded, &name, &numbers));
+            placed.map_err(|error| input(format!("offsets: {name}: {error}")))?;
         }
         if let Some(model) = &self.body_model {
-            for clip in &mut loaded.clips {
-                let offsets = body_offsets(model, clip, Limits::default());
-                let offsets = offsets.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
-                let placed = set_offsets(clip, &offsets);
-                placed
-                    .map_err(|error| input(format!("body_model: {}: {error}", file.display())))?;
-            }
+            let of_clip = |clip| body_offsets(model, clip, Limits::default());
+            let of_clips: Result<Vec<Vec<f64>>, Diagnostic> =
+                loaded.clips.iter().map(of_clip).collect();
+            let numbers = of_clips.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+            let placed = set_all_offsets(&mut loaded, &name, &numbers);
+            placed.map_err(|error| input(format!("body_model: {name}: {error}")))?;
         }
         if self.scale.is_some() || self.up.is_some() {
             let factor = match (self.scale, loaded.space) {
@@ -413,6 +405,31 @@ impl ReadRequest {
             adjust_all(&mut loaded, factor, self.up).map_err(|error| of_track(&error))?;
         }
         Ok(loaded)
+    }
+}
+
+/// The offsets of joints: an array in their order, or a dict by their names.
+fn joint_offsets(value: &Bound<'_, PyAny>) -> PyResult<JointOffsets> {
+    if let Ok(by_name) = value.cast::<PyDict>() {
+        let joints = by_name.iter().map(|(name, offset)| {
+            let (name, offset): (String, [f64; 3]) = (name.extract()?, offset.extract()?);
+            Ok((name, offset))
+        });
+        let joints: PyResult<Vec<(String, [f64; 3])>> = joints.collect();
+        let joints = joints.map_err(|error| {
+            expected(value.py(), error, || {
+                "offsets: give x, y, z for each name of a joint".to_owned()
+            })
+        });
+        return joints.map(JointOffsets::named);
+    }
+    let offsets = doubles(value, "offsets")?;
+    match offsets.shape.get(1) {
+        Some(3) => Ok(JointOffsets::in_order(offsets.values)),
+        _ => Err(input(format!(
+            "offsets: the shape is {:?}; give (joints, 3), or a dict of x, y, z by the names of joints",
+            offsets.shape
+        ))),
     }
 }
 
@@ -447,7 +464,7 @@ impl File {
             clips: loaded.clips.len() + loaded.refused.len(),
             box_length: loaded.box_length,
             warnings: loaded.warnings.clone(),
-            is_adjusted: loaded.is_adjusted,
+            adjustment: loaded.adjustment,
             is_changed,
         });
         let clip = |motion| Clip {

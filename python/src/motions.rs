@@ -18,7 +18,7 @@ use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
 use crate::build::NO_OFFSETS;
 use crate::clip::Clip;
 use crate::engine::Engine;
-use crate::errors::{guarded, in_python, input, of_engine};
+use crate::errors::{guarded, in_python, input, of_engine, warn_of};
 use crate::options::method_named;
 use crate::run::stoppable;
 
@@ -146,6 +146,17 @@ impl SharedSkeleton {
     }
 }
 
+/// The warning that joints of one name are matched by their order, where clips of several files are.
+pub(crate) fn order_assumption(clips: &[Clip]) -> Option<String> {
+    let file = |clip: &Clip| clip.source.as_ref().map(|source| source.path.clone());
+    let (first, others) = clips.split_first()?;
+    if file(first).is_some() && others.iter().all(|clip| file(clip) == file(first)) {
+        return None;
+    }
+    let mut clips = clips.iter().enumerate().filter(|_| !others.is_empty());
+    clips.find_map(|(index, clip)| clip.motion.order_assumption(&shown(index, clip)))
+}
+
 pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
     match error {
         CrowdError::NoInverseBind => {
@@ -219,6 +230,7 @@ impl Motions {
                 "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, or (parents, offsets)",
             ));
         };
+        warn_of(py, order_assumption(&clips).as_slice())?;
         let reasons = clips.iter().enumerate();
         let reasons: Vec<_> = reasons
             .map(|(index, clip)| shared.unplaced(index, clip))

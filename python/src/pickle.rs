@@ -174,7 +174,7 @@ pub(crate) fn clip_of_state(state: &Bound<'_, PyDict>) -> PyResult<Clip> {
                 clips: entry(state, "clips")?.extract()?,
                 box_length: entry(state, "box_length")?.extract()?,
                 warnings: Vec::new(),
-                is_adjusted: false,
+                adjustment: None,
                 is_changed: false,
             })),
         };

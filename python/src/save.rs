@@ -103,7 +103,7 @@ pub(crate) fn save(
     let format = format_named(name)?;
     if times_out.is_some() && !format.takes(FormatOption::TimesApart) {
         return Err(input(format!(
-            "times_out is for {}, which stores no times; {} stores times or a frame rate: leave it out",
+            "times_out is for {}, whose times are in a separate file, and has no effect on {}; leave it out",
             Format::names_taking(FormatOption::TimesApart),
             format.name
         )));
@@ -345,7 +345,10 @@ impl Save {
     /// The file that all clips come from, if it can be written again.
     fn document(&self) -> Option<Arc<dyn Document>> {
         let document = |clip: &Clip| {
-            let source = clip.source.as_ref().filter(|source| !source.is_adjusted)?;
+            let source = clip
+                .source
+                .as_ref()
+                .filter(|source| source.adjustment.is_none())?;
             source.document.clone()
         };
         let first = document(self.clips.first()?)?;
@@ -370,10 +373,10 @@ impl Save {
         }
         let is_one = sources.len() == 1;
         let lost = sources.into_iter().filter_map(|(document, source)| {
-            let why = match is_one {
-                _ if source.is_adjusted => "other units or axes make",
-                true => "some of its clips make",
-                false => "clips of several files make",
+            let why = match (source.adjustment, is_one) {
+                (Some(adjustment), _) => adjustment.makes_new(),
+                (None, true) => "some of its clips make",
+                (None, false) => "clips of several files make",
             };
             let lost = left_behind(&**document, &source.warnings, self.format, Some(why))?;
             Some(Diagnostic::new(

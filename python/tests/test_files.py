@@ -416,10 +416,14 @@ def test_other_keys_go_into_the_file_of_a_clip(tmp_path):
     np.savez(walk, poses=np.zeros((4, 66)), trans=np.zeros((4, 3)), mocap_framerate=30.0)
     offsets = np.arange(66.0).reshape(22, 3)
     placed = tumble.load(walk, offsets=offsets)
-    tumble.save(tmp_path / "placed.npz", placed)
-    lifted = np.load(tmp_path / "placed.npz")
-    assert sorted(lifted.files) == sorted(np.load(walk).files)
-    assert np.array_equal(tumble.load(tmp_path / "placed.npz", offsets=offsets).clip.offsets, placed.clip.offsets)
+    for suffix in ["npz", "glb"]:
+        tumble.save(tmp_path / f"placed.{suffix}", placed)
+        assert np.array_equal(tumble.load(tmp_path / f"placed.{suffix}").clip.offsets, placed.clip.offsets)
+    # Offsets in the file are replaced, in the result of the same format too, and this is told.
+    with pytest.warns(tumble.InputWarning, match=r"offsets of 2\d joints in the file are replaced"):
+        far = tumble.load(tmp_path / "placed.glb", offsets=2 * offsets)
+    tumble.save(tmp_path / "far.glb", far)
+    assert np.array_equal(tumble.load(tmp_path / "far.glb").clip.offsets[1:], 2 * placed.clip.offsets[1:])
 
 
 def test_outputs_that_cannot_be_written(tmp_path, rng):

@@ -238,3 +238,30 @@ def test_offsets_with_names_are_matched_by_name(body, tmp_path):
     found = np.load(result)
     assert found.shape == (31, len(clip), 7)
     np.testing.assert_allclose(found[..., :3], expected, rtol=1e-6, atol=1e-6)
+    # So are those of a dict.
+    by_name = dict(zip(reversed(clip.names), offsets[::-1].tolist()))
+    assert tumble.load(body, offsets=by_name).clip == tumble.load(body, offsets=offsets).clip
+    by_name.pop(clip.names[3])
+    with pytest.raises(tumble.InputError, match=f"`{clip.names[3]}`, the list of offsets has none of that name"):
+        tumble.load(body, offsets=by_name)
+    for wrong in [{"hip": 1.0}, {1: [0, 0, 0]}]:
+        with pytest.raises(TypeError, match="give x, y, z for each name of a joint"):
+            tumble.load(body, offsets=wrong)
+
+
+def test_joints_of_one_name_are_told_to_be_matched_by_their_order(keys):
+    """Names that were one in a file say nothing but the order of its joints."""
+    beside = [tumble.Clip(TIMES, keys[:3], names=["hip", "leg", "leg#2"], parents=[None, 0, 0], offsets=OFFSETS[:3]) for _ in range(2)]
+    words = "several joints are called `leg`; they are matched with those of other clips by their order"
+    with pytest.warns(tumble.InputWarning, match=words):
+        tumble.MotionLibrary(beside)
+    with pytest.warns(tumble.InputWarning, match=words):
+        tumble.Crowd(beside, 1)
+    with pytest.warns(tumble.InputWarning, match=words):
+        tumble.compare(*beside)
+    # One clip is matched with none, and parents tell joints apart.
+    chain = [tumble.Clip(TIMES, keys[:3], names=["hip", "leg", "leg#2"], parents=[None, 0, 1], offsets=OFFSETS[:3]) for _ in range(2)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tumble.MotionLibrary(beside[:1])
+        tumble.MotionLibrary(chain)

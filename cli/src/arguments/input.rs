@@ -141,7 +141,7 @@ impl Inputs {
         match loaded.clips.pop() {
             Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip {
                 clip,
-                document: loaded.document.filter(|_| !loaded.is_adjusted),
+                document: loaded.document_in_place(),
                 rest,
             }),
             Some(clip) => {

@@ -244,6 +244,11 @@ impl Outside {
         [self.before, self.after].map(|it| it == OutsideArgument::LeaveOut)
     }
 
+    /// Whether tracks hold their first and their last key outside the keys, the default.
+    pub(crate) fn is_default(self) -> [bool; 2] {
+        [self.before, self.after].map(|it| it == OutsideArgument::default())
+    }
+
     /// The samples without those that are left out; frames of a rate stay such.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
+use serde::{Deserialize, Serialize};
 use tumble::{Encoding, Layout};
 use tumble_formats::Feature;
 use tumble_formats::end_frame::EndFrame;
@@ -16,6 +17,7 @@ use tumble_formats::format::{Format, FormatOption};
 use crate::arguments::output::OutputArguments;
 use crate::batch::digest::{self, InputFile};
 use crate::messages::exit::Failure;
+use crate::messages::names;
 
 /// A rule about an option of this name; the name is that of its field, with `_`.
 pub(crate) struct OptionRule {
@@ -139,10 +141,6 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     reading("source_order", FormatOption::SourceOrder),
     reading("bridge_gaps", FormatOption::BridgeGaps),
     reading("keyframes", FormatOption::Keyframes),
-    OptionRule {
-        bytes: Bytes::ByContent,
-        ..deciding("body_model")
-    },
     // Results.
     silent("out"),
     silent("overwrite"),
@@ -195,6 +193,10 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     OptionRule {
         bytes: Bytes::ByContent,
         ..of_results("offsets", |result| lengths(result, "offsets"))
+    },
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..of_results("body_model", |result| lengths(result, "body-model"))
     },
     // Paths.
     deciding("seconds"),
@@ -370,9 +372,34 @@ impl CommandLine {
         }
     }
 
-    /// Everything that determines a result besides its input: `layout=track method=slerp`. Options
-    /// without a value or a default are left out.
-    pub(crate) fn options(&self) -> String {
+    /// Everything that determines a result besides its input. Options without a value or a default are left out.
+    pub(crate) fn options(&self) -> ResultOptions {
+        ResultOptions {
+            text: self.text(),
+            files: self.files(),
+        }
+    }
+
+    /// The files that options name, and that determine results.
+    fn files(&self) -> Vec<OptionFile> {
+        let named = self.values.iter().flat_map(|(name, values)| {
+            let is_file =
+                name == "times" || rule(name).is_some_and(|rule| rule.bytes == Bytes::ByContent);
+            values
+                .iter()
+                .filter(move |_| is_file)
+                .map(move |value| (name, value))
+        });
+        let files = named.filter(|(_, value)| !names::is_standard(Path::new(value)));
+        let files = files.map(|(name, value)| OptionFile {
+            option: name.replace('_', "-"),
+            path: value.clone(),
+            sha256: content(value),
+        });
+        files.filter(|file| !file.sha256.is_empty()).collect()
+    }
+
+    fn text(&self) -> String {
         let shown = self.values.iter().filter_map(|(name, values)| {
             let bytes = rule(name).map_or(Bytes::ByValue, |rule| rule.bytes);
             let values: Vec<String> = match bytes {
@@ -386,9 +413,39 @@ impl CommandLine {
     }
 }
 
+/// Everything that determines a result besides its input.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ResultOptions {
+    /// The options with their values: `layout=track method=slerp`.
+    pub(crate) text: String,
+    /// The files that they name.
+    pub(crate) files: Vec<OptionFile>,
+}
+
+impl ResultOptions {
+    /// The options of that command, whose name begins their text.
+    pub(crate) fn of_command(self, command: &str) -> Self {
+        Self {
+            text: format!("{command} {}", self.text),
+            ..self
+        }
+    }
+}
+
+/// A file that an option names, such as that of `--offsets`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct OptionFile {
+    /// The option, without `--`.
+    pub(crate) option: String,
+    /// As on the command line.
+    pub(crate) path: String,
+    /// The hash of the file, or of the models in a folder.
+    pub(crate) sha256: String,
+}
+
 /// The hash of a file; empty where it cannot be read again, as standard input. That of the models in a folder of
 /// body models.
-fn content(file: &str) -> String {
+pub(crate) fn content(file: &str) -> String {
     if Path::new(file).is_dir() {
         return digest::of_folder(Path::new(file), "npz");
     }

@@ -163,28 +163,33 @@ impl OutputArguments {
             None => Vec3::ZERO,
             Some(_) => Vec3::new(0.0, -length as f32, 0.0),
         };
-        let Some(parents) = &self.parents else {
+        let Some(parents) = self.parents(tracks)? else {
             let offsets = (0..tracks).map(|track| hung(&track.checked_sub(1)));
             let chain = Skeleton::chain(tracks, length).map_err(|error| error.to_string())?;
             return Ok((chain, offsets.collect()));
+        };
+        let offsets: Vec<Vec3> = parents.iter().map(hung).collect();
+        let skeleton = Skeleton::new(parents, offsets.clone());
+        let skeleton = skeleton.map_err(|error| format!("--parents: {error}"))?;
+        Ok((skeleton, offsets))
+    }
+
+    /// The parent of each track by `--parents`; `None` if the command line does not have it.
+    pub(crate) fn parents(&self, tracks: usize) -> Result<Option<Vec<Option<usize>>>, String> {
+        let Some(parents) = &self.parents else {
+            return Ok(None);
         };
         if parents.len() != tracks {
             let count = parents.len();
             return Err(format!("--parents has {count} entries for {tracks} tracks"));
         }
-        let parents: Vec<Option<usize>> = parents
-            .iter()
-            .map(|&parent| match parent {
-                -1 => Ok(None),
-                _ => usize::try_from(parent).map(Some).map_err(|_| {
-                    format!("--parents: {parent} is not the index of a track; use -1 for no parent")
-                }),
-            })
-            .collect::<Result<_, _>>()?;
-        let offsets: Vec<Vec3> = parents.iter().map(hung).collect();
-        let skeleton = Skeleton::new(parents, offsets.clone());
-        let skeleton = skeleton.map_err(|error| format!("--parents: {error}"))?;
-        Ok((skeleton, offsets))
+        let indices = parents.iter().map(|&parent| match parent {
+            -1 => Ok(None),
+            _ => usize::try_from(parent).map(Some).map_err(|_| {
+                format!("--parents: {parent} is not the index of a track; use -1 for no parent")
+            }),
+        });
+        indices.collect::<Result<_, _>>().map(Some)
     }
 
     /// Whether plain rotations are written.
@@ -207,11 +212,6 @@ impl OutputArguments {
             OutputKind::Transform => "transform",
             OutputKind::World => "world",
         }
-    }
-
-    /// Whether `--parents` is set.
-    pub(crate) fn has_parents(&self) -> bool {
-        self.parents.is_some()
     }
 
     /// Whether the axes of angles change what is written.

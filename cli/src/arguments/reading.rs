@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use tumble::FrameRate;
-use tumble_formats::adjust::{JointOffsets, UpAxis, adjust_all, set_offsets};
+use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
@@ -277,26 +277,26 @@ impl ReadingArguments {
         if let Some(file) = &self.offsets {
             let offsets = JointOffsets::open(file);
             let offsets = offsets.map_err(|fault| Failure::input(&fault, ""))?;
-            for clip in &mut loaded.clips {
-                offsets.set(clip).map_err(|error| {
-                    let message = format!("{}: {error}", names::input(path));
-                    let file = file.display().to_string();
-                    Failure::input(&Diagnostic::new(file, Code::Offsets, message), "")
-                })?;
-            }
+            let of_clips = loaded.clips.iter().map(|clip| offsets.of_clip(clip));
+            let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = of_clips.collect();
+            let placed =
+                of_clips.and_then(|numbers| set_all_offsets(loaded, &names::input(path), &numbers));
+            placed.map_err(|error| {
+                let message = format!("{}: {error}", names::input(path));
+                let file = file.display().to_string();
+                Failure::input(&Diagnostic::new(file, Code::Offsets, message), "")
+            })?;
         }
         if let Some(model) = &self.body_model {
-            for clip in &mut loaded.clips {
-                let offsets = body_offsets(model, clip, Limits::default());
-                let offsets = offsets.map_err(|fault| Failure::input(&fault, ""))?;
-                set_offsets(clip, &offsets).map_err(|error| {
-                    let model = model.display().to_string();
-                    Failure::input(
-                        &Diagnostic::new(model, Code::BodyModel, error.to_string()),
-                        "",
-                    )
-                })?;
-            }
+            let of_clip = |clip| body_offsets(model, clip, Limits::default());
+            let of_clips: Result<Vec<Vec<f64>>, Diagnostic> =
+                loaded.clips.iter().map(of_clip).collect();
+            let numbers = of_clips.map_err(|fault| Failure::input(&fault, ""))?;
+            set_all_offsets(loaded, &names::input(path), &numbers).map_err(|error| {
+                let model = model.display().to_string();
+                let fault = Diagnostic::new(model, Code::BodyModel, error.to_string());
+                Failure::input(&fault, "")
+            })?;
         }
         if self.up_axis.is_some() && loaded.box_length.is_some() {
             let message = "--up-axis has no effect on a chain of boxes; leave it out";

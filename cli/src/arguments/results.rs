@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::EulerSequence;
-use tumble_formats::format::{Document, FormatOption, MotionOptions, left_behind};
+use tumble_formats::format::{Adjustment, Document, FormatOption, MotionOptions, left_behind};
 use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::{Code, Diagnostic, Feature, Format};
 
 use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
+use crate::arguments::options::ResultOptions;
 use crate::batch::output_plan::{self, OutputPlan, OutputRequest};
 use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
 use crate::batch::result_names::ResultNaming;
@@ -151,6 +152,16 @@ impl ResultArguments {
                 naming: self.names,
             },
         )?;
+        if plan.manifest.is_none() {
+            let options = [
+                ("--base", self.base.is_some()),
+                ("--names full", self.names == ResultNaming::Full),
+            ];
+            if let Some((option, _)) = options.into_iter().find(|(_, is_set)| *is_set) {
+                let message = format!("{option} is for a directory of results; leave it out");
+                return Err(Failure::usage(message));
+            }
+        }
         if self.json && plan.targets.iter().any(ResultTarget::is_standard) {
             return Err(Failure::usage(
                 "--json and the result cannot both go to standard output; give -o FILE",
@@ -164,7 +175,7 @@ impl ResultArguments {
             let format = target.format();
             if !format.takes(FormatOption::TimesApart) {
                 return Err(Failure::usage(format!(
-                    "--times-out is for {}, which stores no times; {} stores times or a frame rate: leave it out",
+                    "--times-out is for {}, whose times are in a separate file, and has no effect on {}; leave it out",
                     Format::names_taking(FormatOption::TimesApart),
                     format.name
                 )));
@@ -180,7 +191,7 @@ impl ResultArguments {
         &self,
         reader: impl InputReader,
         plan: OutputPlan,
-        options: String,
+        options: ResultOptions,
     ) -> Pipeline<'static> {
         let inputs = PipelineInputs {
             jobs: plan.paths.into_iter().zip(plan.targets).collect(),
@@ -229,8 +240,7 @@ pub(crate) fn document_to_rewrite<'a>(
 ) -> Option<&'a dyn Document> {
     let (loaded, format) = (&work.input.loaded, work.target.format());
     let document = loaded.document.as_deref()?;
-    let adjusted = loaded.is_adjusted.then_some("other units or axes make");
-    let why = otherwise.or(adjusted);
+    let why = otherwise.or(loaded.adjustment.map(Adjustment::makes_new));
     if let Some(lost) = left_behind(document, &loaded.warnings, format, why) {
         work.warn(Diagnostic::new(&work.name, Code::NoRoom, lost));
     }

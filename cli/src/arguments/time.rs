@@ -433,9 +433,9 @@ pub(crate) fn in_frames(
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // `Outside::kept` prints how many are left out.
-    let [before, after] = outside.leaves_out();
-    if start < first && !before || end > last && !after {
+    // What tracks do there was said; `Outside::kept` prints how many times are left out.
+    let [is_default_before, is_default_after] = outside.is_default();
+    if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::Diagnostic;
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
+use crate::arguments::options::OptionFile;
 use crate::batch::digest;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
@@ -31,6 +32,9 @@ pub(crate) struct ManifestEntry {
     pub(crate) input_sha256: Option<String>,
     /// Everything that determines the result besides the input.
     pub(crate) options: String,
+    /// The files that these name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) option_files: Vec<OptionFile>,
     pub(crate) kernels_sha256: String,
     /// The program's version.
     pub(crate) tumble: String,

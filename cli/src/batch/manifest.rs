@@ -25,6 +25,7 @@ use crate::batch::entry::{
     self, BatchStart, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
     PreviousEntries, ResultRecorder, line, of_clips,
 };
+use crate::batch::owner::Owner;
 use crate::batch::shards::{plan::RecordedPlan, record};
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
@@ -122,6 +123,17 @@ impl Manifest {
     /// Whether the manifest lists that output, or the results of its clips.
     pub(crate) fn knows(&self, output: &str) -> bool {
         self.previous.contains_key(output) || of_clips(&self.previous, output).next().is_some()
+    }
+
+    /// The input that the output was made from, or those of its clips.
+    pub(crate) fn owner(&self, output: &str) -> Option<Owner> {
+        let whole = self.previous.get(output);
+        let clip = || {
+            of_clips(&self.previous, output)
+                .map(|(entry, _)| entry)
+                .next()
+        };
+        whole.or_else(clip).map(Owner::from)
     }
 
     /// Adds the line of a result, in one piece.
@@ -383,6 +395,7 @@ mod tests {
             input: text("a.dat"),
             input_sha256: Some(text("1")),
             options: text("o"),
+            option_files: Vec::new(),
             kernels_sha256: kernels_sha256().to_owned(),
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),

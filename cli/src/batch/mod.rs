@@ -4,6 +4,7 @@ pub(crate) mod digest;
 pub(crate) mod entry;
 pub(crate) mod manifest;
 pub(crate) mod output_plan;
+pub(crate) mod owner;
 pub(crate) mod pipeline;
 pub(crate) mod result_names;
 pub(crate) mod room;

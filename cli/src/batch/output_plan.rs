@@ -14,6 +14,7 @@ use tumble_formats::output::remove_abandoned;
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry::{self, InputEntry};
 use crate::batch::manifest::Manifest;
+use crate::batch::owner::ReplacedOwners;
 use crate::batch::result_names::{ResultName, ResultNaming, format, name_results};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
 use crate::batch::shards::record;
@@ -140,8 +141,12 @@ fn in_folder(
     }
     let mut result_folder = ResultFolder::new(folder);
     let mut plan = OutputPlan::default();
+    let mut replaced = ReplacedOwners::default();
     for (found, name) in files.iter().zip(names) {
         let target = name.and_then(|name| {
+            if let Some(owner) = manifest.owner(&name).filter(|_| !request.overwrite) {
+                replaced.check(found, &folder.join(&name), &owner)?;
+            }
             let destination = result_folder.destination(&name, overwrites(&name))?;
             Ok(ResultTarget::new(destination.hashed(), format, name))
         });
@@ -156,6 +161,7 @@ fn in_folder(
             }),
         }
     }
+    replaced.note();
     // Locked files are being written: they are kept.
     result_folder.made.extend(manifest.folders());
     result_folder.made.insert(folder.to_owned());

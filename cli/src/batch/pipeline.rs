@@ -28,6 +28,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::{Diagnostic, Feature, Loaded};
 
 use crate::arguments::input::{InputReader, check_complete, print_warnings, several_clips_failure};
+use crate::arguments::options::ResultOptions;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{
     BatchStart, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
@@ -56,7 +57,7 @@ pub(crate) struct PipelineInputs {
 /// The options of a batch.
 pub(crate) struct BatchOptions {
     /// Everything that determines a result besides its input.
-    pub(crate) options: String,
+    pub(crate) options: ResultOptions,
     /// Results that are done are skipped.
     pub(crate) resume: bool,
     /// Every result and every warning is printed.
@@ -192,7 +193,7 @@ struct CurrentInput {
 struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
-    options: String,
+    options: ResultOptions,
     inputs: usize,
     made: HashSet<String>,
     /// The inputs with all their results, and those with some of them.
@@ -240,7 +241,7 @@ impl<'a> Pipeline<'a> {
         let reading = ReadingAhead {
             reader,
             previous: records.previous(),
-            options: options.clone(),
+            options: options.text.clone(),
             resume,
         };
         let begun = records.begin(BatchStart {
@@ -249,7 +250,7 @@ impl<'a> Pipeline<'a> {
                 .map(|(path, target)| (&**path, target.name()))
                 .collect(),
             skipped,
-            options: &options,
+            options: &options.text,
             resume,
         });
         let batch = BatchRecords {
@@ -637,7 +638,8 @@ impl BatchRecords<'_> {
             output_sha256: digest.finish(),
             input: work.path().display().to_string(),
             input_sha256: work.input.file.sha256().map(str::to_owned),
-            options: self.options.clone(),
+            options: self.options.text.clone(),
+            option_files: self.options.files.clone(),
             kernels_sha256: kernels_sha256().to_owned(),
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: result.device,

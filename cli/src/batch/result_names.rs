@@ -26,7 +26,7 @@ pub(crate) fn format(
     if !folder.is_dir() && (folder.exists() || target::of(folder).is_some()) {
         let shown = folder.display();
         return Err(Failure::usage(format!(
-            "{shown}: several inputs need a directory for their results, not one file"
+            "{shown}: is one file; several inputs, and shards, need a directory for their results"
         )));
     }
     choose(Path::new("-"), requested)

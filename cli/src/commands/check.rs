@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
+use crate::arguments::options::{self, OptionFile};
 use crate::batch::digest::{self, InputFile};
 use crate::batch::entry::{self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME};
 use crate::batch::manifest::is_removed;
@@ -23,12 +24,13 @@ use crate::threads::on_threads;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 `tumble eval` writes a manifest into every directory of results: for each result a line of
-JSON with the SHA-256 of the result and of its input (with the files that it refers to), the
-options, the kernels, the program's version and the device; and a line for each input that
-failed or has no result yet. The exit code is 0 only if the batch is complete: all inputs have
-their results, no result has changed, and neither has an input that is found by its path in
-the manifest. If shards are missing in the directory, it checks the results of the complete
-shards, and prints how many there are.
+JSON with the SHA-256 of the result, of its input (with the files that it refers to) and of
+the files that options name, the options, the kernels, the program's version and the device;
+and a line for each input that failed or has no result yet. The exit code is 0 only if the
+batch is complete: all inputs have their results, no result has changed, and neither has an
+input, or a file that an option names, that is found by its path in the manifest. If shards
+are missing in the directory, it checks the results of the complete shards, and prints how
+many there are.
 
 Examples:
   tumble check results/manifest.jsonl
@@ -42,8 +44,8 @@ pub(crate) struct Arguments {
 enum Fault {
     Damaged,
     Unreadable(io::Error),
-    /// Its input has other bytes than those that it was made from.
-    Stale,
+    /// This file has other bytes than those that it was made from.
+    Stale(String),
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -95,10 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         words::error(&match fault {
             Fault::Damaged => format!("{output}: its bits have changed since it was written"),
             Fault::Unreadable(error) => format!("{output}: cannot be read: {error}"),
-            Fault::Stale => {
-                let input = &entry.input;
-                format!("{output}: its input {input} has changed since it was written")
-            }
+            Fault::Stale(file) => format!("{output}: its {file} has changed since it was written"),
         });
     }
     inputs.note_missing(&entries);
@@ -189,8 +188,7 @@ fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
 fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Option<Fault> {
     let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
     match digest::is_whole(folder, &entry.output, bytes, sha256) {
-        Ok(true) if inputs.differ(entry) => Some(Fault::Stale),
-        Ok(true) => None,
+        Ok(true) => inputs.changed(entry).map(Fault::Stale),
         Ok(false) => Some(Fault::Damaged),
         Err(error) => Some(Fault::Unreadable(error)),
     }
@@ -198,7 +196,11 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
 
 /// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none: results
 /// may be checked on another machine than that of their inputs.
-struct InputHashes<'a>(BTreeMap<&'a str, Option<String>>);
+struct InputHashes<'a> {
+    inputs: BTreeMap<&'a str, Option<String>>,
+    /// Those of the files that options name.
+    of_options: BTreeMap<&'a str, String>,
+}
 
 impl<'a> InputHashes<'a> {
     fn of(entries: &'a [ManifestEntry]) -> Self {
@@ -213,18 +215,33 @@ impl<'a> InputHashes<'a> {
             || inputs.par_iter().map(|input| hash(input)).collect(),
             || inputs.iter().map(|input| hash(input)).collect(),
         );
-        Self(hashes.into_iter().collect())
+        let files = entries.iter().flat_map(|entry| &entry.option_files);
+        let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
+        let found = paths.into_iter().filter(|path| Path::new(path).exists());
+        Self {
+            inputs: hashes.into_iter().collect(),
+            of_options: found.map(|path| (path, options::content(path))).collect(),
+        }
     }
 
-    /// Whether the input of a result is there and has other bytes than those that the result was made from.
-    fn differ(&self, entry: &ManifestEntry) -> bool {
-        let now = self.0.get(&*entry.input).and_then(Option::as_ref);
-        now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now))
+    /// The input of a result, or the file of an option, if it is there and has other bytes than those that the result
+    /// was made from.
+    fn changed(&self, entry: &ManifestEntry) -> Option<String> {
+        let now = self.inputs.get(&*entry.input).and_then(Option::as_ref);
+        if now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now)) {
+            return Some(format!("input {}", entry.input));
+        }
+        let differs = |file: &&OptionFile| {
+            let now = self.of_options.get(&*file.path);
+            now.is_some_and(|now| *now != file.sha256)
+        };
+        let file = entry.option_files.iter().find(differs)?;
+        Some(format!("file {} of --{}", file.path, file.option))
     }
 
     /// Says how many results have no input any more, and how many inputs were not found to be compared.
     fn note_missing(&self, entries: &[ManifestEntry]) {
-        let missing: BTreeSet<&str> = (self.0.iter())
+        let missing: BTreeSet<&str> = (self.inputs.iter())
             .filter_map(|(input, hash)| hash.is_none().then_some(*input))
             .filter(|input| !Path::new(input).exists())
             .collect();

@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     check_sequence(arguments.sequence, format)?;
-    let options = format!("convert {}", arguments.command_line.options());
+    let options = arguments.command_line.options().of_command("convert");
     let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
@@ -124,11 +124,7 @@ impl Arguments {
             }
             None => write_keys(name, &parts, document, &options, target)?,
         };
-        let done = format!(
-            "{}, {}",
-            words::count(parts.len(), "clip"),
-            words::count(parts.iter().map(|clip| clip.key_count()).sum(), "key"),
-        );
+        let done = format!("{}, {}", words::count(parts.len(), "clip"), keys(&parts),);
         Ok(work.result(written, &done, None))
     }
 
@@ -137,5 +133,16 @@ impl Arguments {
         let several = target.format().supports(Feature::SeveralClips);
         let chooses = self.inputs.reading.chooses_animation() && several;
         makes_new(&self.inputs).or(chooses.then_some("one animation makes"))
+    }
+}
+
+/// `30 keys (25 of rotations)`: of all channels of some clips, and those that `tumble info` counts.
+fn keys(clips: &[Cow<'_, Motion>]) -> String {
+    let all = clips.iter().map(|clip| clip.key_count()).sum();
+    let rotations: usize = clips.iter().map(|clip| clip.set.key_count()).sum();
+    let keys = words::count(all, "key");
+    match all == rotations {
+        true => keys,
+        false => format!("{keys} ({rotations} of rotations)"),
     }
 }

@@ -15,7 +15,7 @@ use tumble_formats::sample::Samples;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{GatheredInputs, InputSelection};
 use crate::arguments::interpolation::Outside;
-use crate::arguments::options::CommandLine;
+use crate::arguments::options::{CommandLine, ResultOptions};
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{SampleRequest, SamplingArguments};
@@ -93,9 +93,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 impl Arguments {
     /// All that decides over the bytes of a result besides its input.
-    fn options(&self, samples: &SampleRequest) -> String {
-        let times = samples.digest();
-        format!("follow {} times={times}", self.command_line.options())
+    fn options(&self, samples: &SampleRequest) -> ResultOptions {
+        let mut options = self.command_line.options().of_command("follow");
+        options.text += &format!(" times={}", samples.digest());
+        options
     }
 
     /// Refuses options that have no effect on these paths.

@@ -228,7 +228,13 @@ impl Summary {
             let _ = writeln!(text, "  {label:18} {value}");
         };
         line("tracks", self.tracks.to_string());
-        line("keys", self.keys.to_string());
+        line(
+            "keys",
+            match self.moved + self.scaled {
+                0 => self.keys.to_string(),
+                _ => format!("{} of rotations", self.keys),
+            },
+        );
         line(
             "time",
             match self.time_offset {

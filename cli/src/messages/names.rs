@@ -44,6 +44,14 @@ pub(crate) fn clip(clip: &Motion) -> String {
     }
 }
 
+/// The title of a clip: its file and its name, if it has one.
+pub(crate) fn title(path: &Path, of_file: &Motion) -> String {
+    match of_file.name {
+        Some(_) => format!("{}: {}", file(path), clip(of_file)),
+        None => file(path),
+    }
+}
+
 /// The names in messages of all clips of a file.
 pub(crate) fn clips(loaded: &Loaded) -> String {
     let names: Vec<String> = loaded.clips.iter().map(clip).collect();

@@ -168,7 +168,7 @@ impl FrameKeys {
                 rest,
             });
         }
-        Ok(Motion {
+        let mut clip = Motion {
             set,
             skeleton,
             rate: Some(self.rate),
@@ -188,9 +188,19 @@ impl FrameKeys {
                 .map(|joint| joint.written.clone())
                 .collect(),
             ..Motion::default()
-        })
+        };
+        let mut end_sites = clip.bvh.iter().flat_map(|joint| &joint.end_sites);
+        if clip.has_unplaced_joints() && end_sites.all(|&site| site == Vec3::ZERO) {
+            clip.no_world = Some(NO_OFFSETS.to_owned());
+        }
+        Ok(clip)
     }
 }
+
+/// Programs that know the rotations of joints and not their positions, as of a body whose shape is not known, write
+/// such files.
+const NO_OFFSETS: &str = "all offsets in the file are 0, so that it does not say where joints are relative to their \
+                          parents; give their places with --offsets";
 
 /// The interpolation of a channel, if it has keys.
 fn linear(has_keys: bool) -> Option<ChannelInterpolation> {

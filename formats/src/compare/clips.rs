@@ -253,7 +253,9 @@ impl ClipPair<'_> {
         let (inputs, motions) = (self.inputs, self.clips);
         let found = self.matched_joints()?;
         self.check_any_pair(&found)?;
-        if !in_world {
+        if in_world {
+            check_known_parents(inputs, motions, &found.matched.pairs)?;
+        } else {
             let [first, second] = &found.joints;
             first.check_parents(second, &found.matched, inputs)?;
             self.check_spaces()?;
@@ -391,10 +393,19 @@ impl ClipPair<'_> {
         })
     }
 
-    /// The assumption by which the clips are compared, for a warning: that two tracks are the same although their
-    /// names differ, because each clip has one track. `None` if nothing is assumed.
+    /// The assumptions by which the clips are compared, for warnings: that two tracks are the same although their names
+    /// differ, because each clip has one track; that joints of one name have the same order in both clips.
     #[must_use]
-    pub fn assumption(&self) -> Option<String> {
+    pub fn assumptions(&self) -> Vec<String> {
+        let of_order = |side: usize| self.clips[side].order_assumption(self.inputs[side]);
+        let by_order = of_order(0).or_else(|| of_order(1));
+        self.single_track_assumption()
+            .into_iter()
+            .chain(by_order)
+            .collect()
+    }
+
+    fn single_track_assumption(&self) -> Option<String> {
         let [first, second] = self.clips.map(|clip| {
             let name = clip.set.get(0)?.name?;
             // Readers of trajectories make up this name.
@@ -452,6 +463,9 @@ impl ClipPair<'_> {
         }
         let [first, second] = &found.joints;
         let error = first.order_of(second, self.inputs).err();
+        if let Some(error @ JointMatchError::Unnamed { .. }) = error {
+            return Err(error.into());
+        }
         Err(CompareError::NoTrackInBoth {
             inputs: self.inputs.map(str::to_owned),
             tracks: [first.len(), second.len()],
@@ -478,6 +492,34 @@ impl MatchedJoints {
                 .collect()
         })
     }
+}
+
+/// Refuses, in the world, pairs of tracks of which one has a parent and the other is of a clip without a skeleton: its
+/// rotations may be relative to a parent that the clip does not know.
+pub(super) fn check_known_parents(
+    inputs: [&str; 2],
+    clips: [&Motion; 2],
+    pairs: &[[usize; 2]],
+) -> Result<(), CompareError> {
+    let has_parent = |side: usize, track: usize| {
+        let joint = clips[side].skeleton.get(track);
+        joint.is_some_and(|joint| joint.parent.is_some())
+    };
+    for without in [0, 1] {
+        let with = 1 - without;
+        let clip = clips[without];
+        if !clip.skeleton.is_empty() || clip.is_world {
+            continue;
+        }
+        if let Some(pair) = pairs.iter().find(|pair| has_parent(with, pair[with])) {
+            return Err(CompareError::NoSkeleton {
+                without: inputs[without].to_owned(),
+                with: inputs[with].to_owned(),
+                joint: clips[with].set.track_name(pair[with]),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Numbers the frames of a clip, from 0 at its first key.

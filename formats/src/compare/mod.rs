@@ -66,6 +66,19 @@ pub enum CompareError {
         /// Name of the second.
         local: String,
     },
+    /// Poses in the world are compared, and a joint has a parent in one clip, while the other clip has no skeleton.
+    #[error(
+        "`{joint}` has a parent in {with}, and {without} has no skeleton, so its poses in the world are not known; \
+         give {without} in a format that stores parents, or compare relative to the parents, without --world"
+    )]
+    NoSkeleton {
+        /// Name of the clip without a skeleton in messages.
+        without: String,
+        /// Name of the other clip.
+        with: String,
+        /// Name of the first joint with a parent.
+        joint: String,
+    },
     /// The time spans of the clips do not overlap.
     #[error(
         "no time lies in both: {} from {} to {} s, {} from {} to {} s",

@@ -4,6 +4,7 @@ use serde::Serialize;
 use tumble::{Engine, Interpolation, SampleTimes, method};
 
 use crate::compare::CompareError;
+use crate::compare::clips::check_known_parents;
 use crate::motion::Motion;
 use crate::sample::ChannelMethods;
 use crate::trajectory::{
@@ -141,6 +142,11 @@ impl PathDifference {
         let names = clips.map(|(name, _, _)| name);
         let inputs = || names.map(str::to_owned);
         let first = clips[0].1;
+        // A path of one track is of a body in the world.
+        if clips.iter().all(|(_, clip, _)| clip.set.track_count() > 1) {
+            let motions = clips.map(|(_, clip, _)| clip);
+            check_known_parents(names, motions, &[clips.map(|(_, _, track)| track)])?;
+        }
         // Each clip counts from whole seconds of its own.
         let shift = (first.time_offset - clips[1].1.time_offset) as f64;
         let times = [0, 1].map(|side| {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
+use crate::budget::Budget;
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::{Loaded, ReadOptions, TimeUnit};
@@ -85,8 +86,12 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     let mut record = ByteRecord::new();
     // Where each row begins, and how many lines are before it.
     let mut starts = Vec::new();
+    let budget = Budget::of(bytes.len(), options.limits);
     while sheet.next(&mut reader, &mut record)? {
         sheet.check_width(&record, &names)?;
+        // A number of a column or a row's location.
+        let charged = budget.take(columns.len() + 1, size_of::<f64>());
+        charged.map_err(|error| Diagnostic::new(name, Code::Memory, error.to_string()))?;
         if starts.is_empty()
             && let TimeSource::Times(time) = plan.time_source
             && let index = plan.columns[time].index

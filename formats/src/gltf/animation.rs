@@ -3,6 +3,7 @@
 use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
+use serde_json::value::RawValue;
 use tumble::FrameRate;
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -10,7 +11,7 @@ use crate::format::ReadOptions;
 use crate::gltf::channel::{ChannelKeys, InputTimes, MovedChannel};
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
-use crate::gltf::schema::{Animation, Channel, Sampler, TargetPath};
+use crate::gltf::schema::{Animation, AnimationExtras, Channel, Sampler, TargetPath};
 use crate::motion::grid::restore;
 use crate::motion::{self, Channels, Joint, Motion};
 use crate::rate::Precision;
@@ -136,6 +137,10 @@ pub(super) fn read(
     for (track, origin) in origins.into_iter().enumerate() {
         motion.set_origin(track, origin);
     }
+    // Joints that another program has placed since are where it says.
+    if motion.has_unplaced_joints() && motion.no_world.is_none() {
+        motion.no_world = animation.extras.and_then(no_world);
+    }
     let (sampled, others): (Vec<_>, Vec<_>) = moved.iter().zip(&keys).partition(|(moved, keys)| {
         keys.times.len() > 1 && moved.interpolation != motion::ChannelInterpolation::Step
     });
@@ -159,6 +164,12 @@ pub(super) fn read(
         beside: animation.channels.len() - moved.len(),
     };
     Ok(Some((motion, read)))
+}
+
+/// Why the positions of joints are unknown, if the extras of an animation say it.
+fn no_world(extras: &RawValue) -> Option<String> {
+    let extras: AnimationExtras = serde_json::from_str(extras.get()).ok()?;
+    extras.no_world
 }
 
 /// The channels that move nodes.

@@ -126,6 +126,20 @@ pub(super) struct Animation<'a> {
     pub(super) channels: Vec<&'a RawValue>,
     #[serde(borrow, default)]
     pub(super) samplers: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    pub(super) extras: Option<&'a RawValue>,
+}
+
+/// What Tumble writes beside an animation and reads again.
+#[derive(Deserialize)]
+pub(super) struct AnimationExtras {
+    /// Why the positions of its joints are unknown.
+    pub(super) no_world: Option<String>,
+}
+
+impl AnimationExtras {
+    /// The name of this member.
+    pub(super) const NO_WORLD: &str = "no_world";
 }
 
 #[derive(Deserialize)]

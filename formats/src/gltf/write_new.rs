@@ -16,6 +16,7 @@ use serde_json::Value;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, Quantization, WriteError, no_offsets};
+use crate::gltf::schema::AnimationExtras;
 use crate::gltf::write_new::binary::{AccessorData, Binary};
 use crate::gltf::write_new::json::{
     Animation, Asset, Buffer, Channel, MESHOPT, Root, Sampler, Scene, Skin, Target,
@@ -76,6 +77,10 @@ pub fn write_new(
         animation.extras = notes
             .map(|(key, note)| ((*key).to_owned(), Value::from(note.as_str())))
             .collect();
+        if let Some(reason) = (clip.clip.no_world.as_ref()).filter(|_| clip.clip.lacks_offsets()) {
+            let name = AnimationExtras::NO_WORLD.to_owned();
+            animation.extras.insert(name, Value::from(reason.as_str()));
+        }
         animations.push(animation);
     }
     let accessors = |binary: &mut Binary<'_>| std::mem::take(&mut binary.accessors);

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, Read};
 
+use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::foreign;
 use crate::source::MAX_BYTES;
@@ -22,7 +23,12 @@ pub(crate) struct Lines<R> {
     /// Whether the line in `buffer` has a line end.
     pub(crate) ended: bool,
     pub(crate) warnings: Vec<Diagnostic>,
+    /// [`Limits::memory`]; `None` if there is no such limit.
+    budget: Option<Budget>,
 }
+
+/// The bytes that a number takes at least: keys are f32.
+const NUMBER: usize = 4;
 
 /// The largest sizes of an input that is read; a larger input is refused.
 #[derive(Debug, Clone, Copy)]
@@ -95,6 +101,8 @@ impl<R: BufRead> Lines<R> {
             lf: 0,
             ended: true,
             warnings: Vec::new(),
+            // Without a limit, the length of text limits the memory for its numbers.
+            budget: limits.memory.map(|_| Budget::of(0, limits)),
         };
         if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
             let message = "this is UTF-16; save it as UTF-8 or ASCII".to_owned();
@@ -122,7 +130,7 @@ impl<R: BufRead> Lines<R> {
         self.read += count;
         if self.read > self.limits.file {
             let message = format!("the input is longer than {} bytes", self.limits.file);
-            return Err(self.refuse(1, Code::FileTooLong, message));
+            return Err(self.refuse_whole(Code::FileTooLong, message));
         }
         self.ended = self.buffer.last() == Some(&b'\n');
         if !self.ended && count > self.limits.line {
@@ -131,6 +139,12 @@ impl<R: BufRead> Lines<R> {
         }
         self.strip_line_end();
         self.check_characters()?;
+        if let Some(budget) = &self.budget {
+            let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b',';
+            let words = self.buffer.split(is_between);
+            let charged = budget.take(words.filter(|word| !word.is_empty()).count(), NUMBER);
+            charged.map_err(|error| self.refuse_whole(Code::Memory, error.to_string()))?;
+        }
         // Text by now: the check refuses all else.
         let line = String::from_utf8(std::mem::take(&mut self.buffer));
         Ok(Some(line.unwrap_or_default()))

@@ -1082,7 +1082,7 @@ def load(
     raw_times: bool = False,
     bridge_gaps: bool = False,
     keyframes: bool = False,
-    offsets: ArrayLike | None = None,
+    offsets: ArrayLike | Mapping[str, ArrayLike] | None = None,
     body_model: _Path | None = None,
     scale: float | Literal["metres"] | None = None,
     up: _UpAxis | None = None,

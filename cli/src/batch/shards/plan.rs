@@ -1,6 +1,6 @@
 //! Which inputs each shard has, and the record of this in the directory of results.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use tumble_formats::output::{Output, remove_abandoned};
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::Digest;
 use crate::batch::entry::{InputEntry, kernels_sha256};
+use crate::batch::owner::ReplacedOwners;
 use crate::batch::result_names::{self, ResultName, ResultNaming};
 use crate::batch::shards::record::{self, FOLDER};
 use crate::batch::target;
@@ -168,6 +169,17 @@ impl ShardPlan {
                 true => Ok(()),
                 false => Err(failure),
             };
+        }
+        if resume && !overwrite {
+            let names = self.names.iter().map(|name| name.as_deref().ok());
+            let found = names.zip(&self.inputs);
+            let found = found.filter_map(|(name, found)| Some((name?, found)));
+            let found: HashMap<&str, &FoundInput> = found.collect();
+            let mut replaced = ReplacedOwners::default();
+            for (result, owner) in record::other_owners(folder, &found) {
+                replaced.check(found[&*result], &folder.join(&result), &owner)?;
+            }
+            replaced.note();
         }
         self.recorded.write(folder)
     }

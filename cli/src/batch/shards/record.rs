@@ -1,16 +1,18 @@
 //! The file of a shard that is done: a header line, then its lines of the manifest.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
+use crate::arguments::input::FoundInput;
 use crate::batch::digest;
 use crate::batch::entry::{
     self, InputEntry, InputState, ManifestEntry, ManifestLines, PreviousEntries,
 };
+use crate::batch::owner::Owner;
 
 /// The subdirectory of shards in a directory of results.
 pub(crate) const FOLDER: &str = "manifest.d";
@@ -156,7 +158,7 @@ fn lines_of(bytes: &[u8]) -> ManifestLines {
 
 /// The part of a line that names its result.
 #[derive(Deserialize)]
-struct Owner {
+struct NamedResult {
     output: String,
     #[serde(default)]
     one_of: Option<(String, usize)>,
@@ -165,7 +167,7 @@ struct Owner {
 /// The result that a line names, and that of all clips; `None` where the line is not an entry, or names
 /// a result outside its directory.
 pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
-    let Owner { output, one_of } = serde_json::from_slice(line).ok()?;
+    let NamedResult { output, one_of } = serde_json::from_slice(line).ok()?;
     let all = one_of.map(|(all, _)| all);
     let is_good = is_beneath(&output) && all.as_deref().is_none_or(is_beneath);
     is_good.then_some((output, all))
@@ -195,12 +197,36 @@ pub(crate) fn inputs_of(folder: &Path, results: &HashSet<&str>) -> HashMap<Strin
     inputs
 }
 
-/// Passes on the lines of a directory's manifests, those of its shards first. They may be a million: one line is in
-/// memory at a time. A line that is not an entry, such as a shard's header, is among them.
+/// The results, of those in `found`, that a directory's manifests have from inputs of other paths, in order.
+pub(crate) fn other_owners(
+    folder: &Path,
+    found: &HashMap<&str, &FoundInput>,
+) -> BTreeMap<String, Owner> {
+    let mut owners = BTreeMap::new();
+    for_each_line(folder, |line| {
+        let Some(entry) = ManifestEntry::of_line(line) else {
+            return;
+        };
+        let result = entry.whole().0;
+        match found.get(result) {
+            Some(found) if found.path.display().to_string() != entry.input => {
+                owners.insert(result.to_owned(), Owner::from(&entry));
+            }
+            _ => {
+                owners.remove(result);
+            }
+        }
+    });
+    owners
+}
+
+/// Passes on the lines of a directory's manifests, those of its shards last: they are newer. They may be a million: one
+/// line is in memory at a time. A line that is not an entry, such as a shard's header, is among them.
 fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
     let shards = numbers(folder).into_iter();
     let shards = shards.filter_map(|shard| open_beneath(folder, &name(shard)).ok());
-    for file in shards.chain(entry::open(folder).ok().flatten()) {
+    let manifest = entry::open(folder).ok().flatten();
+    for file in manifest.into_iter().chain(shards) {
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
             each(&line);
         }
@@ -241,6 +267,7 @@ mod tests {
             input: name.to_owned(),
             input_sha256: None,
             options: String::new(),
+            option_files: Vec::new(),
             kernels_sha256: String::new(),
             tumble: String::new(),
             device: String::new(),

@@ -420,7 +420,7 @@ impl Arguments {
     /// The differences of two clips at the frames that are asked for.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
-        for warning in common.warning.iter().chain(&pair.assumption()) {
+        for warning in common.warning.iter().chain(&pair.assumptions()) {
             words::warning(warning);
         }
         let frames = match self.fps {

@@ -12,7 +12,9 @@ use tumble_formats::quaternion::ComponentOrder;
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
-use crate::arguments::options::{AppliesTo, CommandLine, OPTIONS, ResultKind, ResultRequest};
+use crate::arguments::options::{
+    AppliesTo, CommandLine, OPTIONS, ResultKind, ResultOptions, ResultRequest,
+};
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{
@@ -134,10 +136,10 @@ impl Arguments {
     }
 
     /// Everything that determines the bytes of a result besides its input.
-    pub(super) fn options(&self, samples: &SampleRequest) -> String {
+    pub(super) fn options(&self, samples: &SampleRequest) -> ResultOptions {
         let mut options = self.command_line.options();
         if let SampleRequest::Times(_) | SampleRequest::Keys(_) = samples {
-            options += &format!(" times={}", samples.digest());
+            options.text += &format!(" times={}", samples.digest());
         }
         options
     }

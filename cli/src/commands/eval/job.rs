@@ -7,15 +7,15 @@ use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::method::SLERP;
 use tumble::{Engine, Error, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline};
-use tumble_formats::Feature;
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
-use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
+use tumble_formats::{Code, Diagnostic, Feature};
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::curve_warning;
@@ -332,7 +332,7 @@ impl EvaluationJob<'_> {
     /// Whether the input's file can be written again.
     fn keeps(&self, target: &ResultTarget) -> bool {
         let document = self.work.input.loaded.document.as_ref();
-        !self.work.input.loaded.is_adjusted
+        self.work.input.loaded.adjustment.is_none()
             && document.is_some_and(|document| document.writes(target.format()))
     }
 
@@ -596,6 +596,7 @@ impl EvaluationJob<'_> {
         end_frame: EndFrame,
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let clip = &*self.with_parents(clip, name)?;
         let set = &clip.set;
         let samples = self.clip_frames(clip, end_frame, name)?;
         self.note_frames(std::slice::from_ref(&samples), target);
@@ -612,10 +613,6 @@ impl EvaluationJob<'_> {
             }
             (numbers, Vec::new())
         } else {
-            if self.arguments.output.has_parents() {
-                let message = "has a skeleton or positions already; leave out --parents";
-                return Err(Failure::usage(format!("{name}: {message}")));
-            }
             let samples = self.sample(name, clip, &samples)?;
             numbers_of(clip, &samples, kind)
                 .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?
@@ -660,6 +657,35 @@ impl EvaluationJob<'_> {
         let written = target.prepare(|out| write(&poses, out))?;
         let method = self.arguments.method.to_string();
         Ok(self.evaluated(size, &method, written, Some(order)))
+    }
+
+    /// The clip; one with translations and without a skeleton gets the parents of `--parents`.
+    fn with_parents<'a>(&self, clip: &'a Motion, name: &str) -> Result<Cow<'a, Motion>, Failure> {
+        let refused = |message: String| Failure::usage(format!("{name}: {message}"));
+        let parents = self.arguments.output.parents(clip.set.track_count());
+        let Some(parents) = parents.map_err(refused)? else {
+            return Ok(Cow::Borrowed(clip));
+        };
+        if !clip.skeleton.is_empty() || clip.is_world {
+            let message = "has a skeleton, or poses in the world, already; leave out --parents";
+            return Err(refused(message.to_owned()));
+        }
+        if !clip.has_vectors() {
+            // Boxes hang at the ends of others.
+            return Ok(Cow::Borrowed(clip));
+        }
+        let rest = Transform::default();
+        let mut with_parents = clip.clone();
+        with_parents.skeleton = (parents.into_iter())
+            .map(|parent| Joint { parent, rest })
+            .collect();
+        if with_parents.has_unplaced_joints() {
+            let message =
+                "joints with a parent have no translations; they are written at their parents";
+            self.work
+                .warn(Diagnostic::new(name, Code::NoOffsets, message));
+        }
+        Ok(Cow::Owned(with_parents))
     }
 
     /// The poses of boxes that hang at the ends of others.

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::input::{FoundInput, GatheredInputs};
+use crate::arguments::options::ResultOptions;
 use crate::arguments::time::SampleRequest;
 use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
@@ -83,7 +84,7 @@ pub(crate) fn size(found: &FoundInput) -> u64 {
 pub(crate) struct EvaluationRequest {
     samples: SampleRequest,
     /// Everything that determines results besides their inputs.
-    pub(crate) options: String,
+    pub(crate) options: ResultOptions,
 }
 
 impl EvaluationRequest {
@@ -112,7 +113,7 @@ impl EvaluationRequest {
     ) -> Result<ShardPlan, Failure> {
         let results = &arguments.results;
         let naming = (results.format(), results.naming());
-        let options = self.options.clone();
+        let options = self.options.text.clone();
         let plan = ShardPlan::new(inputs, sizes, folder, naming, options, shard_bytes)?;
         arguments.check_before(plan.format)?;
         Ok(plan)

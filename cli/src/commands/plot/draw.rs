@@ -67,7 +67,8 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
     let fine = format!("<svg width=\"{fine_width}\" height=\"{fine_height}\"");
     Ok(text.replacen(
         &fine,
-        &format!("<svg width=\"{width}\" height=\"{height}\""),
+        // Mitred joins would overshoot the corners of curves.
+        &format!("<svg width=\"{width}\" height=\"{height}\" stroke-linejoin=\"round\""),
         1,
     ))
 }
@@ -243,6 +244,14 @@ impl Brush {
                     let dash = vec![at(start), at(start + 6.0)];
                     canvas.draw(&PathElement::new(dash, self.line(entry.colour, 1.5)))?;
                 }
+            }
+            Mark::Upright => {
+                let ends =
+                    [-7.0, 7.0].map(|y| (self.px(left + LEGEND_MARK / 2.0), self.px(height + y)));
+                canvas.draw(&PathElement::new(
+                    ends.to_vec(),
+                    self.line(entry.colour, 1.0),
+                ))?;
             }
             Mark::Dot => {
                 let dot = rgb(entry.colour).filled();

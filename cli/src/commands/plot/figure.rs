@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::messages::colours::Colour;
+use crate::messages::colours::{AXIS, Colour};
 
 /// A grid of panels under a title and one legend.
 #[derive(Debug, Clone)]
@@ -22,11 +22,25 @@ pub(crate) struct LegendEntry {
     pub(crate) mark: Mark,
 }
 
+impl LegendEntry {
+    /// The entry of the upright lines at keys, if panels have any.
+    pub(crate) fn of_uprights(panels: &[Panel]) -> Option<Self> {
+        let has_uprights = panels.iter().any(|panel| !panel.uprights.is_empty());
+        has_uprights.then(|| Self {
+            label: "key".to_owned(),
+            colour: AXIS,
+            mark: Mark::Upright,
+        })
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mark {
     Line,
     Dot,
     Dashes,
+    /// An upright line, as those of [`Panel::uprights`].
+    Upright,
 }
 
 /// One pair of axes and what is drawn between them.
@@ -107,15 +121,14 @@ impl TimeAxis {
     /// their labels would lie on each other.
     const LONGEST: f64 = 1e5;
 
-    /// The axis of the times from the first to the last, with a little room.
-    pub(crate) fn of(first: f64, last: f64) -> Self {
+    /// The axis of the times from the first to the last, which count from the second `offset`, with a little room.
+    pub(crate) fn of(first: f64, last: f64, offset: i64) -> Self {
         let is_long = first.abs().max(last.abs()) >= Self::LONGEST;
-        let (origin, label) = match is_long {
-            true => (
-                first.floor(),
-                format!("time, s after {:.0} s", first.floor()),
-            ),
-            false => (0.0, "time, s".to_owned()),
+        let origin = if is_long { first.floor() } else { 0.0 };
+        let from = offset as f64 + origin;
+        let label = match from == 0.0 {
+            true => "time, s".to_owned(),
+            false => format!("time, s after {from:.0} s"),
         };
         let (low, high) = (first - origin, last - origin);
         let room = match high - low {
@@ -190,20 +203,29 @@ mod tests {
     /// Would catch times that fill a part of the axis only, and labels of ten digits.
     #[test]
     fn times_fill_their_axis_whatever_they_count_from() {
-        for (first, last, label, origin, range) in [
-            (0.0, 20.0, "time, s", 0.0, -1.0..21.0),
-            (-2.0, 8.0, "time, s", 0.0, -2.5..8.5),
-            (9000.0, 9002.0, "time, s", 0.0, 8999.9..9002.1),
-            (3.0, 3.0, "time, s", 0.0, 2.5..3.5),
+        for (first, last, offset, label, origin, range) in [
+            (0.0, 20.0, 0, "time, s", 0.0, -1.0..21.0),
+            (-2.0, 8.0, 0, "time, s", 0.0, -2.5..8.5),
+            (9000.0, 9002.0, 0, "time, s", 0.0, 8999.9..9002.1),
+            (3.0, 3.0, 0, "time, s", 0.0, 2.5..3.5),
+            (
+                0.5,
+                2.5,
+                1_700_000_000,
+                "time, s after 1700000000 s",
+                0.0,
+                0.4..2.6,
+            ),
             (
                 1_700_000_000.5,
                 1_700_000_002.5,
+                0,
                 "time, s after 1700000000 s",
                 1_700_000_000.0,
                 0.4..2.6,
             ),
         ] {
-            let TimeAxis { axis, origin: from } = TimeAxis::of(first, last);
+            let TimeAxis { axis, origin: from } = TimeAxis::of(first, last, offset);
             assert_eq!((&*axis.label, from), (label, origin));
             let off = (axis.range.start - range.start).abs() + (axis.range.end - range.end).abs();
             assert!(off < 1e-6, "{first} to {last}: {:?}", axis.range);

@@ -216,7 +216,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let choices = arguments.choices(&name, &clip)?;
         note_curves(&name, &clip, &choices);
-        let source = PlotSource::new(names::file(path), &clip, &choices, &samples)?;
+        let source = PlotSource::new(names::title(path, &clip), &clip, &choices, &samples)?;
         let subjects = arguments.subjects(&clip.set, tracks, &name)?;
         let pictures = match &out {
             PlotOutput::One(file) => {

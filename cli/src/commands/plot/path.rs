@@ -60,7 +60,7 @@ pub(super) fn figure(
     let colours: Vec<Colour> = makers.iter().map(|maker| maker.colour()).collect();
     let forward = source.body_rotation() * Vec3::Z;
     let keys = source.key_times();
-    let time = TimeAxis::of(first, last);
+    let time = TimeAxis::of(first, last, source.clip().time_offset);
     let uprights = match keys.len() {
         0..=UPRIGHTS => keys.iter().map(|key| key - time.origin).collect(),
         _ => vec![],
@@ -111,6 +111,7 @@ pub(super) fn figure(
             level: None,
         }
     });
+    let panels: Vec<Panel> = panels.collect();
     let entry = |(travel, &colour): (&Travel, &Colour)| LegendEntry {
         label: travel.name.clone(),
         colour,
@@ -123,9 +124,11 @@ pub(super) fn figure(
             words::count(tracks, "path"),
             device.label
         ),
-        legend: travels.iter().zip(&colours).map(entry).collect(),
+        legend: (travels.iter().zip(&colours).map(entry))
+            .chain(LegendEntry::of_uprights(&panels))
+            .collect(),
         columns: if tracks == 1 { 1 } else { 3 },
-        panels: panels.collect(),
+        panels,
     })
 }
 

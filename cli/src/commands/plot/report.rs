@@ -6,7 +6,6 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use tumble::TrackSet;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::interpolation::CurveChoice;
@@ -57,8 +56,8 @@ pub(crate) fn write(
         let mut boxes = progress.suspend(|| moving_boxes(set, &name));
         boxes.truncate(PANELS);
         let chapter = Chapter {
-            title: names::file(path),
-            facts: facts(set),
+            title: names::title(path, clip),
+            facts: facts(clip),
             figures: figures(
                 writer,
                 (path, clip, boxes),
@@ -98,7 +97,7 @@ fn figures(
     folder: &Path,
     progress: &mut Progress,
 ) -> Result<Vec<ReportFigure>, Failure> {
-    let name = names::file(path);
+    let name = names::title(path, clip);
     let mut shown = Vec::new();
     let mut draw =
         |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
@@ -122,7 +121,11 @@ fn figures(
     for dimension in dimensions {
         let subject = PlotSubject::Dimensions(vec![dimension - 1]);
         let (component, index) = (NAMES[(dimension - 1) % 4], (dimension - 1) / 4 + 1);
-        let about = format!("dimension {dimension}, {component} of box {index}");
+        let part = match clip.skeleton.is_empty() {
+            true => "box",
+            false => "joint",
+        };
+        let about = format!("dimension {dimension}, {component} of {part} {index}");
         for one in choices.chunks(1) {
             let method = one[0].method;
             let label = format!("{method}-dimension-{dimension}");
@@ -147,7 +150,10 @@ fn figures(
         ),
         (
             "sphere",
-            "where each box points, seen from the one it hangs from",
+            match clip.skeleton.is_empty() {
+                true => "where each box points, seen from the one it hangs from",
+                false => "where each joint points, seen from its parent",
+            },
             PlotSubject::Sphere(boxes, Vec3::NEG_Y),
         ),
     ] {
@@ -156,7 +162,8 @@ fn figures(
     Ok(shown)
 }
 
-fn facts(set: &TrackSet) -> String {
+fn facts(clip: &Motion) -> String {
+    let set = &clip.set;
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
     let steps = match Steps::of(set) {
         None => String::new(),
@@ -167,7 +174,10 @@ fn facts(set: &TrackSet) -> String {
     };
     format!(
         "{}, {} in all, from {first} to {last} s{steps}",
-        words::boxes(set.track_count()),
+        match clip.skeleton.is_empty() {
+            true => words::boxes(set.track_count()),
+            false => words::count(set.track_count(), "joint"),
+        },
         words::count(set.key_count(), "key"),
     )
 }

@@ -117,7 +117,7 @@ impl<'a> PlotSource<'a> {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), time| {
                 (time.min(first), time.max(last))
             });
-        let x = TimeAxis::of(first, last);
+        let x = TimeAxis::of(first, last, clip.time_offset);
         Ok(Self {
             name,
             clip,

@@ -153,7 +153,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.check_quantized(format)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
-    let options = format!("reduce {}", arguments.command_line.options());
+    let options = arguments.command_line.options().of_command("reduce");
     let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
@@ -209,7 +209,7 @@ impl Arguments {
         let all: Vec<Reduced> = all.into_iter().map(|pair| pair.0).collect();
         let plotted = match (plot, &*all) {
             (Some(destination), [reduced]) => {
-                let title = names::file(work.path());
+                let title = names::title(work.path(), &reduced.clip);
                 Some(picture::draw(&title, reduced, destination)?)
             }
             _ => None,

@@ -206,7 +206,12 @@ impl Scene {
             .collect();
         let centre = (low + high) / 2.0;
         let aspect = style.size.0 as f32 / style.size.1 as f32;
-        let upright = (SIGHT.to_radians() / 2.0).tan() * 0.92;
+        // Names are below the actors, which move up by half of what they take.
+        let below = match actors.iter().any(|actor| !actor.name.is_empty()) {
+            true => overlay::Labels::share(style.size.1),
+            false => 0.0,
+        };
+        let upright = (SIGHT.to_radians() / 2.0).tan() * 0.92 * (1.0 - below);
         let mut distance = length;
         for end in reach().chain(ground()) {
             for shift in &shifts {
@@ -220,9 +225,9 @@ impl Scene {
         let radius = (high - low).length() / 2.0 + shifts[0].length();
         let eye = centre + orientation * Vec3::Z * distance;
         let near = distance / 50.0;
-        let matrix =
-            directx::perspective(SIGHT.to_radians(), aspect, near, distance + radius * 40.0)
-                * look_at_mat4(eye, centre, Vec3::Y);
+        let matrix = Mat4::from_translation(below * Vec3::Y)
+            * directx::perspective(SIGHT.to_radians(), aspect, near, distance + radius * 40.0)
+            * look_at_mat4(eye, centre, Vec3::Y);
         let camera = Camera { matrix, eye };
         let theme = style.theme;
         let fine = [

@@ -120,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         plan.targets.first().map(ResultTarget::format),
     )?;
     let mut device = arguments.device.open()?;
-    let options = format!("smooth {}", arguments.command_line.options());
+    let options = arguments.command_line.options().of_command("smooth");
     let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
@@ -161,7 +161,7 @@ impl Arguments {
             let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
             let names: Vec<String> = names.collect();
             let subject = SmoothingSubject {
-                title: names::file(work.path()),
+                title: names::title(work.path(), clip),
                 about: match (self.low_pass, smoothing.passes) {
                     (Some(hz), _) => {
                         format!("low-pass at {hz} Hz, {}", smoothed_clip.kernel)

@@ -121,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let loaded = arguments.inputs.load(path)?;
         refused += loaded.refused.len();
         let several = loaded.clips.len() + loaded.refused.len() > 1;
-        let document = loaded.document.filter(|_| !loaded.is_adjusted);
+        let document = loaded.document_in_place();
         for clip in loaded.clips {
             let clip = arguments.select_tracks(clip, path)?;
             let mut one = ShownClip::new(path, clip, loaded.box_length, several);

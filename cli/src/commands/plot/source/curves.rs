@@ -72,10 +72,11 @@ impl PlotSource<'_> {
             PlotSubject::Sphere(boxes, axis) => {
                 let panel = |&index| self.sphere(device, index, *axis);
                 let panels = boxes.iter().map(panel).collect();
-                (
-                    "where an axis of each box points, seen from its parent",
-                    panels,
-                )
+                let quantity = match self.clip.skeleton.is_empty() {
+                    true => "where an axis of each box points, seen from its parent",
+                    false => "where an axis of each joint points, seen from its parent",
+                };
+                (quantity, panels)
             }
         };
         let panels = panels?;
@@ -97,13 +98,18 @@ impl PlotSource<'_> {
         Ok(Figure {
             title: format!("{}: {quantity}", self.name),
             subtitle: format!("{method}{}; evaluated on {}", self.about, device.label),
-            legend: self.legend(subject, by_component.is_some()),
+            legend: self.legend(subject, by_component.is_some(), &panels),
             columns,
             panels,
         })
     }
 
-    fn legend(&self, subject: &PlotSubject, by_component: bool) -> Vec<LegendEntry> {
+    fn legend(
+        &self,
+        subject: &PlotSubject,
+        by_component: bool,
+        panels: &[Panel],
+    ) -> Vec<LegendEntry> {
         let line = |label: String, colour| LegendEntry {
             label,
             colour,
@@ -116,23 +122,24 @@ impl PlotSource<'_> {
             let of = |one: &CurveChoice| line(one.method.name().to_owned(), one.method.colour());
             self.choices.iter().map(of).collect()
         };
-        let (label, mark) = match subject {
-            PlotSubject::Speed(_) => return legend,
-            PlotSubject::Error(_) => ("bound", Mark::Dashes),
-            _ => ("key", Mark::Dot),
+        let drawn = match subject {
+            PlotSubject::Speed(_) => None,
+            PlotSubject::Error(_) => Some(("bound", Mark::Dashes)),
+            _ => Some(("key", Mark::Dot)),
         };
-        legend.push(LegendEntry {
+        legend.extend(drawn.map(|(label, mark)| LegendEntry {
             label: label.to_owned(),
             colour: INK,
             mark,
-        });
+        }));
+        legend.extend(LegendEntry::of_uprights(panels));
         legend
     }
 
     /// The name of a box, of which a panel has room for the end alone if it is long: the end tells joints apart.
     fn box_name(&self, index: usize) -> String {
         /// Characters for which a panel has room.
-        const LONGEST: usize = 28;
+        const LONGEST: usize = 44;
         let name = box_name(self.set, index);
         match name.chars().count().checked_sub(LONGEST) {
             Some(over @ 1..) => format!("…{}", name.chars().skip(over + 1).collect::<String>()),

@@ -11,14 +11,25 @@ pub(crate) struct Labels {
     ink: Colour,
 }
 
+/// The height of letters in a picture of this height, in pixels.
+fn letters(height: u32) -> f32 {
+    (height as f32 / 26.0).clamp(9.0, 40.0)
+}
+
 impl Labels {
+    /// The part of a picture's height, at its bottom, that names take.
+    pub(crate) fn share(height: u32) -> f32 {
+        // The letters end one height above the bottom.
+        (2.2 * letters(height) / height as f32).min(0.5)
+    }
+
     /// Names, each centred at a position from 0, the left edge, to 1.
     pub(crate) fn new<'a>(
         names: impl Iterator<Item = (&'a str, f32)>,
         (width, height): (u32, u32),
         ink: Colour,
     ) -> io::Result<Self> {
-        let size = (height as f32 / 26.0).clamp(9.0, 40.0);
+        let size = letters(height);
         let text = |(name, position): (&str, f32)| {
             let (x, y) = (position * width as f32, height as f32 - size);
             format!("<text x=\"{x}\" y=\"{y}\">{name}</text>")
