@@ -116,6 +116,7 @@ impl LibraryPlan {
         }
         let (inputs, sizes): (GatheredInputs, Vec<u64>) = match listed {
             Some(listed) => {
+                arguments.results.refuse_base(library)?;
                 let of_formats = listed
                     .into_iter()
                     .filter(|(name, _)| Format::of(Path::new(name)).is_some())

@@ -96,6 +96,19 @@ impl ResultArguments {
         Ok(inputs)
     }
 
+    /// Refuses `--base` where the results of objects are named by the names of the objects.
+    pub(crate) fn refuse_base(&self, library: &Path) -> Result<(), Failure> {
+        match &self.base {
+            None => Ok(()),
+            Some(base) => Err(Failure::usage(format!(
+                "--base {}: the results of objects are named by the objects' names below {}; leave it out, or give \
+                 another library",
+                base.display(),
+                library.display()
+            ))),
+        }
+    }
+
     /// How results are named.
     pub(crate) fn naming(&self) -> ResultNaming {
         self.names
@@ -186,8 +199,9 @@ impl ResultArguments {
             jobs: plan.paths.into_iter().zip(plan.targets).collect(),
             refused: plan.refused,
             skipped: plan.skipped,
+            prints_json: self.json,
         };
-        let pipeline = match plan.manifest {
+        match plan.manifest {
             None => Pipeline::of_one(reader, inputs),
             Some(manifest) => Pipeline::of_batch(
                 reader,
@@ -199,10 +213,6 @@ impl ResultArguments {
                 },
                 Box::new(manifest),
             ),
-        };
-        match self.json {
-            true => pipeline.with_json(),
-            false => pipeline,
         }
     }
 }

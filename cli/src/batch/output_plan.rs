@@ -13,7 +13,7 @@ use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry::{self, InputEntry};
-use crate::batch::manifest::Manifest;
+use crate::batch::manifest::{Manifest, ManifestOptions};
 use crate::batch::result_names::{ResultName, ResultNaming, format, name_results};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
 use crate::batch::shards::record;
@@ -130,8 +130,14 @@ fn in_folder(
         refuse_shards(recorded, &names, folder, request)?;
     }
     target::create_folder(folder)?;
-    let mut manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
-    manifest.prune = request.prune;
+    let manifest = Manifest::open(
+        folder,
+        ManifestOptions {
+            has_shards: shards.is_some(),
+            overwrite: request.overwrite,
+            prune: request.prune,
+        },
+    )?;
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
     let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);

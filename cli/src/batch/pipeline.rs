@@ -51,6 +51,8 @@ pub(crate) struct PipelineInputs {
     pub(crate) refused: Vec<UnplannedInput>,
     /// Skipped entries of the directories of inputs.
     pub(crate) skipped: Vec<InputEntry>,
+    /// Whether JSON about all results and failures is printed at the end.
+    pub(crate) prints_json: bool,
 }
 
 /// The options of a batch.
@@ -205,13 +207,18 @@ struct BatchRecords<'a> {
 impl<'a> Pipeline<'a> {
     /// Of a single result, without a manifest.
     pub(crate) fn of_one(reader: impl InputReader, inputs: PipelineInputs) -> Self {
-        let PipelineInputs { jobs, refused, .. } = inputs;
+        let PipelineInputs {
+            jobs,
+            refused,
+            prints_json,
+            ..
+        } = inputs;
         let mut pipeline = Self {
             outcomes: Outcomes::of(refused.len() + jobs.len()),
             inputs: InputSource::One(Box::new(reader), jobs.into_iter()),
             current: None,
             batch: None,
-            json: None,
+            json: prints_json.then(Vec::new),
         };
         pipeline.refuse_all(refused);
         pipeline
@@ -228,6 +235,7 @@ impl<'a> Pipeline<'a> {
             jobs,
             refused,
             skipped,
+            prints_json,
         } = inputs;
         let BatchOptions {
             options,
@@ -288,18 +296,10 @@ impl<'a> Pipeline<'a> {
             current: None,
             batch: Some(batch),
             outcomes,
-            json: None,
+            json: prints_json.then(Vec::new),
         };
         pipeline.refuse_all(refused);
         pipeline
-    }
-
-    /// The same, which prints JSON about all results and failures at the end.
-    pub(crate) fn with_json(self) -> Self {
-        Self {
-            json: Some(Vec::new()),
-            ..self
-        }
     }
 
     /// Adds the failures of inputs that have no job.

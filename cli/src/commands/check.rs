@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::batch::digest::{self, InputFile};
 use crate::batch::entry::{self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME};
-use crate::batch::manifest::is_removed;
+use crate::batch::manifest::InputPresence;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
@@ -228,15 +228,11 @@ impl<'a> InputHashes<'a> {
             .filter_map(|(input, hash)| hash.is_none().then_some(*input))
             .filter(|input| !Path::new(input).exists())
             .collect();
-        let removed: BTreeSet<&str> = missing
-            .iter()
-            .copied()
-            .filter(|it| is_removed(it))
-            .collect();
-        let orphans = entries
-            .iter()
-            .filter(|entry| removed.contains(&*entry.input));
+        let orphans = entries.iter().filter(|entry| {
+            missing.contains(&*entry.input) && entry.presence() == InputPresence::Removed
+        });
         let orphans: Vec<&ManifestEntry> = orphans.collect();
+        let removed: BTreeSet<&str> = orphans.iter().map(|entry| &*entry.input).collect();
         if let Some(first) = orphans.first() {
             let results = words::count(orphans.len(), "result");
             let have = if orphans.len() == 1 { "has" } else { "have" };

@@ -161,12 +161,10 @@ impl Evaluator {
         let records = Box::new(&mut *shard);
         let work = PipelineInputs {
             jobs,
+            prints_json: arguments.results.prints_json(),
             ..PipelineInputs::default()
         };
         let mut pipeline = Pipeline::of_batch(reader, work, options, records);
-        if arguments.results.prints_json() {
-            pipeline = pipeline.with_json();
-        }
         let samples = &self.request.samples;
         let rotations = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
         let (outcome, json) = pipeline.finish_with_json();
