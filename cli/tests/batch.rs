@@ -398,7 +398,9 @@ fn pruning_forgets_no_failure_of_an_input_that_exists() {
     assert_eq!(check.code, 8, "{}", check.words);
     assert!(check.words.contains("1 input failed"), "{}", check.words);
     fs::remove_file(folder.join("bad.dat")).unwrap();
-    succeed(folder, &one);
+    let pruned = succeed(folder, &one);
+    let forgotten = "1 input without a result is forgotten: bad.dat was not found";
+    assert!(pruned.words.contains(forgotten), "{}", pruned.words);
     succeed(folder, &["check", "out"]);
 }
 

@@ -177,14 +177,17 @@ impl Inputs {
         })
     }
 
-    /// How files are read.
-    pub(crate) fn options(&self) -> Result<ReadOptions, Failure> {
-        let limits = Limits {
+    fn limits(&self) -> Limits {
+        Limits {
             file: self.max_size,
             memory: self.max_memory,
             ..Limits::default()
-        };
-        let options = self.reading.options(limits, self.pipes);
+        }
+    }
+
+    /// How files are read.
+    pub(crate) fn options(&self) -> Result<ReadOptions, Failure> {
+        let options = self.reading.options(self.limits(), self.pipes);
         options.map_err(|fault| Failure::input(&fault, ""))
     }
 
@@ -223,8 +226,8 @@ pub(crate) trait InputReader: Send + 'static {
     /// Reads an input; its warnings are not printed.
     fn read(&self, path: &Path) -> Result<Loaded, Failure>;
 
-    /// The longest input that it accepts, bytes.
-    fn max_size(&self) -> u64;
+    /// The limits within which it reads.
+    fn limits(&self) -> Limits;
 }
 
 impl InputReader for Inputs {
@@ -232,8 +235,8 @@ impl InputReader for Inputs {
         self.read(path)
     }
 
-    fn max_size(&self) -> u64 {
-        self.max_size
+    fn limits(&self) -> Limits {
+        self.limits()
     }
 }
 

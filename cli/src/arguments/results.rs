@@ -109,6 +109,11 @@ impl ResultArguments {
         }
     }
 
+    /// Whether the times of the result are written to a separate file.
+    pub(crate) fn has_times_apart(&self) -> bool {
+        self.times_out.is_some()
+    }
+
     /// How results are named.
     pub(crate) fn naming(&self) -> ResultNaming {
         self.names

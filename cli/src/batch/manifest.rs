@@ -389,13 +389,26 @@ impl ResultRecorder for Manifest {
 
     fn begin(&mut self, start: BatchStart<'_>) -> Result<(), Failure> {
         // An input that is gone has not failed any more.
-        let is_kept = |entry: &InputEntry| match entry.presence() {
+        let mut forgotten = Vec::new();
+        let prune = self.prune;
+        self.inputs.retain(|_, entry| match entry.presence() {
+            _ if entry.state == InputState::Skipped => false,
             InputPresence::Present => true,
             InputPresence::Removed => false,
-            InputPresence::Unknown => !self.prune,
-        };
-        self.inputs
-            .retain(|_, entry| entry.state != InputState::Skipped && is_kept(entry));
+            InputPresence::Unknown => {
+                if prune {
+                    forgotten.push(entry.input.clone());
+                }
+                !prune
+            }
+        });
+        if let Some(first) = forgotten.first() {
+            let inputs = words::count(forgotten.len(), "input");
+            let are = if forgotten.len() == 1 { "is" } else { "are" };
+            words::note(&format!(
+                "{inputs} without a result {are} forgotten: {first} was not found from this directory"
+            ));
+        }
         let skipped = start.skipped.into_iter();
         self.inputs
             .extend(skipped.map(|entry| (entry.key(), entry)));

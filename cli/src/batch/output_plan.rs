@@ -80,7 +80,7 @@ pub(crate) fn plan(
             let destination = Destination::new(out, request.overwrite, &paths)?;
             // The surest check is to try.
             destination.check_writable()?;
-            destination.refuse_terminal(format.is_text)?;
+            destination.refuse_terminal(format)?;
             OutputPlan {
                 paths,
                 targets: vec![ResultTarget::new(destination, format, String::new())],

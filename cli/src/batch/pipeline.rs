@@ -581,7 +581,7 @@ impl InputSource {
             Self::One(reader, jobs) => {
                 let job = jobs.next()?;
                 let path = &job.0;
-                let file = InputFile::new(path);
+                let file = InputFile::within(path, reader.limits());
                 let label = format!("reading {}", names::input(path));
                 let loaded = busy(&label, || reader.read(path));
                 let input = Some((file, loaded));
@@ -712,11 +712,11 @@ impl<R: InputReader> ReadingAhead<R> {
 
     /// Reads an input, if it has to be evaluated.
     fn read(&self, (path, target): &PipelineJob) -> Option<(InputFile, Result<Loaded, Failure>)> {
-        let file = InputFile::new(path);
+        let limits = self.reader.limits();
+        let file = InputFile::within(path, limits);
         let is_done = |hash: &str| self.previous.is_done(target.name(), hash, &self.options);
         // The hash is of the bytes that are read next; longer inputs are refused.
-        let max_size = self.reader.max_size();
-        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= max_size);
+        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= limits.file);
         let sha256 = is_read.then(|| file.sha256()).flatten();
         if self.resume && sha256.is_some_and(is_done) {
             return None;

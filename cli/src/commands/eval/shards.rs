@@ -9,7 +9,7 @@ use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::arguments::time::SampleRequest;
 use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
-use crate::batch::shards::plan::ShardPlan;
+use crate::batch::shards::plan::{ShardPlan, ShardRequest};
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
@@ -111,9 +111,13 @@ impl EvaluationRequest {
         shard_bytes: u64,
     ) -> Result<ShardPlan, Failure> {
         let results = &arguments.results;
-        let naming = (results.format(), results.naming());
-        let options = self.options.clone();
-        let plan = ShardPlan::new(inputs, sizes, folder, naming, options, shard_bytes)?;
+        let request = ShardRequest {
+            format: results.format(),
+            naming: results.naming(),
+            options: self.options.clone(),
+            shard_bytes,
+        };
+        let plan = ShardPlan::new(inputs, sizes, folder, request)?;
         arguments.check_before(plan.format)?;
         Ok(plan)
     }
