@@ -48,7 +48,8 @@ Exit codes:
   1 a bug in tumble                6 the device failed, or its bits differ
   2 the command line is wrong      7 output could not be written
   3 some inputs failed             8 results differ or are missing, or nothing was proved
-  4 all inputs failed              129 to 131, 141, 143 ended by a signal";
+  4 all inputs failed              129 to 131, 141, 143 ended by a signal
+A result that is too large is 4 for the memory and 7 for the disk; of several inputs the others go on.";
 
 /// The command line.
 #[derive(Debug, Parser)]

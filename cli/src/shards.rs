@@ -15,8 +15,7 @@ use tumble_formats::{Format, Limits};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::InputFile;
-use crate::batch::entry::{InputEntry, InputState, ManifestEntry, ManifestLines};
-use crate::batch::result_names::ResultNaming;
+use crate::batch::entry::{InputEntry, ManifestEntry, ManifestLines, UnfinishedInputs};
 use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
@@ -67,17 +66,24 @@ pub fn input_sha256(path: &Path) -> Option<String> {
     InputFile::new(path).sha256().map(str::to_owned)
 }
 
-/// The unfinished inputs in the text of a manifest: a line for each input that failed or has no result yet.
+/// The unfinished inputs in the text of a manifest and of the records of shards that are not merged: a line for each
+/// input that failed or does not have all its results yet.
 #[must_use]
-pub fn manifest_unfinished(text: &str) -> Vec<String> {
-    let lines = ManifestLines::parse(text.as_bytes());
-    let inputs = lines.inputs.values();
-    let unfinished = inputs.filter(|entry| entry.state != InputState::Skipped);
-    let line = |entry: &InputEntry| match &entry.message {
+pub fn manifest_unfinished(text: &str, records: &[String]) -> Vec<String> {
+    let mut lines = ManifestLines::parse(text.as_bytes());
+    for record in records {
+        lines.extend(record::lines_of(record.as_bytes()));
+    }
+    let UnfinishedInputs { failed, pending } = lines.unfinished_inputs();
+    let message = |entry: &&InputEntry| match &entry.message {
         Some(message) => message.clone(),
-        None => format!("{}: has no result yet", entry.input),
+        None => format!("{}: failed", entry.input),
     };
-    unfinished.map(line).collect()
+    let failed = failed.iter().map(message);
+    let pending = pending
+        .iter()
+        .map(|input| format!("{input}: does not have all its results yet"));
+    failed.chain(pending).collect()
 }
 
 /// The SHA-256 hash of all kernels. Machines with the same hash and the same version write the same bytes.
@@ -116,6 +122,7 @@ impl LibraryPlan {
         }
         let (inputs, sizes): (GatheredInputs, Vec<u64>) = match listed {
             Some(listed) => {
+                arguments.results.refuse_base(library)?;
                 let of_formats = listed
                     .into_iter()
                     .filter(|(name, _)| Format::of(Path::new(name)).is_some())
@@ -287,10 +294,7 @@ impl Worker {
     /// without the extension of the result's format.
     #[must_use]
     pub fn key_of(&self, below: &Path) -> String {
-        match self.arguments.results.naming() {
-            ResultNaming::Stem => below.with_extension("").display().to_string(),
-            ResultNaming::Full => below.display().to_string(),
-        }
+        self.arguments.results.naming().key(below)
     }
 
     /// Evaluates the inputs of a task, and writes the results to `folder`. The plan of this directory must have been
@@ -440,7 +444,8 @@ impl ShardRecord {
         let mut parts: BTreeMap<String, usize> = BTreeMap::new();
         let mut made = 0;
         for entry in &self.entries {
-            let (key, count) = (key_of(entry), entry.whole().1);
+            let (result, count) = entry.whole();
+            let key = result_names::key_of_result(result);
             let hash = inputs.get(&key);
             if !hash.is_some_and(|hash| entry.is_made_from(hash, options)) {
                 return false;
@@ -493,16 +498,6 @@ fn results_of<'a>(
     entries.into_iter().map(result).collect()
 }
 
-/// The name by which the results of an entry's input are identified: without its extension, which depends on the
-/// format, except for files of rows.
-fn key_of(entry: &ManifestEntry) -> String {
-    let name = entry.whole().0;
-    match name.ends_with(".parquet") {
-        true => name.to_owned(),
-        false => Path::new(name).with_extension("").display().to_string(),
-    }
-}
-
 /// The results in the text of a manifest: for each, its name, its SHA-256 hash and its length in bytes. If a result
 /// occurs several times, the last line counts.
 #[must_use]
@@ -520,7 +515,8 @@ pub fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
         if unfinished.contains_key(entry.whole().0) {
             continue;
         }
-        let lines = found.entry(key_of(&entry)).or_default();
+        let key = result_names::key_of_result(entry.whole().0);
+        let lines = found.entry(key).or_default();
         lines.push(entry::line(&entry));
     }
     found
@@ -673,6 +669,43 @@ mod tests {
             into: String::new(),
         });
         assert_eq!(none.results(), []);
+    }
+
+    /// Records of shards that are not merged count, and inputs of which a clip is missing.
+    #[test]
+    fn unfinished_inputs_are_in_manifests_and_in_records() {
+        let cut = line("a.run.npy", Some(("a.npy", 2)));
+        let mut record = ShardRecord::new(1, 1, String::new(), 0, &[line("b.npy", None)]);
+        record.refuse("c.dat".to_owned(), "c.dat: no keys".to_owned());
+        let pending = r#"{"state":"pending","input":"b.dat","result":"b.npy"}"#;
+        let text = format!("{cut}{pending}\n");
+        let of = |records: &[String]| manifest_unfinished(&text, records);
+        let is_missing = |input: &str| format!("{input}: does not have all its results yet");
+        assert_eq!(of(&[]), [is_missing("a.glb"), is_missing("b.dat")]);
+        let with_record = of(&[record.text()]);
+        assert_eq!(
+            with_record,
+            ["c.dat: no keys".to_owned(), is_missing("a.glb")]
+        );
+    }
+
+    /// The results of objects are named by the names of the objects, so that `--base` cannot apply.
+    #[test]
+    fn a_base_of_listed_objects_is_refused() {
+        let plan = |line: &[&str]| {
+            let line: Vec<OsString> = line.iter().map(OsString::from).collect();
+            let listed = Some(vec![("walks/a.dat".to_owned(), 3)]);
+            let (library, out) = (Path::new("s3://bucket/lib"), Path::new("out"));
+            LibraryPlan::new(&line, library, listed, out, "1MiB", "files")
+        };
+        assert_eq!(plan(&["lib"]).map(|plan| plan.inputs()).ok(), Some(1));
+        let refused = plan(&["lib", "--base", "lib"]).err().unwrap();
+        assert!(refused.is_usage, "{}", refused.message);
+        assert!(
+            refused.message.contains("--base lib: "),
+            "{}",
+            refused.message
+        );
     }
 
     #[test]

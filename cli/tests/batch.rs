@@ -410,6 +410,126 @@ fn results_without_inputs_are_told_and_pruned() {
     assert_eq!(refused.code, 2, "{}", refused.words);
 }
 
+/// A result stays if its input may be somewhere else: in another directory than the current one, or on a disk that is
+/// not mounted.
+#[test]
+fn results_of_inputs_that_may_be_elsewhere_are_not_pruned() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    for name in ["one", "two", "disk/share"] {
+        fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    for name in ["one/x.dat", "one/w.dat", "two/z.dat", "disk/share/s.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join(name)).unwrap();
+    }
+    let share = folder.join("disk/share");
+    let from = |directory: &str, inputs: &[&str], options: &[&str]| {
+        let batch = [
+            &["eval"][..],
+            inputs,
+            &["-o", "../out/", "--device", "cpu"],
+            options,
+        ];
+        succeed(&folder.join(directory), &batch.concat())
+    };
+    let resume = ["--resume"];
+    from("one", &["x.dat", "./w.dat"], &[]);
+    from("one", &[share.to_str().unwrap()], &resume);
+    fs::remove_file(share.join("s.dat")).unwrap();
+    for unmounted in ["nothing is left in the directory", "there is no directory"] {
+        let kept = from("two", &["z.dat"], &["--overwrite", "--prune"]);
+        let expected = "3 results stay, because the input may be somewhere else: ";
+        assert!(kept.words.contains(expected), "{unmounted}: {}", kept.words);
+        assert!(
+            !kept.words.contains("removed"),
+            "{unmounted}: {}",
+            kept.words
+        );
+        assert_eq!(
+            names(&folder.join("out")),
+            ["manifest.jsonl", "s.npy", "w.npy", "x.npy", "z.npy"]
+        );
+        let _ = fs::remove_dir(&share);
+    }
+    // The directory is there and has other files.
+    fs::create_dir(&share).unwrap();
+    fs::copy(folder.join("a.dat"), share.join("t.dat")).unwrap();
+    let pruned = from("two", &[share.to_str().unwrap()], &["--resume", "--prune"]);
+    assert!(pruned.words.contains("s.npy: removed"), "{}", pruned.words);
+    assert!(!folder.join("out/s.npy").exists());
+}
+
+/// Pruning removes what has no input, and nothing else: an input that has failed is still without its result.
+#[test]
+fn pruning_forgets_no_failure_of_an_input_that_exists() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let all = ["eval", "a.dat", "bad.dat", "-o", "out/", "--device", "cpu"];
+    assert_eq!(run(folder, &all).code, 3);
+    let one = [
+        "eval", "a.dat", "-o", "out/", "--device", "cpu", "--resume", "--prune",
+    ];
+    succeed(folder, &one);
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    assert!(check.words.contains("1 input failed"), "{}", check.words);
+    fs::remove_file(folder.join("bad.dat")).unwrap();
+    let pruned = succeed(folder, &one);
+    let forgotten = "1 input without a result is forgotten: bad.dat was not found";
+    assert!(pruned.words.contains(forgotten), "{}", pruned.words);
+    succeed(folder, &["check", "out"]);
+}
+
+/// Inputs that are refused before the work begins are in JSON too.
+#[test]
+fn json_has_the_inputs_without_a_job() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let inputs = ["a.dat", "folder/a.dat", "-o", "out", "--json"];
+    let made = run(folder, &[&["eval"][..], &inputs].concat());
+    let json: Vec<serde_json::Value> = serde_json::from_slice(&made.out).unwrap();
+    let failed: Vec<_> = json.iter().filter(|it| it["state"] == "failed").collect();
+    assert_eq!(failed.len(), 2, "{json:?}");
+    let message = failed[0]["message"].as_str().unwrap();
+    assert!(message.contains("would both be"), "{message}");
+}
+
+/// `--exclude` tests what is below a named directory, not the directories above it.
+#[test]
+fn exclusion_begins_below_what_is_named() {
+    let temporary = sample_folder();
+    let folder = temporary.path().join("old/takes");
+    fs::create_dir_all(folder.join("drafts")).unwrap();
+    for name in ["walk.dat", "drafts/run.dat"] {
+        fs::copy(temporary.path().join("a.dat"), folder.join(name)).unwrap();
+    }
+    let takes = folder.to_str().unwrap();
+    let eval = |pattern: &str, out: &str| {
+        run(
+            temporary.path(),
+            &[
+                "eval",
+                takes,
+                "-o",
+                out,
+                "--exclude",
+                pattern,
+                "--device",
+                "cpu",
+            ],
+        )
+    };
+    assert_eq!(eval("old", "all").code, 0);
+    let results = ["drafts/run.npy", "manifest.jsonl", "walk.npy"];
+    assert_eq!(names(&temporary.path().join("all")), results);
+    assert_eq!(eval("drafts", "some").code, 0);
+    assert_eq!(names(&temporary.path().join("some")), results[1..]);
+    let none = eval("*.dat", "none");
+    assert_eq!(none.code, 2, "{}", none.words);
+    let expected = "--exclude leaves out all inputs (2 inputs)";
+    assert!(none.words.contains(expected), "{}", none.words);
+}
+
 /// Warnings and failures are in the manifest and in JSON; a long batch prints a line for each code.
 #[test]
 fn a_long_batch_prints_at_most_a_screen() {

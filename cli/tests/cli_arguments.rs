@@ -16,7 +16,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy --fps 30fps              | `30fps` is not a frame rate
 2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is not a frame rate
 2 | eval a.dat -o o.npy --fps 1e13               | at most 1099511627776 frames
-7 | eval a.dat -o o.npy --fps 5e11               | 2 tracks × 1000000000001 frames need 32.0 TB
+7 | eval a.dat -o o.npy --fps 5e11               | 32000000000032 bytes) are needed for 2 tracks × 1000000000001 frames, and
 0 | eval a.dat -o o.npy --fps 1e-9               | 1 frame,
 0 | eval a.dat -o o.npy --fps 29.97              | 30000/1001
 0 | eval a.dat -o o.npy --fps 23.976             | 24000/1001
@@ -70,7 +70,7 @@ const ARGUMENTS: &str = "
 3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
 4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
 2 | eval - --times - -o o.npy                    | standard input cannot be both
-4 | verify a.dat --fps 5e11                      | of memory that are free
+4 | verify a.dat --fps 5e11                      | are needed for 2 tracks × 1000000000001 frames, and
 2 | verify a.dat -m none                         | catmull-rom
 4 | verify none.dat                              | none.dat
 3 | info a.dat none.dat                          | none.dat

@@ -141,6 +141,12 @@ fn what_cannot_be_compared_is_refused() {
             2,
             "two inputs are compared, not 1",
         ),
+        (
+            &["compare", "a.dat", "b.dat", "--exclude", "b.*"],
+            2,
+            "two inputs are compared, not 1",
+        ),
+        (&["compare", "-", "-"], 2, "two inputs are compared, not 1"),
         (&["compare", "a.dat", "b.dat", "folder/a.dat"], 2, "not 3"),
         (&["compare", "a.dat", "bad.dat"], 4, "bad.dat:2"),
         (
@@ -792,13 +798,36 @@ fn joints_are_listed_worst_first() {
         "{text}"
     );
     assert!(text.contains("\n  knee "), "{text}");
-    assert!(text.contains("and 1 more joint (--top 2)"), "{text}");
+    assert!(
+        !text.contains("more joint"),
+        "the other does not differ: {text}"
+    );
 
     let csv = succeed(folder, &["compare", "walk.bvh", "bent.bvh", "--csv"]).out;
     let csv = String::from_utf8(csv).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(rows[0][..4], ["first", "second", "joint", "rotation_mean"]);
     assert_eq!((rows.len(), rows[1][2], rows[1][7]), (3, "knee", "30"));
+
+    // Joints without a difference are not among those that are not listed.
+    walk(folder, "both.bvh", 7.0);
+    let bent = std::fs::read_to_string(folder.join("both.bvh")).unwrap();
+    let turned = bent.replace(" 5 0 ", " 6 0 ");
+    std::fs::write(folder.join("both.bvh"), turned).unwrap();
+    let line = ["compare", "walk.bvh", "both.bvh", "--top", "1"];
+    let text = String::from_utf8(succeed(folder, &line).out).unwrap();
+    assert!(text.contains("and 1 more joint (--top 2)"), "{text}");
+
+    // One file by two paths, or by a pattern given twice, is compared with itself.
+    for pair in [["walk.bvh", "./walk.bvh"], ["wal?.bvh", "wal?.bvh"]] {
+        let same = succeed(
+            folder,
+            &[&["compare"][..], &pair, &["--tolerance", "0"]].concat(),
+        );
+        let text = String::from_utf8(same.out).unwrap();
+        assert!(text.contains("largest 0°"), "{text}");
+        assert!(!same.words.contains("named twice"), "{}", same.words);
+    }
 
     // In the world the tip of the leg moves, and nothing above it.
     let line = [

@@ -158,8 +158,8 @@ fn an_end_that_a_format_cannot_store_is_refused() {
             "npy stores frames of a rate and no times",
         ),
         (
-            "loop.glb -o out.glb --end-frame hold",
-            "keep their ends; leave out --end-frame",
+            "loop.tum -o out.kitti --end-frame key",
+            "kitti stores the times of its frames in a separate file alone, and none is written; give --times-out",
         ),
     ] {
         let arguments = format!("eval --fps 30 {arguments}");
@@ -186,6 +186,30 @@ fn archives_keep_their_ends() {
     assert!(words.is_empty(), "no warning of two rates: {words}");
     let back = evaluated(at, "again.npz --fps 30 -o back.glb");
     assert_eq!(back, (35, 0.0, 1.125));
+}
+
+/// A file that is written again ends as new files do, and as it is asked to.
+#[test]
+fn files_that_are_kept_end_as_they_are_asked_to() {
+    let folder = sample_folder();
+    let at = folder.path();
+    fs::write(at.join("loop.tum"), LOOP).unwrap();
+    line(at, "convert loop.tum -o loop.glb");
+    for (end_frame, frames, last) in [
+        ("", 35, 1.125),
+        (" --end-frame key", 35, 1.125),
+        (" --end-frame hold", 35, 34.0 / 30.0),
+        (" --end-frame leave-out", 34, 33.0 / 30.0),
+    ] {
+        let found = evaluated(at, &format!("loop.glb --fps 30 -o out.glb{end_frame}"));
+        assert_eq!((found.0, found.1), (frames, 0.0), "{end_frame}");
+        assert!((found.2 - last).abs() < 1e-12, "{end_frame}: {}", found.2);
+    }
+    // An end on a frame is the last frame.
+    assert_eq!(
+        evaluated(at, "loop.glb --fps 24 -o out.glb"),
+        (28, 0.0, 1.125)
+    );
 }
 
 /// A reduction of the frames of a rate lasts as long as its clip.

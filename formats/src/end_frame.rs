@@ -1,8 +1,11 @@
-//! The end of a clip that is sampled at a rate, where it lies between two frames: [`EndFrame`].
+//! The end of a clip that is sampled at a rate, where it lies between two frames: [`EndFrame`] is the rule,
+//! [`FramesToEnd`] are the samples that follow from it.
 //!
 //! A clip of 1.1583 s at 30 fps ends 0.025 s after its frame 34. If nothing followed this frame, the clip would be
 //! shorter, and a loop would jump from one turn to the next. Therefore a file of clips gets one sample more, whose
 //! value is that of the end.
+
+mod result;
 
 use std::borrow::Cow;
 
@@ -13,6 +16,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::Motion;
 use crate::sample::{ChannelMethods, Samples};
 use crate::signs::continue_signs;
+
+pub use result::{EndFrameError, SampledKind, SampledResult};
 
 /// How a result that is sampled at the frames of a rate ends, if its clip ends between two frames. If the end lies on a
 /// frame, this frame is the last sample.
@@ -82,18 +87,100 @@ impl EndFrame {
     #[must_use]
     pub fn sample(self, timeline: &Timeline, rate: FrameRate, end: f64) -> Option<EndSample> {
         let last_frame = timeline.len().checked_sub(1)?;
-        let gap = end - timeline.time(0, last_frame)?;
-        // Formats of f32 times cannot store times that are nearer to each other.
-        let rounding = f64::from(f32::EPSILON) * end.abs();
-        if gap <= (ON_FRAME / rate.per_second()).max(rounding) {
+        let last = timeline.time(0, last_frame)?;
+        if is_on_frame(end, last, rate) {
             return None;
         }
         let time = match self {
             Self::Key => end,
-            Self::Hold => timeline.time(0, 0)? + rate.time_of(timeline.len() as u64),
+            Self::Hold => {
+                let next = timeline.time(0, 0)? + rate.time_of(timeline.len() as u64);
+                // The first sample of a file that is written again may lie between two frames.
+                let frames = (next - last) * rate.per_second();
+                match (frames - 1.0).abs() <= ON_FRAME {
+                    true => next,
+                    false => last + rate.time_of(1),
+                }
+            }
             Self::LeaveOut => return None,
         };
         Some(EndSample { at: end, time })
+    }
+}
+
+/// Whether the end of a clip is its last frame. Both are in seconds.
+pub(crate) fn is_on_frame(end: f64, last_frame: f64, rate: FrameRate) -> bool {
+    // Formats of f32 times cannot store times that are nearer to each other.
+    let rounding = f64::from(f32::EPSILON) * end.abs();
+    end - last_frame <= (ON_FRAME / rate.per_second()).max(rounding)
+}
+
+/// The frames of a rate at which a clip is sampled.
+#[derive(Debug, Clone)]
+pub struct RateFrames {
+    /// Their times; the first may lie between two frames.
+    pub frames: SampleTimes,
+    /// The rate.
+    pub rate: FrameRate,
+    /// Where the clip ends, in seconds.
+    pub end: f64,
+}
+
+/// The samples of a clip: its frames, and the sample after them.
+#[derive(Debug, Clone)]
+pub struct FramesToEnd {
+    /// The frames.
+    pub frames: SampleTimes,
+    /// The times of the frames.
+    pub timeline: Timeline,
+    /// The sample at the end of the clip, after its frames.
+    pub end: Option<EndSample>,
+    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    pub left_out: Option<f64>,
+    /// The rate of which all samples are neighbouring frames.
+    pub rate: Option<FrameRate>,
+}
+
+impl FramesToEnd {
+    /// The frames of a rate, and the sample that `end_frame` puts after them.
+    ///
+    /// # Errors
+    /// As [`SampleTimes::resolve`].
+    pub fn new(clip: &Motion, frames: RateFrames, end_frame: EndFrame) -> Result<Self, Error> {
+        let RateFrames { frames, rate, end } = frames;
+        let found = Self::at(clip, frames)?;
+        let sample = end_frame.sample(&found.timeline, rate, end);
+        let left_out = EndFrame::Key.sample(&found.timeline, rate, end);
+        let left_out = left_out.filter(|_| sample.is_none());
+        let last_frame = found.timeline.len().checked_sub(1);
+        let last_frame = last_frame.and_then(|frame| found.timeline.time(0, frame));
+        Ok(Self {
+            end: sample,
+            left_out: left_out.zip(last_frame).map(|(end, last)| end.at - last),
+            rate: Some(rate).filter(|_| sample.is_none_or(EndSample::is_held)),
+            ..found
+        })
+    }
+
+    /// Samples at these times alone.
+    ///
+    /// # Errors
+    /// As [`SampleTimes::resolve`].
+    pub fn at(clip: &Motion, frames: SampleTimes) -> Result<Self, Error> {
+        Ok(Self {
+            timeline: frames.resolve(clip.set.track_count(), clip.set.time_span())?,
+            frames,
+            end: None,
+            left_out: None,
+            rate: None,
+        })
+    }
+
+    /// The times of all samples, in seconds.
+    #[must_use]
+    pub fn times(&self) -> Vec<f64> {
+        let end = self.end.map(|end| end.time);
+        self.timeline.times(0).chain(end).collect()
     }
 }
 
@@ -146,21 +233,31 @@ impl EndRows {
 
     /// The next rows, in the order of the layout, with the ends that follow them.
     pub fn next<'a>(&mut self, rows: &'a [Quat]) -> Cow<'a, [Quat]> {
-        if self.rows.is_empty() {
+        let before = self.passed;
+        self.passed += rows.len();
+        let ends_before = |passed: usize| match self.layout {
+            Layout::TrackMajor => passed.checked_div(self.frames).unwrap_or(0),
+            Layout::FrameMajor => usize::from(passed >= self.frames * self.rows.len()),
+        };
+        if self.rows.is_empty() || ends_before(before) == ends_before(self.passed) {
             return Cow::Borrowed(rows);
         }
         let mut all = Vec::with_capacity(rows.len() + self.rows.len());
-        for row in rows {
-            all.push(*row);
-            self.passed += 1;
-            match self.layout {
-                Layout::TrackMajor if self.passed.is_multiple_of(self.frames) => {
-                    all.push(self.rows[self.passed / self.frames - 1]);
+        match self.layout {
+            Layout::FrameMajor => {
+                all.extend_from_slice(rows);
+                all.extend_from_slice(&self.rows);
+            }
+            Layout::TrackMajor => {
+                let mut rest = rows;
+                for track in ends_before(before)..ends_before(self.passed) {
+                    let passed = self.passed - rest.len();
+                    let (of_track, later) = rest.split_at((track + 1) * self.frames - passed);
+                    all.extend_from_slice(of_track);
+                    all.push(self.rows[track]);
+                    rest = later;
                 }
-                Layout::FrameMajor if self.passed == self.frames * self.rows.len() => {
-                    all.extend_from_slice(&self.rows);
-                }
-                Layout::TrackMajor | Layout::FrameMajor => {}
+                all.extend_from_slice(rest);
             }
         }
         Cow::Owned(all)
@@ -205,6 +302,16 @@ mod tests {
         }
     }
 
+    /// The first sample of a file that is kept may lie between two frames; the frame after the last one does not.
+    #[test]
+    fn a_held_end_is_the_next_whole_frame() {
+        let rate = FrameRate::new(10, 1).unwrap();
+        let frames = SampleTimes::at(vec![0.04, 0.1, 0.2]);
+        let timeline = frames.resolve(1, None).unwrap();
+        let held = EndFrame::Hold.sample(&timeline, rate, 0.25).unwrap();
+        assert!((held.time - 0.3).abs() < 1e-12, "{held:?}");
+    }
+
     #[test]
     fn ends_follow_the_rows_of_their_tracks_in_any_parts() {
         let row = |number: usize| Quat::from_array([number as f32; 4]);
@@ -217,7 +324,10 @@ mod tests {
                 let mut ends = EndRows::new(vec![row(10), row(11)], layout, 3);
                 let mut found = Vec::new();
                 for rows in rows.chunks(part) {
-                    found.extend_from_slice(&ends.next(rows));
+                    let next = ends.next(rows);
+                    // Nothing is copied where no end follows.
+                    assert_eq!(matches!(next, Cow::Borrowed(_)), next.len() == rows.len());
+                    found.extend_from_slice(&next);
                 }
                 assert_eq!(found, expected.map(row), "{layout} in parts of {part}");
             }

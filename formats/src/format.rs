@@ -15,7 +15,7 @@ use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 use crate::carried_mesh::CarriedMesh;
 use crate::decimal::LARGEST_SECONDS;
 use crate::diagnostic::Diagnostic;
-use crate::end_frame::EndFrame;
+use crate::end_frame::{EndFrame, RateFrames};
 use crate::feature::Feature;
 pub use crate::format::write_clips::left_behind;
 pub(crate) use crate::format::write_clips::{check_times, no_offsets};
@@ -316,16 +316,15 @@ impl Loaded {
 
 /// A file that can be written again with other keys, keeping everything else.
 pub trait Document: fmt::Debug + Send + Sync {
-    /// The times, in seconds, at which clip `clip` is to be sampled at `rate`: whole frames of the rate, and the
-    /// first key time of the clip. Where [`end_frame`](Self::end_frame) is `None`, also its last one.
+    /// The frames at which clip `clip` is to be sampled at `rate`: its first key time, and the whole frames of the rate
+    /// after it. Their times are in seconds.
     ///
     /// # Errors
     /// When the file's type of times cannot distinguish frames of this rate.
-    fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic>;
+    fn frames(&self, clip: usize, rate: FrameRate) -> Result<RateFrames, Diagnostic>;
 
-    /// The default for the end of a clip that ends between two frames; `None`
-    /// if [`times`](Self::times) always contains the end.
-    fn end_frame(&self) -> Option<EndFrame>;
+    /// The default for the end of a clip that ends between two frames.
+    fn end_frame(&self) -> EndFrame;
 
     /// Whether the file can be written again in `format`.
     fn writes(&self, format: &Format) -> bool;

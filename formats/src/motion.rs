@@ -184,6 +184,12 @@ impl Motion {
         (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
     }
 
+    /// Whether the tracks are boxes of a chain: rotations alone, without a skeleton or positions.
+    #[must_use]
+    pub fn is_chain(&self) -> bool {
+        self.skeleton.is_empty() && !self.has_vectors()
+    }
+
     /// The vector to add to a track's translations ([`origins`](Self::origins)).
     #[must_use]
     pub fn origin(&self, track: usize) -> DVec3 {

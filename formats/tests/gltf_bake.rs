@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tumble::FrameRate;
+use tumble_formats::end_frame::FramesToEnd;
 use tumble_formats::format::{Document, MotionOptions, WriteError};
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::motion::{ChannelInterpolation, Motion, SampledClip};
@@ -16,12 +17,19 @@ use crate::gltf::{fixture, keys_of, open, sample};
 use crate::support::shared_data;
 use crate::validator::{Report, validate};
 
+/// The times at which a clip of a file is sampled, its end among them.
+pub(crate) fn times(document: &dyn Document, clip: &Motion, rate: FrameRate) -> Vec<f64> {
+    let frames = document.frames(clip.index, rate).unwrap();
+    let to_end = FramesToEnd::new(clip, frames, document.end_frame());
+    to_end.unwrap().times()
+}
+
 /// A file with all its animations sampled at `fps`, as the file of that name.
 fn baked(loaded: &Loaded, fps: u64, to: &Path) -> Result<(Vec<u8>, Vec<Diagnostic>), WriteError> {
     let document = loaded.document.as_ref().unwrap();
     let rate = FrameRate::new(fps, 1).unwrap();
     let samples: Vec<Samples> = (loaded.clips.iter())
-        .map(|clip| sample(clip, document.times(clip.index, rate).unwrap()))
+        .map(|clip| sample(clip, times(&**document, clip, rate)))
         .collect();
     let clips: Vec<(usize, SampledClip<'_>)> = (loaded.clips.iter().zip(&samples))
         .map(|(clip, samples)| (clip.index, samples.of(clip, Some(rate), &[])))
@@ -268,7 +276,7 @@ fn check_clips(loaded: &Loaded, again: &[Motion], label: &str) {
     let document = loaded.document.as_ref().unwrap();
     for (clip, new) in loaded.clips.iter().zip(again) {
         let rate = FrameRate::new(60, 1).unwrap();
-        let times = document.times(clip.index, rate).unwrap();
+        let times = times(&**document, clip, rate);
         let samples = sample(clip, times.clone());
         // To the last bit where times are read as they are: see the next test.
         let ends = |clip: &Motion| clip.set.time_span().unwrap();

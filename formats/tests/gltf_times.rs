@@ -8,15 +8,15 @@ use tumble_formats::format::MotionOptions;
 use tumble_formats::motion::SampledClip;
 
 use crate::gltf::open;
-use crate::gltf_bake::{document, refused};
+use crate::gltf_bake::{document, refused, times};
 use crate::support::shared_data;
 
 #[test]
 fn frames_that_f32_cannot_tell_apart_are_refused_with_the_rate_that_fits() {
     let Some(data) = shared_data() else { return };
     let loaded = open(&data.join("gltf/made/after_a_day.gltf"));
-    let times = |fps| document(&loaded).times(0, FrameRate::new(fps, 1).unwrap());
-    let refused = times(240).unwrap_err();
+    let rate = |fps| FrameRate::new(fps, 1).unwrap();
+    let refused = document(&loaded).frames(0, rate(240)).unwrap_err();
     assert_eq!(refused.code, Code::TimesInF32);
     let said = refused.to_string();
     assert!(said.contains("/animations/0: error[E182]"), "{said}");
@@ -24,7 +24,7 @@ fn frames_that_f32_cannot_tell_apart_are_refused_with_the_rate_that_fits() {
         said.contains("0.0078125 s apart") && said.contains("128 fps fits"),
         "{said}"
     );
-    let found = times(128).unwrap();
+    let found = times(document(&loaded), &loaded.clips[0], rate(128));
     assert_eq!(
         (found.len(), found[0], found[128]),
         (129, 86_399.0, 86_400.0)
@@ -34,17 +34,16 @@ fn frames_that_f32_cannot_tell_apart_are_refused_with_the_rate_that_fits() {
 #[test]
 fn times_are_whole_frames_and_both_ends() {
     let Some(data) = shared_data() else { return };
-    let times = |file: &str, fps| {
+    let of_file = |file: &str, fps| {
         let loaded = open(&data.join("gltf").join(file));
-        document(&loaded)
-            .times(0, FrameRate::new(fps, 1).unwrap())
-            .unwrap()
+        let rate = FrameRate::new(fps, 1).unwrap();
+        times(document(&loaded), &loaded.clips[0], rate)
     };
     assert_eq!(
-        times("made/start_late.gltf", 2),
+        of_file("made/start_late.gltf", 2),
         [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
     );
-    assert_eq!(times("made/single_key.gltf", 60).len(), 43);
+    assert_eq!(of_file("made/single_key.gltf", 60).len(), 43);
     // 17 frames of 24 fps end on a frame of 120, and not on one of 50.
     let fox = open(&data.join("gltf/Fox.glb"));
     let walk = fox
@@ -52,11 +51,7 @@ fn times_are_whole_frames_and_both_ends() {
         .iter()
         .find(|clip| clip.name.as_deref() == Some("Walk"))
         .unwrap();
-    let of = |fps| {
-        document(&fox)
-            .times(walk.index, FrameRate::new(fps, 1).unwrap())
-            .unwrap()
-    };
+    let of = |fps| times(document(&fox), walk, FrameRate::new(fps, 1).unwrap());
     assert_eq!((of(120).len(), of(120)[85]), (86, 17.0 / 24.0));
     assert_eq!(
         (of(50).len(), of(50)[35], of(50)[36]),

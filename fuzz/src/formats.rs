@@ -6,6 +6,7 @@ use std::path::Path;
 
 use glam::Vec3;
 use tumble::{Device, Engine, FrameRate, Interpolation, SampleTimes};
+use tumble_formats::end_frame::{EndFrame, FramesToEnd};
 use tumble_formats::format::{FormatOption, MotionOptions, TimeUnit, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::Motion;
@@ -252,7 +253,8 @@ fn kept(loaded: &Loaded, format: &Format) -> Vec<Option<Code>> {
     };
     let rate = FrameRate::new(7, 1).expect("a rate");
     let sampled = loaded.clips.iter().filter_map(|clip| {
-        let times = document.times(clip.index, rate).unwrap_or_default();
+        let frames = document.frames(clip.index, rate).ok()?;
+        let times = FramesToEnd::new(clip, frames, EndFrame::Key).ok()?.times();
         let is_short = (1..500).contains(&times.len());
         is_short.then(|| {
             assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");

@@ -7,9 +7,12 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop, Timeline};
+use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop};
 use tumble_formats::diagnostic::Code;
-use tumble_formats::end_frame::{EndFrame, EndRows, EndSample, sample_to_end};
+use tumble_formats::end_frame::{
+    EndFrame, EndFrameError, EndRows, FramesToEnd, RateFrames, SampledKind, SampledResult,
+    sample_to_end,
+};
 use tumble_formats::format::{
     Document, Format, FormatOption, MotionOptions, Quantization, ResultShape, WriteError,
     WriteResults, left_behind,
@@ -205,52 +208,28 @@ struct Save {
     path: PathBuf,
 }
 
-/// The frames of a clip, and the sample after them.
-struct FramesToEnd {
-    frames: SampleTimes,
-    timeline: Timeline,
-    end: Option<EndSample>,
-    /// The rate of which all samples are frames.
-    rate: Option<FrameRate>,
-}
-
-impl FramesToEnd {
-    /// `end`: where the clip ends, in seconds.
-    fn of(
-        clip: &Motion,
-        frames: SampleTimes,
-        (rate, end): (FrameRate, f64),
-        end_frame: EndFrame,
-    ) -> PyResult<Self> {
-        let timeline = resolved(clip, &frames)?;
-        let end = end_frame.sample(&timeline, rate, end);
-        Ok(Self {
-            frames,
-            timeline,
-            end,
-            rate: Some(rate).filter(|_| end.is_none_or(EndSample::is_held)),
-        })
-    }
-
-    fn requested(clip: &Motion, samples: &SampleRequest, end_frame: EndFrame) -> PyResult<Self> {
-        let frames = samples.frames(clip, None)?;
-        if let &SampleRequest::Rate(rate, _, end) = samples {
+/// The samples of a clip that are asked for.
+fn requested(clip: &Motion, samples: &SampleRequest, end_frame: EndFrame) -> PyResult<FramesToEnd> {
+    let frames = samples.frames(clip, None)?;
+    let found = match *samples {
+        SampleRequest::Rate(rate, _, end) => {
             let last = clip.set.time_span().map_or(0.0, |span| span.1);
             let end = end.map_or(last, |end| clip.time_in_set(end));
-            return Self::of(clip, frames, (rate, end), end_frame);
+            FramesToEnd::new(clip, RateFrames { frames, rate, end }, end_frame)
         }
-        Ok(Self {
-            timeline: resolved(clip, &frames)?,
-            frames,
-            end: None,
-            rate: None,
-        })
-    }
+        _ => FramesToEnd::at(clip, frames),
+    };
+    found.map_err(|error| of_engine(&error))
 }
 
-fn resolved(clip: &Motion, frames: &SampleTimes) -> PyResult<Timeline> {
-    let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
-    timeline.map_err(|error| of_engine(&error.into()))
+fn of_end_frame(error: EndFrameError) -> PyErr {
+    let remedy = match error {
+        EndFrameError::NoFileOfTimes { .. } => {
+            "give times_out, or end_frame=\"hold\" or \"leave-out\""
+        }
+        _ => "give end_frame=\"hold\" or \"leave-out\"",
+    };
+    input(format!("{error}; {remedy}"))
 }
 
 /// Ends writing when the work is stopped.
@@ -285,14 +264,6 @@ impl Save {
         };
         if self.end_frame.is_some() && !matches!(samples, SampleRequest::Rate(..)) {
             return Err(input("`end_frame` needs `fps`; `at` lists all times"));
-        }
-        let has_times = self.format.supports(Feature::UnevenTimes)
-            || self.format.takes(FormatOption::TimesApart);
-        if self.end_frame == Some(EndFrame::Key) && !has_times {
-            return Err(input(format!(
-                "{} stores frames of a rate and no times; give end_frame=\"hold\" or \"leave-out\"",
-                self.format.name
-            )));
         }
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
@@ -462,27 +433,13 @@ impl Save {
         rate: FrameRate,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let end_frame = match (document.end_frame(), self.end_frame) {
-            (None, Some(_)) => {
-                return Err(input(
-                    "the animations of a file that is kept keep their ends; leave out `end_frame`",
-                ));
-            }
-            (Some(EndFrame::Hold), Some(EndFrame::Key)) => {
-                return Err(input(
-                    "its arrays are frames of a rate, without times; give end_frame=\"hold\" or \"leave-out\"",
-                ));
-            }
-            (of_document, asked) => asked.or(of_document).unwrap_or(EndFrame::Key),
+        let end_frame = EndFrame::for_document(self.end_frame, document).map_err(of_end_frame)?;
+        let frames = |clip: &&Motion| {
+            let frames = document.frames(clip.index, rate);
+            let frames = frames.map_err(|error| of_write(&error.into()))?;
+            FramesToEnd::new(clip, frames, end_frame).map_err(|error| of_engine(&error))
         };
-        let times = |clip: &&Motion| {
-            let times = document.times(clip.index, rate);
-            let times = times.map_err(|error| of_write(&error.into()))?;
-            let last = times.last().copied().unwrap_or(0.0);
-            let end = clip.set.time_span().map_or(last, |span| span.1);
-            FramesToEnd::of(clip, SampleTimes::at(times), (rate, end), end_frame)
-        };
-        let frames: Vec<FramesToEnd> = clips.iter().map(times).collect::<PyResult<_>>()?;
+        let frames: Vec<FramesToEnd> = clips.iter().map(frames).collect::<PyResult<_>>()?;
         let held = self.held(&frames);
         let mut warnings = self.written(clips, &frames, |sampled| {
             let indices = clips.iter().map(|clip| clip.index);
@@ -492,6 +449,16 @@ impl Save {
         })?;
         warnings.extend(held);
         Ok(warnings)
+    }
+
+    /// The rule for the end of a new result.
+    fn end_frame_of(&self, kind: SampledKind) -> PyResult<EndFrame> {
+        let result = SampledResult {
+            format: self.format,
+            times_apart: self.motion.times_apart,
+            kind,
+        };
+        EndFrame::for_result(self.end_frame, result).map_err(of_end_frame)
     }
 
     /// The warning that a frame was added after the end of a clip, unless it was asked for.
@@ -511,11 +478,8 @@ impl Save {
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
-        let has_times = self.format.supports(Feature::UnevenTimes) || self.motion.times_apart;
-        let end_frame = EndFrame::where_times_are(has_times);
-        let frames = clips
-            .iter()
-            .map(|clip| FramesToEnd::requested(clip, samples, self.end_frame.unwrap_or(end_frame)));
+        let end_frame = self.end_frame_of(SampledKind::Clips)?;
+        let frames = clips.iter().map(|clip| requested(clip, samples, end_frame));
         let frames: Vec<FramesToEnd> = frames.collect::<PyResult<_>>()?;
         let held = self.held(&frames);
         let mut warnings = self.written(clips, &frames, |sampled| {
@@ -567,19 +531,13 @@ impl Save {
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let end_frame = self.end_frame.unwrap_or({
-            // Rotations with times are read again as a clip; arrays are frames.
-            match self.format.supports(Feature::UnevenTimes) {
-                true => EndFrame::Key,
-                false => EndFrame::LeaveOut,
-            }
-        });
-        let all = FramesToEnd::requested(clip, samples, end_frame)?;
+        let end_frame = self.end_frame_of(SampledKind::Rotations)?;
+        let all = requested(clip, samples, end_frame)?;
         let (frames, count) = (&all.frames, all.timeline.len());
         let timeline = match all.end {
-            Some(end) => {
-                let times = all.timeline.times(0).chain([end.time]).collect();
-                resolved(clip, &SampleTimes::at(times))?
+            Some(_) => {
+                let whole = FramesToEnd::at(clip, SampleTimes::at(all.times()));
+                whole.map_err(|error| of_engine(&error))?.timeline
             }
             None => all.timeline.clone(),
         };

@@ -50,10 +50,10 @@ pub(crate) fn input_sha256(py: Python<'_>, path: PathBuf) -> Option<String> {
     py.detach(|| shards::input_sha256(&path))
 }
 
-/// A line for each input in a manifest that failed or has no result yet.
+/// A line for each input in a manifest and in the records of shards that failed or does not have all its results yet.
 #[pyfunction]
-pub(crate) fn manifest_unfinished(text: &str) -> Vec<String> {
-    shards::manifest_unfinished(text)
+pub(crate) fn manifest_unfinished(text: &str, records: Vec<String>) -> Vec<String> {
+    shards::manifest_unfinished(text, &records)
 }
 
 /// The hash of every kernel: machines that agree in it, and in the version, write the same bytes.

@@ -56,6 +56,19 @@ pub(crate) struct Inputs {
 impl Inputs {
     /// The inputs without repetitions, each of which earns a warning. Standard input can be read only once.
     pub(crate) fn gather(&self, times_from_stdin: bool) -> Result<GatheredInputs, Failure> {
+        self.gather_with(times_from_stdin, Repeats::Once)
+    }
+
+    /// The paths of the inputs, for commands that compare an input with itself where it is named twice.
+    pub(crate) fn with_repeats(&self) -> Result<Vec<PathBuf>, Failure> {
+        Ok(self.gather_with(false, Repeats::Keep)?.paths())
+    }
+
+    fn gather_with(
+        &self,
+        times_from_stdin: bool,
+        repeats: Repeats,
+    ) -> Result<GatheredInputs, Failure> {
         let uses = [
             (times_from_stdin, "the times"),
             (
@@ -72,7 +85,11 @@ impl Inputs {
                 "standard input cannot be both {all}; put one in a file"
             )));
         }
-        let gathered = GatheredInputs::new(&self.paths, &self.selection())?;
+        let selection = InputSelection {
+            repeats,
+            ..self.selection()
+        };
+        let gathered = GatheredInputs::new(&self.paths, &selection)?;
         let paths = gathered.paths();
         self.check_formats(&paths.iter().collect::<Vec<_>>())?;
         Ok(gathered)
@@ -97,7 +114,7 @@ impl Inputs {
         GatheredInputs::new(&[library.to_owned()], &selection)
     }
 
-    /// Whether `--exclude` leaves out a file of this path.
+    /// Whether `--exclude` leaves out a file of this path below the library.
     pub(crate) fn excludes(&self, path: &Path) -> bool {
         self.selection().excludes(path)
     }
@@ -108,6 +125,7 @@ impl Inputs {
             is_null_separated: self.null,
             exclude: &self.exclude,
             pipes: self.pipes,
+            repeats: Repeats::Once,
         }
     }
 
@@ -159,14 +177,17 @@ impl Inputs {
         })
     }
 
-    /// How files are read.
-    pub(crate) fn options(&self) -> Result<ReadOptions, Failure> {
-        let limits = Limits {
+    fn limits(&self) -> Limits {
+        Limits {
             file: self.max_size,
             memory: self.max_memory,
             ..Limits::default()
-        };
-        let options = self.reading.options(limits, self.pipes);
+        }
+    }
+
+    /// How files are read.
+    pub(crate) fn options(&self) -> Result<ReadOptions, Failure> {
+        let options = self.reading.options(self.limits(), self.pipes);
         options.map_err(|fault| Failure::input(&fault, ""))
     }
 
@@ -205,8 +226,8 @@ pub(crate) trait InputReader: Send + 'static {
     /// Reads an input; its warnings are not printed.
     fn read(&self, path: &Path) -> Result<Loaded, Failure>;
 
-    /// The longest input that it accepts, bytes.
-    fn max_size(&self) -> u64;
+    /// The limits within which it reads.
+    fn limits(&self) -> Limits;
 }
 
 impl InputReader for Inputs {
@@ -214,8 +235,8 @@ impl InputReader for Inputs {
         self.read(path)
     }
 
-    fn max_size(&self) -> u64 {
-        self.max_size
+    fn limits(&self) -> Limits {
+        self.limits()
     }
 }
 
@@ -301,12 +322,37 @@ pub(crate) struct InputSelection<'a> {
     pub(crate) exclude: &'a [PathPattern],
     /// Whether named pipes in directories are inputs.
     pub(crate) pipes: bool,
+    pub(crate) repeats: Repeats,
+}
+
+/// What becomes of inputs that are named several times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Repeats {
+    /// They are processed once, with a warning.
+    #[default]
+    Once,
+    /// They are inputs as often as they are named.
+    Keep,
 }
 
 impl InputSelection<'_> {
     fn excludes(&self, path: &Path) -> bool {
         self.exclude.iter().any(|pattern| pattern.matches(path))
     }
+}
+
+/// A path that the command line or a list of inputs names.
+struct NamedPath<'a> {
+    path: &'a Path,
+    is_listed: bool,
+}
+
+/// The inputs that a path stands for.
+#[derive(Default)]
+struct Expansion {
+    found: Vec<FoundInput>,
+    /// The inputs that `--exclude` leaves out. Directories count theirs only if none is left.
+    excluded: usize,
 }
 
 /// One input file, and its path below a directory of results.
@@ -376,20 +422,28 @@ impl GatheredInputs {
         )?;
         let mut seen = HashSet::new();
         let mut excluded = 0;
-        let named = paths.iter().map(|path| (path, false));
-        for (path, is_listed) in named.chain(listed.iter().map(|path| (path, true))) {
-            for mut found in gathered.expand(path, selection) {
-                if selection.excludes(&found.path) && !names::is_standard(&found.path) {
-                    excluded += 1;
-                    continue;
-                }
+        let named = paths.iter().map(|path| NamedPath {
+            path,
+            is_listed: false,
+        });
+        let listed = listed.iter().map(|path| NamedPath {
+            path,
+            is_listed: true,
+        });
+        for NamedPath { path, is_listed } in named.chain(listed) {
+            let expansion = gathered.expand(path, selection);
+            excluded += expansion.excluded;
+            for mut found in expansion.found {
                 // The results of a list keep its tree.
                 if is_listed && let Some(below) = plain(&found.path) {
                     found.below = below;
                 }
                 // A missing file is reported when it is opened.
                 let identity = found.path.canonicalize();
-                if seen.insert(identity.unwrap_or_else(|_| found.path.clone())) {
+                let is_new = seen.insert(identity.unwrap_or_else(|_| found.path.clone()));
+                let may_repeat =
+                    selection.repeats == Repeats::Keep && !names::is_standard(&found.path);
+                if is_new || may_repeat {
                     gathered.files.push(found);
                 } else {
                     let name = names::input(&found.path);
@@ -420,25 +474,54 @@ impl GatheredInputs {
         self.files.iter().map(|found| found.path.clone()).collect()
     }
 
-    fn expand(&mut self, path: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
+    /// The inputs that a path stands for. Files that are named or that match a pattern are left out by their paths as
+    /// they are given, those in directories by their paths below the directory.
+    fn expand(&mut self, path: &Path, selection: &InputSelection<'_>) -> Expansion {
         let alone = || {
             let name = path.file_name().unwrap_or(path.as_os_str());
-            FoundInput::named(path.to_owned(), name.into())
+            vec![FoundInput::named(path.to_owned(), name.into())]
         };
-        if names::is_standard(path) || path.is_file() {
-            return vec![alone()];
+        if names::is_standard(path) {
+            return Expansion {
+                found: alone(),
+                excluded: 0,
+            };
         }
-        let found = if path.is_dir() {
-            self.below(path, selection)
-        } else {
-            matches(path)
+        if path.is_dir() {
+            let found = self.below(path, selection);
+            let excluded = match found.is_empty() {
+                true => count_inputs(path, selection),
+                false => 0,
+            };
+            if found.is_empty() && excluded == 0 {
+                // Opening it reports what is wrong.
+                return Expansion {
+                    found: alone(),
+                    excluded,
+                };
+            }
+            self.many = true;
+            return Expansion { found, excluded };
+        }
+        let matching = match path.is_file() {
+            true => Vec::new(),
+            false => matches(path),
         };
-        if found.is_empty() {
-            // Opening it reports what is wrong.
-            return vec![alone()];
+        self.many |= !matching.is_empty();
+        // Opening a file that is not there reports it.
+        let all = match matching.is_empty() {
+            true => alone(),
+            false => matching,
+        };
+        let count = all.len();
+        let left = all
+            .into_iter()
+            .filter(|found| !selection.excludes(&found.path));
+        let found: Vec<FoundInput> = left.collect();
+        Expansion {
+            excluded: count - found.len(),
+            found,
         }
-        self.many = true;
-        found
     }
 
     /// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
@@ -489,6 +572,18 @@ impl GatheredInputs {
         }
         found
     }
+}
+
+/// The inputs below a directory that `--exclude` leaves out, where it leaves out all.
+fn count_inputs(directory: &Path, selection: &InputSelection<'_>) -> usize {
+    if selection.exclude.is_empty() {
+        return 0;
+    }
+    let walk = WalkDir::new(directory).follow_links(true).into_iter();
+    let is_input = |entry: &walkdir::DirEntry| {
+        entry.file_type().is_file() && Format::of(entry.path()).is_some()
+    };
+    walk.flatten().filter(is_input).count()
 }
 
 /// Directories and links that a walk could not read.

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tumble::method::{BESSEL_OVERHAUSER, KOCHANEK_BARTELS};
 use tumble::{
     Ends, Engine, Error, FrameRate, Interpolation, InterpolationWarning, KeySigns, METHODS, Method,
-    SampleTimes, Speed, TrackSet, WrapMode,
+    Quantity, SampleTimes, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, Samples};
@@ -18,19 +18,6 @@ use crate::arguments::output::one_of;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
-
-/// The methods, and the options of [`InterpolationArguments`].
-pub(crate) const CURVE_OPTIONS: [(&str, &str); 9] = [
-    ("methods", "--method"),
-    ("ends", "--ends"),
-    ("path", "--path"),
-    ("speed", "--speed"),
-    ("before", "--before"),
-    ("after", "--after"),
-    ("tension", "--tension"),
-    ("continuity", "--continuity"),
-    ("bias", "--bias"),
-];
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -120,13 +107,9 @@ impl InterpolationArguments {
         clip: &Motion,
         methods: &[MethodArgument],
     ) -> Result<(), Failure> {
-        let with = |method| self.with(method);
-        let used = methods.iter().flat_map(|method| {
-            let channels = ChannelMethods {
-                method: method.0,
-                with: &with,
-            };
-            channels.groups_of(clip)
+        let used = methods.iter().flat_map(|&method| {
+            let choice = CurveChoice::of_rotations(method, self);
+            choice.with_methods(|methods| methods.groups_of(clip))
         });
         let used: Vec<Method> = used.map(|group| group.0).collect();
         let checked = self.check(&each_once(used.iter()));
@@ -441,20 +424,64 @@ impl MethodArgument {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurveChoice {
     pub(crate) method: MethodArgument,
-    pub(crate) options: InterpolationArguments,
+    options: InterpolationArguments,
+    quantity: Quantity,
 }
 
 impl CurveChoice {
+    /// Rotations by a method.
+    pub(crate) fn of_rotations(method: MethodArgument, options: InterpolationArguments) -> Self {
+        Self {
+            method,
+            options,
+            quantity: Quantity::Rotation,
+        }
+    }
+
+    /// The same curve, of which another quantity is evaluated.
+    pub(crate) fn of(self, quantity: Quantity) -> Self {
+        Self { quantity, ..self }
+    }
+
+    /// Of these methods those that draw a clip, each differently.
+    ///
+    /// # Errors
+    /// When an option has no effect on any of them.
+    pub(crate) fn of_clip(
+        methods: &[MethodArgument],
+        options: InterpolationArguments,
+        name: &str,
+        clip: &Motion,
+    ) -> Result<Vec<Self>, Failure> {
+        let methods = MethodArgument::distinct(methods, clip);
+        options.check_clip(name, clip, &methods)?;
+        let choices = methods.into_iter();
+        Ok(choices
+            .map(|method| Self::of_rotations(method, options))
+            .collect())
+    }
+
+    /// The curve by a method, with the other options.
+    pub(crate) fn interpolation(self, method: Method) -> Interpolation {
+        Interpolation {
+            quantity: self.quantity,
+            ..self.options.with(method)
+        }
+    }
+
+    /// Gives the methods of a clip's channels to `work`.
+    pub(crate) fn with_methods<T>(self, work: impl FnOnce(&ChannelMethods<'_>) -> T) -> T {
+        work(&ChannelMethods {
+            method: self.method.0,
+            with: &|method| self.interpolation(method),
+        })
+    }
+
     /// How the rotations of a track are interpolated.
     pub(crate) fn of_track(self, clip: &Motion, track: usize) -> Interpolation {
-        let with = |method| self.options.with(method);
-        let methods = ChannelMethods {
-            method: self.method.0,
-            with: &with,
-        };
-        let groups = methods.groups_of(clip);
+        let groups = self.with_methods(|methods| methods.groups_of(clip));
         let group = groups.iter().find(|(_, tracks)| tracks.contains(&track));
-        with(group.map_or(BESSEL_OVERHAUSER, |(method, _)| *method))
+        self.interpolation(group.map_or(BESSEL_OVERHAUSER, |(method, _)| *method))
     }
 
     /// All channels of a clip.
@@ -464,12 +491,7 @@ impl CurveChoice {
         clip: &Motion,
         frames: &SampleTimes,
     ) -> Result<Samples, Error> {
-        let with = |method| self.options.with(method);
-        let methods = ChannelMethods {
-            method: self.method.0,
-            with: &with,
-        };
-        methods.sample(engine, clip, frames)
+        self.with_methods(|methods| methods.sample(engine, clip, frames))
     }
 }
 

@@ -10,11 +10,12 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 use serde::{Deserialize, Serialize};
 use tumble::{Encoding, Layout};
-use tumble_formats::Feature;
-use tumble_formats::end_frame::EndFrame;
+use tumble_formats::end_frame::{SampledKind, SampledResult};
 use tumble_formats::format::{Format, FormatOption};
 
+use crate::arguments::interpolation::InterpolationArguments;
 use crate::arguments::output::OutputArguments;
+use crate::arguments::time::EndFrameArguments;
 use crate::batch::digest::{self, InputFile};
 use crate::messages::exit::Failure;
 use crate::messages::names;
@@ -74,7 +75,24 @@ pub(crate) struct ResultRequest<'a> {
     pub(crate) output: &'a OutputArguments,
     pub(crate) layout: Layout,
     pub(crate) encoding: Encoding,
-    pub(crate) end_frame: Option<EndFrame>,
+    pub(crate) end_frame: &'a EndFrameArguments,
+    /// Whether the times are written to a separate file.
+    pub(crate) times_apart: bool,
+}
+
+impl ResultRequest<'_> {
+    /// The result, as far as the rule for its end depends on it.
+    pub(crate) fn sampled(&self) -> SampledResult<'static> {
+        SampledResult {
+            format: self.format,
+            times_apart: self.times_apart,
+            kind: match self.kind {
+                ResultKind::Motion | ResultKind::Baked => SampledKind::Clips,
+                ResultKind::Rotations if self.output.is_rotations() => SampledKind::Rotations,
+                ResultKind::Rotations | ResultKind::Poses => SampledKind::Numbers,
+            },
+        }
+    }
 }
 
 const fn silent(name: &'static str) -> OptionRule {
@@ -323,14 +341,7 @@ fn linear(result: &ResultRequest<'_>) -> Option<String> {
 }
 
 fn end_frame(result: &ResultRequest<'_>) -> Option<String> {
-    let format = result.format;
-    let has_times = format.supports(Feature::UnevenTimes) || format.takes(FormatOption::TimesApart);
-    (result.end_frame == Some(EndFrame::Key) && !has_times).then(|| {
-        format!(
-            "{} stores frames of a rate and no times; give --end-frame hold or leave-out",
-            format.name
-        )
-    })
+    result.end_frame.for_result(result.sampled()).err()
 }
 
 fn lengths(result: &ResultRequest<'_>, option: &str) -> Option<String> {
@@ -370,6 +381,29 @@ impl CommandLine {
             ))),
             None => Ok(()),
         }
+    }
+
+    /// As [`CommandLine::refuse`], of all options of a group.
+    pub(crate) fn refuse_group<T: clap::Args>(
+        &self,
+        on: &str,
+        remedy: &str,
+    ) -> Result<(), Failure> {
+        let command = T::augment_args(Command::new(""));
+        let named = command.get_arguments().filter_map(|argument| {
+            let long = argument.get_long()?;
+            Some((argument.get_id().as_str(), format!("--{long}")))
+        });
+        let named: Vec<(&str, String)> = named.collect();
+        let options: Vec<(&str, &str)> = named.iter().map(|(id, long)| (*id, &**long)).collect();
+        self.refuse(&options, on, remedy)
+    }
+
+    /// Refuses the options of curves through rotations where there are none.
+    pub(crate) fn refuse_rotation_options(&self, on: &str) -> Result<(), Failure> {
+        let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
+        self.refuse(&[("methods", "--method")], on, remedy)?;
+        self.refuse_group::<InterpolationArguments>(on, remedy)
     }
 
     /// Everything that determines a result besides its input. Options without a value or a default are left out.

@@ -13,28 +13,13 @@ use tumble_formats::{Limits, Loaded, ReadOptions};
 
 use crate::arguments::input::InputReader;
 use crate::arguments::interpolation::{each_once, ends};
+use crate::arguments::options::CommandLine;
 use crate::arguments::output::one_of;
 use crate::messages::exit::Failure;
 use crate::messages::names;
 
 /// The heading of these options in help.
 pub(crate) const PATHS: &str = "Paths";
-
-/// The options of [`PathArguments`], by their names beside arguments about rotations.
-pub(crate) const PATH_OPTIONS: [(&str, &str); 12] = [
-    ("seconds", "--seconds"),
-    ("rate", "--rate"),
-    ("path_method", "--path-method"),
-    ("path_ends", "--path-ends"),
-    ("direction", "--direction"),
-    ("path_frames", "--frame"),
-    ("path_up", "--path-up"),
-    ("no_ups", "--no-ups"),
-    ("twist", "--twist"),
-    ("path_speed", "--path-speed"),
-    ("forward", "--forward"),
-    ("upward", "--upward"),
-];
 
 /// How paths are followed. Beside arguments about rotations those of the same meaning are called
 /// `--path-…`; `follow`, which has none of these, gives them their short names.
@@ -203,6 +188,11 @@ fn methods() -> impl TypedValueParser<Value = VectorMethod> {
 }
 
 impl PathArguments {
+    /// Refuses these options where there are no paths.
+    pub(crate) fn refuse(command_line: &CommandLine, on: &str) -> Result<(), Failure> {
+        command_line.refuse_group::<Self>(on, "it is for files of paths; leave it out")
+    }
+
     /// The curve.
     pub(crate) fn method(&self) -> VectorMethod {
         self.path_method
@@ -266,8 +256,8 @@ impl InputReader for PathArguments {
         Ok(Loaded::of(self.read(path)?, Vec::new()))
     }
 
-    fn max_size(&self) -> u64 {
-        Limits::default().file
+    fn limits(&self) -> Limits {
+        Limits::default()
     }
 }
 

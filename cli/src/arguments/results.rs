@@ -97,6 +97,24 @@ impl ResultArguments {
         Ok(inputs)
     }
 
+    /// Refuses `--base` where the results of objects are named by the names of the objects.
+    pub(crate) fn refuse_base(&self, library: &Path) -> Result<(), Failure> {
+        match &self.base {
+            None => Ok(()),
+            Some(base) => Err(Failure::usage(format!(
+                "--base {}: the results of objects are named by the objects' names below {}; leave it out, or give \
+                 another library",
+                base.display(),
+                library.display()
+            ))),
+        }
+    }
+
+    /// Whether the times of the result are written to a separate file.
+    pub(crate) fn has_times_apart(&self) -> bool {
+        self.times_out.is_some()
+    }
+
     /// How results are named.
     pub(crate) fn naming(&self) -> ResultNaming {
         self.names
@@ -197,8 +215,9 @@ impl ResultArguments {
             jobs: plan.paths.into_iter().zip(plan.targets).collect(),
             refused: plan.refused,
             skipped: plan.skipped,
+            prints_json: self.json,
         };
-        let pipeline = match plan.manifest {
+        match plan.manifest {
             None => Pipeline::of_one(reader, inputs),
             Some(manifest) => Pipeline::of_batch(
                 reader,
@@ -210,10 +229,6 @@ impl ResultArguments {
                 },
                 Box::new(manifest),
             ),
-        };
-        match self.json {
-            true => pipeline.with_json(),
-            false => pipeline,
         }
     }
 }

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
 use tumble::{FrameRate, SampleTimes, Timeline};
-use tumble_formats::end_frame::{EndFrame, EndSample};
+use tumble_formats::end_frame::{
+    EndFrame, EndFrameError, EndSample, FramesToEnd, RateFrames, SampledResult,
+};
+use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
@@ -25,15 +28,6 @@ const BROADCAST: [u64; 5] = [24, 30, 48, 60, 120];
 /// A decimal rate this close to a broadcast rate (relative) was probably meant to
 /// be it: 23.98 is, 24 is not.
 const BROADCAST_TOLERANCE: f64 = 2e-4;
-
-/// The options of [`SamplingArguments`].
-pub(crate) const SAMPLING_OPTIONS: [(&str, &str); 5] = [
-    ("fps", "--fps"),
-    ("times", "--times"),
-    ("start", "--start"),
-    ("end", "--end"),
-    ("from_zero", "--from-zero"),
-];
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
@@ -119,7 +113,40 @@ pub(crate) struct EndFrameArguments {
     /// the end (`hold`), or nothing [default: key; hold in clips of formats without times; leave-out in NPY, and
     /// in results other than rotations]
     #[arg(long, value_name = "HOW", value_parser = end_frame(), conflicts_with_all = ["times", "at"])]
-    pub(crate) end_frame: Option<EndFrame>,
+    end_frame: Option<EndFrame>,
+}
+
+impl EndFrameArguments {
+    /// Whether the command line says it.
+    pub(crate) fn is_given(&self) -> bool {
+        self.end_frame.is_some()
+    }
+
+    /// The rule for a new result.
+    ///
+    /// # Errors
+    /// When the result has no time for a key at the end.
+    pub(crate) fn for_result(&self, result: SampledResult<'_>) -> Result<EndFrame, String> {
+        EndFrame::for_result(self.end_frame, result).map_err(Self::refusal)
+    }
+
+    /// The rule for a file that is written again.
+    ///
+    /// # Errors
+    /// As [`EndFrameArguments::for_result`].
+    pub(crate) fn for_document(&self, document: &dyn Document) -> Result<EndFrame, String> {
+        EndFrame::for_document(self.end_frame, document).map_err(Self::refusal)
+    }
+
+    fn refusal(error: EndFrameError) -> String {
+        let remedy = match error {
+            EndFrameError::NoFileOfTimes { .. } => {
+                "give --times-out, or --end-frame hold or leave-out"
+            }
+            _ => "give --end-frame hold or leave-out",
+        };
+        format!("{error}; {remedy}")
+    }
 }
 
 fn end_frame() -> impl TypedValueParser<Value = EndFrame> {
@@ -161,25 +188,20 @@ impl From<SampleTimes> for ClipFrames {
 }
 
 impl ClipFrames {
-    /// Frames of a rate, and the sample at the end of a clip that ends at `end`, in seconds.
+    /// Frames of a rate, and the sample at the end of the clip.
     pub(crate) fn at_rate(
-        frames: SampleTimes,
-        rate: FrameRate,
-        (clip, end): (&Motion, f64),
+        clip: &Motion,
+        frames: RateFrames,
         end_frame: EndFrame,
         name: &str,
     ) -> Result<Self, Failure> {
-        let timeline = resolved(&frames, clip, name)?;
-        let sample = end_frame.sample(&timeline, rate, end);
-        let left_out = EndFrame::Key
-            .sample(&timeline, rate, end)
-            .filter(|_| sample.is_none());
-        let last_frame = timeline.time(0, timeline.len().saturating_sub(1));
+        let found = FramesToEnd::new(clip, frames, end_frame)
+            .map_err(|error| Failure::evaluating(name, &error))?;
         Ok(Self {
-            end: sample,
-            left_out: left_out.zip(last_frame).map(|(end, last)| end.at - last),
-            rate: Some(rate).filter(|_| sample.is_none_or(EndSample::is_held)),
-            ..frames.into()
+            end: found.end,
+            left_out: found.left_out,
+            rate: found.rate,
+            ..found.frames.into()
         })
     }
 
@@ -275,6 +297,21 @@ impl SampleRequest {
         }
     }
 
+    /// Where the frames of a rate end in a clip, in seconds: at its last key or where the command line says; `None` for
+    /// listed times, or where neither is known.
+    pub(crate) fn end_of(&self, clip: &Motion, outside: Outside) -> Option<f64> {
+        let Self::Rate { end, .. } = self else {
+            return None;
+        };
+        let last = clip.set.time_span().map(|span| span.1);
+        let end = end.map(|end| clip.time_in_set(end));
+        let [_, leaves_out_after] = outside.leaves_out();
+        match leaves_out_after {
+            true => end.into_iter().chain(last).reduce(f64::min),
+            false => end.or(last),
+        }
+    }
+
     /// The samples for one clip; warns when they exceed its keys, and of those in gaps.
     ///
     /// # Errors
@@ -289,12 +326,10 @@ impl SampleRequest {
     ) -> Result<ClipFrames, Failure> {
         let frames = self.of(clip, outside, name)?;
         let all = match *self {
-            Self::Rate { rate, end, .. } => {
-                let last = clip.set.time_span().map_or(0.0, |span| span.1);
-                let end = end.map_or(last, |end| clip.time_in_set(end));
-                let [_, leaves_out_after] = outside.leaves_out();
-                let end = if leaves_out_after { end.min(last) } else { end };
-                ClipFrames::at_rate(frames, rate, (clip, end), end_frame, name)?
+            Self::Rate { rate, .. } => {
+                let end = self.end_of(clip, outside).unwrap_or(0.0);
+                let frames = RateFrames { frames, rate, end };
+                ClipFrames::at_rate(clip, frames, end_frame, name)?
             }
             Self::Times(_) | Self::Keys(_) => frames.into(),
         };

@@ -44,11 +44,17 @@ pub(crate) struct InputFile {
 }
 
 impl InputFile {
-    /// Before it is read.
+    /// Before it is read, within the limits of the program.
     pub(crate) fn new(path: &Path) -> Self {
+        Self::within(path, Limits::default())
+    }
+
+    /// Before it is read. The files that it refers to are found within these limits; an input beyond them is refused
+    /// when it is read.
+    pub(crate) fn within(path: &Path, limits: Limits) -> Self {
         let before = Identity::of(path);
         let referred = match before {
-            Some(_) => referred_files(path, Limits::default()),
+            Some(_) => referred_files(path, limits),
             None => Vec::new(),
         };
         let identity = |name: PathBuf| (Identity::of(&folder(path).join(&name)), name);
@@ -247,6 +253,13 @@ mod tests {
             hashes[0] != hashes[1] && hashes[1] != hashes[2],
             "{hashes:?}"
         );
+        // The files of an input beyond the limits are not looked for.
+        let limits = Limits {
+            file: 8,
+            ..Limits::default()
+        };
+        let beyond = InputFile::within(&path, limits);
+        assert_eq!(beyond.bytes(), Some(text.len() as u64));
         // One file alone is hashed as `sha256sum` does.
         std::fs::write(&path, "abc").unwrap();
         assert_eq!(hash(), of_bytes([&b"abc"[..]]));

@@ -226,6 +226,14 @@ impl ManifestLine {
     }
 }
 
+/// The inputs without all their results.
+pub(crate) struct UnfinishedInputs<'a> {
+    /// Those that failed, at least in part.
+    pub(crate) failed: Vec<&'a InputEntry>,
+    /// The paths of those that no batch has come to, or that a batch was stopped in.
+    pub(crate) pending: BTreeSet<&'a str>,
+}
+
 impl ManifestLines {
     /// A last line without its end was being written when the program was killed.
     pub(crate) fn parse(bytes: &[u8]) -> Self {
@@ -249,9 +257,7 @@ impl ManifestLines {
         }
         lines
     }
-}
 
-impl ManifestLines {
     /// Adds later lines.
     pub(crate) fn extend(&mut self, later: Self) {
         for entry in later.entries.values() {
@@ -260,6 +266,28 @@ impl ManifestLines {
         self.entries.extend(later.entries);
         self.inputs.extend(later.inputs);
         self.damaged += later.damaged;
+    }
+
+    /// The inputs without all their results.
+    pub(crate) fn unfinished_inputs(&self) -> UnfinishedInputs<'_> {
+        let in_state = |state: InputState| self.inputs.values().filter(move |it| it.state == state);
+        let failed: Vec<&InputEntry> = in_state(InputState::Failed).collect();
+        let failed_results: BTreeSet<&str> = failed
+            .iter()
+            .filter_map(|it| it.result.as_deref())
+            .collect();
+        let mut pending: BTreeSet<&str> =
+            in_state(InputState::Pending).map(|it| &*it.input).collect();
+        // A batch was stopped between the clips of an input.
+        let mut clips: BTreeMap<(&str, usize), (usize, &str)> = BTreeMap::new();
+        for entry in self.entries.values() {
+            clips.entry(entry.whole()).or_insert((0, &entry.input)).0 += 1;
+        }
+        let cut = clips.iter().filter(|((whole, count), (found, _))| {
+            found < count && !failed_results.contains(whole)
+        });
+        pending.extend(cut.map(|(_, (_, input))| input));
+        UnfinishedInputs { failed, pending }
     }
 
     /// The results of inputs that failed, at least in part, or that no batch has come to.

@@ -45,7 +45,7 @@ pub(crate) struct Manifest {
     /// Those of `planned` whose files have all been made.
     ended: BTreeSet<String>,
     /// Whether results without an input are removed.
-    pub(crate) prune: bool,
+    prune: bool,
     /// Whether there is a file of its name: a manifest, or a file to replace.
     exists: bool,
     /// The file that lines are appended to; `None` before the first.
@@ -54,6 +54,17 @@ pub(crate) struct Manifest {
     has_shards: bool,
     /// Locks the directory: two batches would lose each other's lines.
     _lock: Option<File>,
+}
+
+/// How the manifest of a directory is opened.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ManifestOptions {
+    /// Whether there are shards, whose lines become lines of the manifest.
+    pub(crate) has_shards: bool,
+    /// Whether a file that is not a manifest is replaced.
+    pub(crate) overwrite: bool,
+    /// Whether results without an input are removed.
+    pub(crate) prune: bool,
 }
 
 /// Locks a directory of results; `None` where the system or the file system has no such locks.
@@ -72,9 +83,13 @@ pub(crate) fn lock(folder: &Path) -> Result<Option<File>, Failure> {
 }
 
 impl Manifest {
-    /// Opens a directory's manifest; its file is written with the first line. `has_shards`: the lines of
-    /// shards become lines of the manifest. `overwrite`: a file that is not a manifest is replaced.
-    pub(crate) fn open(folder: &Path, has_shards: bool, overwrite: bool) -> Result<Self, Failure> {
+    /// Opens a directory's manifest; its file is written with the first line.
+    pub(crate) fn open(folder: &Path, options: ManifestOptions) -> Result<Self, Failure> {
+        let ManifestOptions {
+            has_shards,
+            overwrite,
+            prune,
+        } = options;
         let lock = lock(folder)?;
         let mut bytes = Vec::new();
         let exists = match entry::open(folder) {
@@ -106,7 +121,7 @@ impl Manifest {
             inputs: lines.inputs,
             planned: BTreeSet::new(),
             ended: BTreeSet::new(),
-            prune: false,
+            prune,
             exists,
             journal: None,
             has_shards,
@@ -191,6 +206,9 @@ impl Manifest {
                 first.display()
             ));
         }
+        if self.prune {
+            self.note_unknown();
+        }
         if !self.is_empty() {
             self.replace(&pruned)?;
         }
@@ -203,12 +221,29 @@ impl Manifest {
             let whole = entry.whole().0;
             match self.planned.contains(whole) {
                 true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
-                false => is_removed(&entry.input),
+                false => entry.presence() == InputPresence::Removed,
             }
         };
         let results = self.results().into_values();
         let orphans = results.filter(|entry| is_orphan(entry));
         orphans.map(|entry| entry.output.clone()).collect()
+    }
+
+    /// Says which results `--prune` keeps because it cannot know whether their inputs are gone.
+    fn note_unknown(&self) {
+        let results = self.results().into_values();
+        let unknown = results.filter(|entry| {
+            !self.planned.contains(entry.whole().0) && entry.presence() == InputPresence::Unknown
+        });
+        let unknown: Vec<&ManifestEntry> = unknown.collect();
+        if let Some(first) = unknown.first() {
+            let results = words::count(unknown.len(), "result");
+            let stay = if unknown.len() == 1 { "stays" } else { "stay" };
+            words::note(&format!(
+                "{results} {stay}, because the input may be somewhere else: {} was not found from this directory",
+                first.input
+            ));
+        }
     }
 
     /// Removes the files of results, and directories that are empty then. A file that is not the one that its line
@@ -285,29 +320,74 @@ impl Manifest {
     }
 }
 
-/// Whether an input does not exist any more. If no folder of its path exists, nothing is known of it: the path may be
-/// one of another machine, or relative to another folder.
-pub(crate) fn is_removed(input: &str) -> bool {
-    let path = Path::new(input);
-    let is_missing = |path: &Path| {
-        let found = std::fs::symlink_metadata(path);
-        found.is_err_and(|error| {
-            matches!(
-                error.kind(),
-                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
-            )
-        })
-    };
-    // A name that is not UTF-8 is recorded with replacement characters.
-    if names::is_standard(path) || input.contains("://") || input.contains('\u{fffd}') {
-        return false;
+/// Whether an input exists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum InputPresence {
+    Present,
+    /// It is gone from the directory that it was found in.
+    Removed,
+    /// It was not found. Its path may be one of another machine, of a disk that is not mounted, or relative to another
+    /// directory.
+    Unknown,
+}
+
+impl InputPresence {
+    /// Of the input with this path, whose result has this name. An input is gone if the directory that the command line
+    /// named is there and has other files: the input's path without the part that the name of its result repeats. Of a
+    /// path below the current directory, such as `walks/a.bvh` in a list of inputs, it is the first folder. Of a name
+    /// alone nothing is known, because every directory may be the one that it was in.
+    fn of(input: &str, result: Option<&str>) -> Self {
+        let path = Path::new(input);
+        let is_missing = || {
+            let found = std::fs::symlink_metadata(path);
+            found.is_err_and(|error| {
+                matches!(
+                    error.kind(),
+                    io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+                )
+            })
+        };
+        if names::is_standard(path) {
+            return Self::Present;
+        }
+        // A name that is not UTF-8 is recorded with replacement characters.
+        if input.contains("://") || input.contains('\u{fffd}') {
+            return Self::Unknown;
+        }
+        if !is_missing() {
+            return Self::Present;
+        }
+        let repeated = result.map_or(1, |result| Path::new(result).components().count());
+        let is_named = |folder: &Path| folder.file_name().is_some();
+        let root = path.ancestors().nth(repeated);
+        let first = || {
+            path.ancestors()
+                .skip(1)
+                .filter(|folder| is_named(folder))
+                .last()
+        };
+        let root = root.filter(|root| is_named(root)).or_else(first);
+        let has_files =
+            |root: &Path| std::fs::read_dir(root).is_ok_and(|mut files| files.next().is_some());
+        match root.is_some_and(has_files) {
+            true => Self::Removed,
+            false => Self::Unknown,
+        }
     }
-    let mut folders = path.ancestors().skip(1);
-    let mut folders = folders
-        .by_ref()
-        .filter(|folder| folder.file_name().is_some());
-    let is_bare = path.components().count() == 1;
-    is_missing(path) && (is_bare || folders.any(|folder| !is_missing(folder)))
+}
+
+impl ManifestEntry {
+    /// Whether its input exists.
+    pub(crate) fn presence(&self) -> InputPresence {
+        InputPresence::of(&self.input, Some(self.whole().0))
+    }
+}
+
+impl InputEntry {
+    /// Whether the input exists.
+    fn presence(&self) -> InputPresence {
+        InputPresence::of(&self.input, self.result.as_deref())
+    }
 }
 
 impl ResultRecorder for Manifest {
@@ -320,11 +400,27 @@ impl ResultRecorder for Manifest {
     }
 
     fn begin(&mut self, start: BatchStart<'_>) -> Result<(), Failure> {
-        // An input that is gone has not failed any more; pruned is all that this batch does not have.
+        // An input that is gone has not failed any more.
+        let mut forgotten = Vec::new();
         let prune = self.prune;
-        self.inputs.retain(|_, entry| {
-            entry.state != InputState::Skipped && !prune && !is_removed(&entry.input)
+        self.inputs.retain(|_, entry| match entry.presence() {
+            _ if entry.state == InputState::Skipped => false,
+            InputPresence::Present => true,
+            InputPresence::Removed => false,
+            InputPresence::Unknown => {
+                if prune {
+                    forgotten.push(entry.input.clone());
+                }
+                !prune
+            }
         });
+        if let Some(first) = forgotten.first() {
+            let inputs = words::count(forgotten.len(), "input");
+            let are = if forgotten.len() == 1 { "is" } else { "are" };
+            words::note(&format!(
+                "{inputs} without a result {are} forgotten: {first} was not found from this directory"
+            ));
+        }
         let skipped = start.skipped.into_iter();
         self.inputs
             .extend(skipped.map(|entry| (entry.key(), entry)));
@@ -407,7 +503,7 @@ mod tests {
     #[test]
     fn a_line_cut_short_is_forgotten_and_the_next_is_whole() {
         let directory = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
         manifest.add(entry("b", "1")).unwrap();
         manifest.add(entry("a", "2")).unwrap();
         manifest.add(entry("b", "3")).unwrap();
@@ -416,7 +512,7 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         bytes.truncate(bytes.len() - 5);
         std::fs::write(&path, &bytes).unwrap();
-        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
         assert_eq!(manifest.previous["b"].output_sha256, "1");
         manifest.add(entry("b", "4")).unwrap();
         manifest.finish().unwrap();
@@ -428,10 +524,10 @@ mod tests {
     #[test]
     fn two_batches_do_not_write_into_one_directory() {
         let directory = tempfile::tempdir().unwrap();
-        let first = Manifest::open(directory.path(), false, false).unwrap();
-        assert!(Manifest::open(directory.path(), false, false).is_err());
+        let first = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
+        assert!(Manifest::open(directory.path(), ManifestOptions::default()).is_err());
         drop(first);
-        assert!(Manifest::open(directory.path(), false, false).is_ok());
+        assert!(Manifest::open(directory.path(), ManifestOptions::default()).is_ok());
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
@@ -439,12 +535,12 @@ mod tests {
     #[test]
     fn a_manifest_is_replaced_and_never_written_into() {
         let directory = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
         manifest.add(entry("a", "1")).unwrap();
         manifest.finish().unwrap();
         let (path, other) = (directory.path().join(NAME), directory.path().join("copy"));
         std::fs::hard_link(&path, &other).unwrap();
-        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
         manifest.add(entry("b", "1")).unwrap();
         manifest.add(entry("c", "1")).unwrap();
         manifest.finish().unwrap();
@@ -465,11 +561,11 @@ mod tests {
     #[test]
     fn what_is_done_is_what_is_there_and_was_asked_for() {
         let directory = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), ManifestOptions::default()).unwrap();
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
         manifest.finish().unwrap();
-        let manifest = Manifest::open(directory.path(), false, false)
+        let manifest = Manifest::open(directory.path(), ManifestOptions::default())
             .unwrap()
             .previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");

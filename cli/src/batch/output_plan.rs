@@ -13,7 +13,7 @@ use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry::{self, InputEntry};
-use crate::batch::manifest::Manifest;
+use crate::batch::manifest::{Manifest, ManifestOptions};
 use crate::batch::owner::ReplacedOwners;
 use crate::batch::result_names::{ResultName, ResultNaming, format, name_results};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
@@ -81,7 +81,7 @@ pub(crate) fn plan(
             let destination = Destination::new(out, request.overwrite, &paths)?;
             // The surest check is to try.
             destination.check_writable()?;
-            destination.refuse_terminal(format.is_text)?;
+            destination.refuse_terminal(format)?;
             OutputPlan {
                 paths,
                 targets: vec![ResultTarget::new(destination, format, String::new())],
@@ -131,8 +131,14 @@ fn in_folder(
         refuse_shards(recorded, &names, folder, request)?;
     }
     target::create_folder(folder)?;
-    let mut manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
-    manifest.prune = request.prune;
+    let manifest = Manifest::open(
+        folder,
+        ManifestOptions {
+            has_shards: shards.is_some(),
+            overwrite: request.overwrite,
+            prune: request.prune,
+        },
+    )?;
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
     let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);

@@ -52,6 +52,8 @@ pub(crate) struct PipelineInputs {
     pub(crate) refused: Vec<UnplannedInput>,
     /// Skipped entries of the directories of inputs.
     pub(crate) skipped: Vec<InputEntry>,
+    /// Whether JSON about all results and failures is printed at the end.
+    pub(crate) prints_json: bool,
 }
 
 /// The options of a batch.
@@ -206,13 +208,18 @@ struct BatchRecords<'a> {
 impl<'a> Pipeline<'a> {
     /// Of a single result, without a manifest.
     pub(crate) fn of_one(reader: impl InputReader, inputs: PipelineInputs) -> Self {
-        let PipelineInputs { jobs, refused, .. } = inputs;
+        let PipelineInputs {
+            jobs,
+            refused,
+            prints_json,
+            ..
+        } = inputs;
         let mut pipeline = Self {
             outcomes: Outcomes::of(refused.len() + jobs.len()),
             inputs: InputSource::One(Box::new(reader), jobs.into_iter()),
             current: None,
             batch: None,
-            json: None,
+            json: prints_json.then(Vec::new),
         };
         pipeline.refuse_all(refused);
         pipeline
@@ -229,6 +236,7 @@ impl<'a> Pipeline<'a> {
             jobs,
             refused,
             skipped,
+            prints_json,
         } = inputs;
         let BatchOptions {
             options,
@@ -289,18 +297,10 @@ impl<'a> Pipeline<'a> {
             current: None,
             batch: Some(batch),
             outcomes,
-            json: None,
+            json: prints_json.then(Vec::new),
         };
         pipeline.refuse_all(refused);
         pipeline
-    }
-
-    /// The same, which prints JSON about all results and failures at the end.
-    pub(crate) fn with_json(self) -> Self {
-        Self {
-            json: Some(Vec::new()),
-            ..self
-        }
     }
 
     /// Adds the failures of inputs that have no job.
@@ -582,7 +582,7 @@ impl InputSource {
             Self::One(reader, jobs) => {
                 let job = jobs.next()?;
                 let path = &job.0;
-                let file = InputFile::new(path);
+                let file = InputFile::within(path, reader.limits());
                 let label = format!("reading {}", names::input(path));
                 let loaded = busy(&label, || reader.read(path));
                 let input = Some((file, loaded));
@@ -714,11 +714,11 @@ impl<R: InputReader> ReadingAhead<R> {
 
     /// Reads an input, if it has to be evaluated.
     fn read(&self, (path, target): &PipelineJob) -> Option<(InputFile, Result<Loaded, Failure>)> {
-        let file = InputFile::new(path);
+        let limits = self.reader.limits();
+        let file = InputFile::within(path, limits);
         let is_done = |hash: &str| self.previous.is_done(target.name(), hash, &self.options);
         // The hash is of the bytes that are read next; longer inputs are refused.
-        let max_size = self.reader.max_size();
-        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= max_size);
+        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= limits.file);
         let sha256 = is_read.then(|| file.sha256()).flatten();
         if self.resume && sha256.is_some_and(is_done) {
             return None;

@@ -44,6 +44,15 @@ pub(crate) enum ResultNaming {
 }
 
 impl ResultNaming {
+    /// The name by which the results of an input are known, from its path below the library: that of its result without
+    /// the extension of a format.
+    pub(crate) fn key(self, below: &Path) -> String {
+        match self {
+            Self::Stem => below.with_extension("").display().to_string(),
+            Self::Full => below.display().to_string(),
+        }
+    }
+
     /// The path of an input's result below the directory of results.
     fn name(self, format: &Format, found: &FoundInput) -> PathBuf {
         match self {
@@ -54,6 +63,15 @@ impl ResultNaming {
                 name.into()
             }
         }
+    }
+}
+
+/// The name by which the results of an input are known, from the name of its result: without the extension, which
+/// depends on the format. Files of rows have the results of many inputs, and are known by their whole names.
+pub(crate) fn key_of_result(name: &str) -> String {
+    match name.ends_with(".parquet") {
+        true => name.to_owned(),
+        false => Path::new(name).with_extension("").display().to_string(),
     }
 }
 

@@ -25,7 +25,7 @@ pub(crate) fn in_memory(
     match tumble::available_memory() {
         Some(free) if needed > free as f64 => {
             let samples = of_samples(tracks, timeline.len());
-            Err(Failure::memory(name, &samples, needed))
+            Err(Failure::memory(name, &samples, needed, Some(free)))
         }
         _ => Ok(timeline),
     }
@@ -65,7 +65,11 @@ pub(crate) fn on_disk(
 ) -> Result<(), Failure> {
     match available_disk(folder) {
         Some(free) if bytes > free => {
-            let limit = format!("{} on the disk of {}", words::bytes(free), folder.display());
+            let limit = format!(
+                "{} on the disk of {} are free",
+                words::bytes(free),
+                folder.display()
+            );
             let samples = of_samples(tracks, samples);
             Err(Failure::room(name, &samples, bytes, &limit))
         }

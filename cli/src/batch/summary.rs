@@ -1,7 +1,8 @@
 //! Messages of a batch about its inputs: the lines of results and failures, as long as they are few, and a line for
-//! each code of a warning at the end. Everything that is not printed is in the manifest.
+//! each code of a warning at the end, or every warning of a single input. Everything that is not printed is in the
+//! manifest.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tumble_formats::{Code, Diagnostic};
 
@@ -19,8 +20,8 @@ const MAX_FAILURES: usize = 10;
 
 /// The messages about a batch.
 pub(crate) struct BatchSummary {
-    /// Whether every line is printed.
-    verbose: bool,
+    /// Whether every warning is printed.
+    prints_warnings: bool,
     /// The lines about results that may yet be printed.
     results_left: usize,
     failures_left: usize,
@@ -31,9 +32,11 @@ pub(crate) struct BatchSummary {
     left_out: usize,
 }
 
-/// The inputs with a warning of one code.
+/// The inputs with warnings of one code.
 struct WarnedInputs {
-    count: usize,
+    inputs: usize,
+    /// Of all these inputs.
+    warnings: usize,
     first: Diagnostic,
 }
 
@@ -47,7 +50,7 @@ impl BatchSummary {
     pub(crate) fn new(inputs: usize, verbose: bool) -> Self {
         let all = |limit: usize| if verbose { usize::MAX } else { limit };
         Self {
-            verbose,
+            prints_warnings: verbose || inputs == 1,
             results_left: all(if inputs > MAX_INPUTS { 0 } else { MAX_RESULTS }),
             failures_left: all(MAX_FAILURES),
             warnings: BTreeMap::new(),
@@ -72,20 +75,20 @@ impl BatchSummary {
 
     /// The warnings of one input: each is printed, or counted for the end.
     pub(crate) fn warn(&mut self, warnings: &[Diagnostic]) {
-        if self.verbose {
+        if self.prints_warnings {
             words::warnings(warnings);
             return;
         }
-        let mut codes = BTreeMap::new();
+        let mut codes = BTreeSet::new();
         for warning in warnings {
-            codes.entry(warning.code).or_insert(warning);
-        }
-        for (code, first) in codes {
-            let of_code = self.warnings.entry(code).or_insert_with(|| WarnedInputs {
-                count: 0,
-                first: first.clone(),
+            let of_code = self.warnings.entry(warning.code);
+            let of_code = of_code.or_insert_with(|| WarnedInputs {
+                inputs: 0,
+                warnings: 0,
+                first: warning.clone(),
             });
-            of_code.count += 1;
+            of_code.warnings += 1;
+            of_code.inputs += usize::from(codes.insert(warning.code));
         }
     }
 
@@ -108,11 +111,19 @@ impl BatchSummary {
     /// The lines at the end of the batch.
     pub(crate) fn lines(&self) -> Vec<String> {
         const MORE: &str = "(--verbose lists them)";
-        let warned = self.warnings.iter().map(|(code, of_code)| {
-            let WarnedInputs { count, first } = of_code;
-            match count {
-                1 => first.to_string(),
-                _ => format!("{code} {count} files: {} {MORE}", code.title()),
+        let warned = self.warnings.iter().map(|(code, of_code)| match of_code {
+            WarnedInputs {
+                inputs: 1,
+                warnings: 1,
+                first,
+            } => first.to_string(),
+            WarnedInputs {
+                inputs: 1,
+                warnings,
+                first,
+            } => format!("{first} (and {} more: --verbose lists them)", warnings - 1),
+            WarnedInputs { inputs, .. } => {
+                format!("{code} {inputs} files: {} {MORE}", code.title())
             }
         });
         let failed = self.failures.iter().map(|(code, of_code)| {
@@ -129,5 +140,42 @@ impl BatchSummary {
     /// Whether lines about results were left out.
     pub(crate) fn is_shortened(&self) -> bool {
         self.left_out > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn warnings(file: &str, count: usize) -> Vec<Diagnostic> {
+        let one = |index: usize| Diagnostic::new(file, Code::NoRoom, format!("fault {index}"));
+        (1..=count).map(one).collect()
+    }
+
+    /// The first of several warnings of one input says how many there are more.
+    #[test]
+    fn no_warning_hides_another() {
+        let mut summary = BatchSummary::new(2, false);
+        summary.warn(&warnings("a.glb", 3));
+        let [line] = &summary.lines()[..] else {
+            panic!("one line");
+        };
+        assert!(
+            line.ends_with("fault 1 (and 2 more: --verbose lists them)"),
+            "{line}"
+        );
+        summary.warn(&warnings("b.glb", 1));
+        let [line] = &summary.lines()[..] else {
+            panic!("one line");
+        };
+        assert!(line.contains(" 2 files: "), "{line}");
+    }
+
+    /// The warnings of the only input are printed as they come, and none is left for the end.
+    #[test]
+    fn a_single_input_has_no_summary() {
+        let mut summary = BatchSummary::new(1, false);
+        summary.warn(&warnings("a.glb", 3));
+        assert_eq!(summary.lines(), [""; 0]);
     }
 }

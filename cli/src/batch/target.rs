@@ -98,11 +98,6 @@ impl ResultTarget {
         Ok(Self { times, ..self })
     }
 
-    /// Whether times go to a separate file.
-    pub(crate) fn has_times_apart(&self) -> bool {
-        self.times.is_some()
-    }
-
     /// Opens and drops the file: its directory may be read-only.
     pub(crate) fn check_writable(&self) -> Result<(), Failure> {
         self.destination.check_writable()
@@ -129,7 +124,7 @@ impl ResultTarget {
         MotionOptions {
             name: self.to_string(),
             format: ending.to_string_lossy().to_lowercase(),
-            times_apart: self.has_times_apart(),
+            times_apart: self.times.is_some(),
             ..MotionOptions::default()
         }
     }
@@ -462,8 +457,8 @@ impl Destination {
     }
 
     /// Refuses bytes that are not text on a terminal, which would obey some of them.
-    pub(crate) fn refuse_terminal(&self, is_text: bool) -> Result<(), Failure> {
-        if is_text || !self.is_standard() || !io::stdout().is_terminal() {
+    pub(crate) fn refuse_terminal(&self, format: &Format) -> Result<(), Failure> {
+        if format.is_text || !self.is_standard() || !io::stdout().is_terminal() {
             return Ok(());
         }
         Err(Failure::usage(

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use crate::arguments::options::{self, OptionFile};
 use crate::batch::digest::{self, InputFile};
-use crate::batch::entry::{self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME};
-use crate::batch::manifest::is_removed;
+use crate::batch::entry::{self, ManifestEntry, ManifestLines, NAME, UnfinishedInputs};
+use crate::batch::manifest::InputPresence;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
@@ -82,13 +82,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let message = format!("{shown}: is not a manifest; `tumble eval` writes one, {NAME}");
         return Err(Failure::new(ALL_INPUTS, message));
     }
-    let entries: Vec<ManifestEntry> = lines.entries.into_values().collect();
+    let entries: Vec<&ManifestEntry> = lines.entries.values().collect();
     let inputs = busy("checking inputs", || InputHashes::of(&entries));
     let faults: Vec<(&ManifestEntry, Fault)> = busy("checking", || {
         let faulty = |entry| fault(folder, entry, &inputs).map(|fault| (entry, fault));
         on_threads(
-            || entries.par_iter().filter_map(faulty).collect(),
-            || entries.iter().filter_map(faulty).collect(),
+            || entries.par_iter().copied().filter_map(faulty).collect(),
+            || entries.iter().copied().filter_map(faulty).collect(),
         )
     });
     for (entry, fault) in &faults {
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if faults.len() + lines.damaged > 0 {
         missing.push(format!("{} of {total} differ", faults.len()));
     }
-    missing.extend(unfinished(&entries, lines.inputs.values()));
+    missing.extend(unfinished(&lines));
     if !missing.is_empty() {
         let missing = missing.join(", ");
         // Without its first line a manifest is no longer taken for one.
@@ -132,34 +132,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The inputs without a result, and those with a part of their results: how many, and the first.
-fn unfinished<'a>(
-    entries: &[ManifestEntry],
-    inputs: impl Iterator<Item = &'a InputEntry>,
-) -> Vec<String> {
-    let (mut failed, mut pending) = (Vec::new(), BTreeSet::new());
-    for entry in inputs {
-        match entry.state {
-            InputState::Failed => failed.push(entry),
-            InputState::Pending => {
-                pending.insert(&*entry.input);
-            }
-            InputState::Skipped => {}
-        }
-    }
-    let failed_results: BTreeSet<&str> = failed
-        .iter()
-        .filter_map(|it| it.result.as_deref())
-        .collect();
-    // A batch was stopped between the clips of an input.
-    let mut clips: BTreeMap<(&str, usize), (usize, &str)> = BTreeMap::new();
-    for entry in entries {
-        clips.entry(entry.whole()).or_insert((0, &entry.input)).0 += 1;
-    }
-    let cut = clips
-        .iter()
-        .filter(|((whole, count), (found, _))| found < count && !failed_results.contains(whole));
-    pending.extend(cut.map(|(_, (_, input))| input));
+/// The inputs without all their results: how many, and the first.
+fn unfinished(lines: &ManifestLines) -> Vec<String> {
+    let UnfinishedInputs { failed, pending } = lines.unfinished_inputs();
     let mut texts = Vec::new();
     if let Some(first) = failed.first() {
         let inputs = words::count(failed.len(), "input");
@@ -203,7 +178,7 @@ struct InputHashes<'a> {
 }
 
 impl<'a> InputHashes<'a> {
-    fn of(entries: &'a [ManifestEntry]) -> Self {
+    fn of(entries: &[&'a ManifestEntry]) -> Self {
         let hashed = entries.iter().filter(|entry| entry.input_sha256.is_some());
         let inputs: BTreeSet<&str> = hashed.map(|entry| &*entry.input).collect();
         let hash = |input: &'a str| {
@@ -240,20 +215,16 @@ impl<'a> InputHashes<'a> {
     }
 
     /// Says how many results have no input any more, and how many inputs were not found to be compared.
-    fn note_missing(&self, entries: &[ManifestEntry]) {
+    fn note_missing(&self, entries: &[&ManifestEntry]) {
         let missing: BTreeSet<&str> = (self.inputs.iter())
             .filter_map(|(input, hash)| hash.is_none().then_some(*input))
             .filter(|input| !Path::new(input).exists())
             .collect();
-        let removed: BTreeSet<&str> = missing
-            .iter()
-            .copied()
-            .filter(|it| is_removed(it))
-            .collect();
-        let orphans = entries
-            .iter()
-            .filter(|entry| removed.contains(&*entry.input));
-        let orphans: Vec<&ManifestEntry> = orphans.collect();
+        let orphans = entries.iter().filter(|entry| {
+            missing.contains(&*entry.input) && entry.presence() == InputPresence::Removed
+        });
+        let orphans: Vec<&ManifestEntry> = orphans.copied().collect();
+        let removed: BTreeSet<&str> = orphans.iter().map(|entry| &*entry.input).collect();
         if let Some(first) = orphans.first() {
             let results = words::count(orphans.len(), "result");
             let have = if orphans.len() == 1 { "has" } else { "have" };

@@ -15,6 +15,7 @@ use tumble_routes::mesh::Mesh;
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::CurveChoice;
+use crate::arguments::options::CommandLine;
 use crate::arguments::path::PathArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::batch::room;
@@ -28,13 +29,6 @@ use crate::messages::names;
 const CURVE_POINTS: usize = 600;
 /// How many facets along a side a net of control points is drawn with.
 const FACETS: usize = 32;
-
-/// The options of [`Scenery`].
-pub(crate) const SCENERY_OPTIONS: [(&str, &str); 3] = [
-    ("meshes", "--mesh"),
-    ("body", "--body"),
-    ("drawn_frames", "--drawn-frames"),
-];
 
 /// What is drawn beside the bodies on paths.
 #[derive(Debug, Clone, Args)]
@@ -60,6 +54,12 @@ pub(crate) struct Scenery {
 }
 
 impl Scenery {
+    /// Refuses its options where no bodies on paths are drawn.
+    pub(crate) fn refuse(command_line: &CommandLine) -> Result<(), Failure> {
+        let remedy = "it is for bodies on paths; leave it out";
+        command_line.refuse_group::<Self>("boxes and skeletons", remedy)
+    }
+
     /// The meshes, in the order in which they were named.
     pub(crate) fn read(&self) -> Result<Vec<Mesh>, Failure> {
         let read = |path: &PathBuf| match Surface::read(path, 0.0)? {

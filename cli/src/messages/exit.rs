@@ -132,7 +132,7 @@ impl Failure {
     pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
         let code = match error {
             Error::OutOfMemory(error) => {
-                return Self::memory(input, error.purpose, error.bytes as f64);
+                return Self::memory(input, error.purpose, error.bytes as f64, None);
             }
             Error::SampleTimes(_) => USAGE,
             Error::Vulkan(
@@ -145,12 +145,11 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
-    /// A result of an input does not fit into the memory that is free. Another input's may.
-    pub(crate) fn memory(input: &str, result: &str, bytes: f64) -> Self {
-        let free = tumble::available_memory();
+    /// A result of an input does not fit into the memory that was free, if that is known. Another input's may.
+    pub(crate) fn memory(input: &str, result: &str, bytes: f64, free: Option<u64>) -> Self {
         let limit = free.map_or_else(
-            || "memory".to_owned(),
-            |free| format!("{} of memory", words::bytes(free as f64)),
+            || "less memory is free".to_owned(),
+            |free| format!("{} of memory are free", words::bytes(free as f64)),
         );
         Self {
             code: ALL_INPUTS,
@@ -158,12 +157,12 @@ impl Failure {
         }
     }
 
-    /// A result of an input does not fit on the disk. Another input's may.
+    /// A result of an input does not fit on the disk. Another input's may. `limit` says how much is free.
     pub(crate) fn room(input: &str, result: &str, bytes: f64, limit: &str) -> Self {
         let amount = words::bytes(bytes);
         let message = format!(
-            "{input}: {result} need {amount} ({bytes} bytes), more than the {limit} that are free; ask for fewer \
-             frames (--fps, --start, --end)"
+            "{input}: {amount} ({bytes} bytes) are needed for {result}, and {limit}; ask for fewer frames (--fps, \
+             --start, --end)"
         );
         Self {
             is_of_one: true,

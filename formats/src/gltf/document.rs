@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::value::RawValue;
-use tumble::FrameRate;
+use tumble::{FrameRate, SampleTimes};
 
 use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::end_frame::EndFrame;
+use crate::end_frame::{EndFrame, RateFrames, is_on_frame};
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
@@ -43,9 +43,14 @@ pub(super) struct GltfDocument {
 }
 
 impl Document for GltfDocument {
-    fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
+    fn frames(&self, clip: usize, rate: FrameRate) -> Result<RateFrames, Diagnostic> {
+        let found = |times: Vec<f64>, end: f64| RateFrames {
+            frames: SampleTimes::at(times),
+            rate,
+            end,
+        };
         let Some(read) = self.animations.get(clip).and_then(Option::as_ref) else {
-            return Ok(Vec::new());
+            return Ok(found(Vec::new(), 0.0));
         };
         let [first, last] = read.span;
         let spacing = Precision::F32.ulp(first.abs().max(last.abs()));
@@ -69,21 +74,22 @@ impl Document for GltfDocument {
         } else {
             0.5
         };
-        let is_end = |time: f64| {
-            let near = near * Precision::F32.ulp(time);
-            (time - first).abs() <= near || (time - last).abs() <= near
+        let is_near = |time: f64, end: f64| (time - end).abs() <= near * Precision::F32.ulp(time);
+        let frames = || (start..=end).map(time);
+        let is_within = |time: f64| {
+            first < time && time < last && !is_near(time, first) && !is_near(time, last)
         };
-        let within = (start..=end)
-            .map(time)
-            .filter(|&time| first < time && time < last && !is_end(time));
         let mut times = vec![first];
-        times.extend(within);
-        times.extend((last > first).then_some(last));
-        Ok(times)
+        times.extend(frames().filter(|&time| is_within(time)));
+        let last_frame = times[times.len() - 1];
+        let is_frame =
+            frames().any(|time| is_near(time, last)) || is_on_frame(last, last_frame, rate);
+        times.extend((last > first && is_frame).then_some(last));
+        Ok(found(times, last))
     }
 
-    fn end_frame(&self) -> Option<EndFrame> {
-        None
+    fn end_frame(&self) -> EndFrame {
+        EndFrame::Key
     }
 
     fn writes(&self, format: &Format) -> bool {

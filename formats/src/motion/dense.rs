@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble::{Channel, Engine, Error, FrameRate, SampleTimes, TrackError, TrackSet};
 
-use crate::end_frame::{EndFrame, sample_to_end};
+use crate::end_frame::{EndFrame, FramesToEnd, RateFrames, sample_to_end};
 use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::sample::{ChannelMethods, Samples};
 
@@ -41,10 +41,12 @@ impl Motion {
     /// # Errors
     /// As [`Engine::evaluate`].
     pub fn sampled_at_rate(&self, engine: &Engine, rate: FrameRate) -> Result<Self, Error> {
-        let frames = SampleTimes::rate(rate);
-        let span = self.set.time_span();
-        let timeline = frames.resolve(self.set.track_count(), span)?;
-        let end = span.and_then(|span| EndFrame::Key.sample(&timeline, rate, span.1));
+        let frames = RateFrames {
+            frames: SampleTimes::rate(rate),
+            rate,
+            end: self.set.time_span().map_or(0.0, |span| span.1),
+        };
+        let FramesToEnd { frames, end, .. } = FramesToEnd::new(self, frames, EndFrame::Key)?;
         let samples = sample_to_end(&ChannelMethods::AUTHORED, engine, self, &frames, end)?;
         Ok(self.with_keys(&samples)?)
     }

@@ -8,7 +8,7 @@ use glam::Vec3;
 use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::end_frame::EndFrame;
+use crate::end_frame::{EndFrame, RateFrames};
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
@@ -271,16 +271,20 @@ impl NpzDocument {
 
 impl Document for NpzDocument {
     /// Whole frames of the rate from the first time on.
-    fn times(&self, _clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
+    fn frames(&self, _clip: usize, rate: FrameRate) -> Result<RateFrames, Diagnostic> {
         let frames = SampleTimes::rate(rate).resolve(self.plan.tracks, self.span);
         let timeline = frames.map_err(|error| {
             Diagnostic::new(&self.archive.file, Code::Layout, error.to_string())
         })?;
-        Ok(timeline.times(0).collect())
+        Ok(RateFrames {
+            frames: SampleTimes::at(timeline.times(0).collect()),
+            rate,
+            end: self.span.map_or(0.0, |span| span.1),
+        })
     }
 
-    fn end_frame(&self) -> Option<EndFrame> {
-        Some(EndFrame::where_times_are(self.has_times()))
+    fn end_frame(&self) -> EndFrame {
+        EndFrame::where_times_are(self.has_times())
     }
 
     fn writes(&self, format: &Format) -> bool {

@@ -25,7 +25,7 @@ fn check(bytes: Vec<u8>, map: &str) {
             assert!(track.keys.iter().all(|key| key.is_normalized()));
         }
         if let Some(document) = &loaded.document {
-            let _ = document.times(0, FrameRate::new(30, 1).unwrap());
+            let _ = document.frames(0, FrameRate::new(30, 1).unwrap());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use std::path::Path;
-use tumble::{FrameRate, TrackSet};
+use tumble::{FrameRate, SampleTimes, TrackSet};
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{MotionOptions, WriteError};
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
@@ -137,7 +137,8 @@ fn halved(loaded: &Loaded, linear: &[&str]) -> (Vec<u8>, Loaded, Vec<String>) {
     let rate = FrameRate::new(clip.rate.unwrap().per_second() as u64 / 2, 1).unwrap();
     let document = loaded.document.as_ref().unwrap();
     let picked = Picked::of(clip, 2);
-    assert_eq!(document.times(0, rate).unwrap(), picked.times);
+    let frames = document.frames(0, rate).unwrap().frames;
+    assert_eq!(frames, SampleTimes::at(picked.times.clone()));
     let sampled = SampledClip {
         rate: Some(rate),
         ..picked.sampled(clip)
@@ -290,7 +291,7 @@ fn what_does_not_fit_the_layout_is_refused() {
     };
     assert_refused(write(&[(0, sampled)], ""), Code::Layout);
     let rate = FrameRate::new(1 << 50, 1).unwrap();
-    assert_eq!(document.times(0, rate).unwrap_err().code, Code::Layout);
+    assert_eq!(document.frames(0, rate).unwrap_err().code, Code::Layout);
 }
 
 /// A file whose rate was given from outside says it from then on.

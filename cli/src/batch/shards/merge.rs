@@ -37,9 +37,9 @@ pub(crate) struct ShardProgress {
     first_missing: Option<usize>,
 }
 
-/// A line of the new manifest: its result, and where the line is. File 0 is the previous manifest, any
+/// A line of the new manifest: its result, and where it is. File 0 is the previous manifest, any
 /// other the file of the shard of this number.
-struct ManifestLine {
+struct LinePosition {
     output: String,
     file: usize,
     at: Range<usize>,
@@ -156,7 +156,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
 fn list_before(
     folder: &Path,
     path: &Path,
-    lines: &mut Vec<ManifestLine>,
+    lines: &mut Vec<LinePosition>,
 ) -> Result<InputEntries, Failure> {
     let mut inputs = InputEntries::new();
     let Some(file) = entry::open(folder)? else {
@@ -177,23 +177,23 @@ fn list_before(
         }
         let mut found = Vec::new();
         list(&line, 0, 0, &mut found);
-        match InputEntry::of_line(&line) {
-            Some(entry) => {
-                inputs.insert(entry.key(), entry);
-            }
-            None => damaged += usize::from(found.is_empty()),
+        if let Some(LinePosition { output, .. }) = found.pop() {
+            lines.push(LinePosition {
+                output,
+                file: 0,
+                at: start..start + length,
+            });
+        } else if let Some(entry) = InputEntry::of_line(&line) {
+            inputs.insert(entry.key(), entry);
+        } else {
+            damaged += 1;
         }
-        lines.extend(found.pop().map(|ManifestLine { output, .. }| ManifestLine {
-            output,
-            file: 0,
-            at: start..start + length,
-        }));
         start += length;
     }
 }
 
 /// Lists the lines of a file that are entries of results.
-fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<ManifestLine>) {
+fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<LinePosition>) {
     let mut at = start;
     for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
         let end = at + line.len();
@@ -201,20 +201,20 @@ fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<ManifestLine>) 
             && let Some((output, _)) = record::owner(line)
         {
             let at = at..end;
-            lines.push(ManifestLine { output, file, at });
+            lines.push(LinePosition { output, file, at });
         }
         at = end;
     }
 }
 
 /// One line for each output, in order; a shard's replaces the previous manifest's.
-fn one_each(mut lines: Vec<ManifestLine>) -> Result<Vec<ManifestLine>, Failure> {
+fn one_each(mut lines: Vec<LinePosition>) -> Result<Vec<LinePosition>, Failure> {
     lines.sort_by(|one, other| {
         one.output
             .cmp(&other.output)
             .then(one.file.cmp(&other.file))
     });
-    let mut kept: Vec<ManifestLine> = Vec::with_capacity(lines.len());
+    let mut kept: Vec<LinePosition> = Vec::with_capacity(lines.len());
     for line in lines {
         match kept.last_mut() {
             Some(last) if last.output == line.output && last.file == 0 => *last = line,
@@ -237,7 +237,7 @@ fn one_each(mut lines: Vec<ManifestLine>) -> Result<Vec<ManifestLine>, Failure> 
 fn write(
     folder: &Path,
     path: &Path,
-    lines: &[ManifestLine],
+    lines: &[LinePosition],
     inputs: &InputEntries,
 ) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);

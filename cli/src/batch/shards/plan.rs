@@ -91,16 +91,31 @@ pub(crate) fn hash_of(names: &[ResultName]) -> String {
     digest.finish()
 }
 
+/// How a library is divided, and what its results are.
+pub(crate) struct ShardRequest {
+    /// The format of the results, if the command line names one.
+    pub(crate) format: Option<&'static Format>,
+    pub(crate) naming: ResultNaming,
+    /// Everything that determines a result besides its input.
+    pub(crate) options: String,
+    /// The most bytes of input in a shard.
+    pub(crate) shard_bytes: u64,
+}
+
 impl ShardPlan {
     /// Cuts inputs, of those sizes, into shards.
     pub(crate) fn new(
         inputs: GatheredInputs,
         sizes: &[u64],
         folder: &Path,
-        (format, naming): (Option<&'static Format>, ResultNaming),
-        options: String,
-        shard_bytes: u64,
+        request: ShardRequest,
     ) -> Result<Self, Failure> {
+        let ShardRequest {
+            format,
+            naming,
+            options,
+            shard_bytes,
+        } = request;
         let files = inputs.files;
         if let Some(pipe) = files.iter().find(|found| names::is_standard(&found.path)) {
             let name = names::input(&pipe.path);

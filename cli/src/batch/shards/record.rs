@@ -146,7 +146,7 @@ pub(crate) fn lines(folder: &Path) -> ManifestLines {
 }
 
 /// The lines in the bytes of a shard's file.
-fn lines_of(bytes: &[u8]) -> ManifestLines {
+pub(crate) fn lines_of(bytes: &[u8]) -> ManifestLines {
     let Some((header, start)) = header(bytes) else {
         return ManifestLines::parse(&[]);
     };
@@ -241,11 +241,13 @@ pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> PreviousE
     if let Ok(Some(file)) = entry::open(folder) {
         // The directory's may be of a million results: one line is in memory at a time.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
-            let lines = ManifestLines::parse(&line);
-            let results = lines.entries.values().map(|entry| entry.whole().0);
-            let mut of_line = results.chain(lines.inputs.keys().map(|key| &**key));
-            if of_line.any(|whole| shard_names.contains(whole)) {
-                found.extend(lines);
+            let is_of_shard = |name: &str| shard_names.contains(name);
+            let is_kept = match owner(&line) {
+                Some((output, all)) => is_of_shard(all.as_deref().unwrap_or(&output)),
+                None => InputEntry::of_line(&line).is_some_and(|entry| is_of_shard(&entry.key())),
+            };
+            if is_kept {
+                found.extend(ManifestLines::parse(&line));
             }
         }
     }

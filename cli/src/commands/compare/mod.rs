@@ -4,7 +4,7 @@ mod table;
 mod text;
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -168,7 +168,7 @@ enum ComparisonReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let inputs = arguments.paths()?;
+    let inputs = arguments.inputs.with_repeats()?;
     let [first, second] = &inputs[..] else {
         return Err(Failure::usage(format!(
             "two inputs are compared, not {}",
@@ -200,17 +200,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The inputs; one that is named twice is compared with itself.
-    fn paths(&self) -> Result<Vec<PathBuf>, Failure> {
-        match self.inputs.named_paths() {
-            [first, second] if first == second && !names::is_standard(first) => {
-                self.inputs.check_formats(&[first, second])?;
-                Ok(vec![first.clone(), second.clone()])
-            }
-            _ => self.inputs.distinct(false),
-        }
-    }
-
     /// Refuses options for the joints of motions where none are compared.
     fn check_table(&self, paths: [&Path; 2]) -> Result<(), Failure> {
         let compared = match self.is_of_trajectories() {
@@ -233,7 +222,7 @@ impl Arguments {
             ComparisonReport::Clips(found) => {
                 let ordered = found.iter().map(|found| {
                     let mut found = found.clone();
-                    found.joints = table.ordered(&found.joints);
+                    found.joints = table.listed(&found.joints);
                     found
                 });
                 if self.csv {

@@ -39,8 +39,15 @@ impl TableArguments {
         top.or(self.worst_by.map(|_| "--worst-by"))
     }
 
-    /// The joints of a comparison, worst first.
-    pub(super) fn ordered(self, joints: &[JointDifference]) -> Vec<JointDifference> {
+    /// The joints of a comparison, worst first, as many as `--top` says.
+    pub(super) fn listed(self, joints: &[JointDifference]) -> Vec<JointDifference> {
+        let mut joints = self.ordered(joints);
+        joints.truncate(self.top.unwrap_or(joints.len()));
+        joints
+    }
+
+    /// All joints of a comparison, worst first.
+    fn ordered(self, joints: &[JointDifference]) -> Vec<JointDifference> {
         let key = |joint: &JointDifference| {
             let angle = joint.rotation.spread.largest;
             let distance = joint.translation.map_or(0.0, |it| it.spread.largest);
@@ -54,7 +61,6 @@ impl TableArguments {
             let [a, b] = [key(a), key(b)];
             b[0].total_cmp(&a[0]).then(b[1].total_cmp(&a[1]))
         });
-        joints.truncate(self.top.unwrap_or(joints.len()));
         joints
     }
 }
@@ -70,6 +76,7 @@ pub(super) fn joints_text(difference: &ClipDifference, arguments: TableArguments
     };
     let mut joints = arguments.ordered(&difference.joints);
     joints.retain(differs);
+    let differing = joints.len();
     joints.truncate(arguments.top.unwrap_or(LISTED));
     if joints.is_empty() || difference.tracks == 1 {
         return String::new();
@@ -102,13 +109,11 @@ pub(super) fn joints_text(difference: &ClipDifference, arguments: TableArguments
         format!("  {}\n", cells.collect::<Vec<_>>().join("  "))
     };
     let table: String = rows.iter().map(line).collect();
-    let rest = difference.tracks - joints.len();
-    match rest {
+    match differing - joints.len() {
         0 => table,
-        _ => format!(
-            "{table}  and {} (--top {})\n",
+        rest => format!(
+            "{table}  and {} (--top {differing})\n",
             words::count(rest, "more joint"),
-            difference.tracks
         ),
     }
 }

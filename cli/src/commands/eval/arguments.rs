@@ -178,6 +178,19 @@ impl Arguments {
             .map_or(Ok(()), |message| Err(Failure::usage(message)))
     }
 
+    /// The result of a kind in a format.
+    pub(super) fn result(&self, kind: ResultKind, format: &'static Format) -> ResultRequest<'_> {
+        ResultRequest {
+            kind,
+            format,
+            output: &self.output,
+            layout: self.layout,
+            encoding: self.encoding,
+            end_frame: &self.end_frame,
+            times_apart: self.results.has_times_apart(),
+        }
+    }
+
     fn refusal(&self, kind: ResultKind, format: &'static Format) -> Option<String> {
         if !kind.is_clip() && format.write.is_none() {
             let all = Format::writable().filter(|format| format.write.is_some());
@@ -189,14 +202,7 @@ impl Arguments {
                 names.join(" or ")
             ));
         }
-        let result = ResultRequest {
-            kind,
-            format,
-            output: &self.output,
-            layout: self.layout,
-            encoding: self.encoding,
-            end_frame: self.end_frame.end_frame,
-        };
+        let result = self.result(kind, format);
         let mut set = OPTIONS
             .iter()
             .filter(|rule| self.command_line.has(rule.name));

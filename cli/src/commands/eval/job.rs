@@ -6,19 +6,19 @@ use std::borrow::Cow;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::method::SLERP;
-use tumble::{Engine, Error, Interpolation, Layout, Method, Quantity, SampleTimes, Timeline};
+use tumble::{Engine, Error, Layout, Quantity, SampleTimes, Timeline};
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::Samples;
 use tumble_formats::world::{HierarchyError, world};
-use tumble_formats::{Code, Diagnostic, Feature};
+use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::curve_warning;
+use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
@@ -120,7 +120,9 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
-        let end_frame = self.end_frame(kind, target);
+        let end_frame = (self.arguments.end_frame)
+            .for_result(self.arguments.result(kind, target.format()).sampled())
+            .map_err(|message| refused(Failure::usage(message)))?;
         let tracks = &self.arguments.inputs.tracks;
         if kind == ResultKind::Motion {
             let some = self.arguments.command_line.has("tracks");
@@ -144,27 +146,14 @@ impl EvaluationJob<'_> {
         self.rotations(name, &*tracks.select(clip, name)?, end_frame, target)
     }
 
-    /// The rule for the end of a clip that ends between two frames, for a new result.
-    fn end_frame(&self, kind: ResultKind, target: &ResultTarget) -> EndFrame {
-        let (asked, format) = (self.arguments.end_frame.end_frame, target.format());
-        let has_times = format.supports(Feature::UnevenTimes) || target.has_times_apart();
-        asked.unwrap_or(match kind {
-            ResultKind::Motion | ResultKind::Baked => EndFrame::where_times_are(has_times),
-            // Rotations with times are read again as a clip; other numbers are frames.
-            ResultKind::Rotations if has_times && self.arguments.output.is_rotations() => {
-                EndFrame::Key
-            }
-            ResultKind::Rotations | ResultKind::Poses => EndFrame::LeaveOut,
-        })
-    }
-
     /// Warns where the evaluated curves are less smooth than their method promises.
     fn note_curves(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
-        let (Some(method), with) = self.methods() else {
+        let curve = self.curve();
+        let Some(method) = curve.method.0 else {
             return Ok(()); // No file asks for such a method.
         };
         let selected = self.arguments.inputs.tracks.select(clip, name)?;
-        if let Some(warning) = curve_warning(name, &selected.set, &with(method)) {
+        if let Some(warning) = curve_warning(name, &selected.set, &curve.interpolation(method)) {
             self.work.warn(warning);
         }
         Ok(())
@@ -199,18 +188,15 @@ impl EvaluationJob<'_> {
         if !self.arguments.explain_route {
             return Ok(());
         }
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
-        let groups = methods.groups_of(clip);
+        let curve = self.curve();
+        let groups = curve.with_methods(|methods| methods.groups_of(clip));
         let whole = groups.len() == 1;
         for (method, tracks) in groups {
             let set = (clip.set.select(tracks.iter().copied()))
                 .map_err(|error| Failure::evaluating(name, &error.into()))?;
-            let explain =
-                |engine: &Engine| engine.explain_route(&set, with(method), frames, layout);
+            let explain = |engine: &Engine| {
+                engine.explain_route(&set, curve.interpolation(method), frames, layout)
+            };
             let samples = frames.resolve(set.track_count(), clip.set.time_span());
             let route = samples
                 .map_err(Error::from)
@@ -239,17 +225,16 @@ impl EvaluationJob<'_> {
         samples: &ClipFrames,
     ) -> Result<Samples, Failure> {
         let frames = &samples.frames;
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
+        let curve = self.curve();
         let tracks = clip.set.track_count();
         let timeline = frames.resolve(tracks, clip.set.time_span());
         let found = timeline.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
-            self.device
-                .work(|engine| sample_to_end(&methods, engine, clip, frames, samples.end))
+            self.device.work(|engine| {
+                curve.with_methods(|methods| {
+                    sample_to_end(methods, engine, clip, frames, samples.end)
+                })
+            })
         });
         found.map_err(|error| Failure::evaluating(name, &error))
     }
@@ -267,15 +252,10 @@ impl EvaluationJob<'_> {
         Ok(notes)
     }
 
-    /// The method of all channels, if there is one, and the interpolation by a method.
-    fn methods(&self) -> (Option<Method>, impl Fn(Method) -> Interpolation + use<>) {
-        let quantity = self.arguments.output.quantity();
-        let interpolation = self.arguments.interpolation;
-        let with = move |method| Interpolation {
-            quantity,
-            ..interpolation.with(method)
-        };
-        (self.arguments.method.0, with)
+    /// The curves that are evaluated.
+    fn curve(&self) -> CurveChoice {
+        let (method, options) = (self.arguments.method, self.arguments.interpolation);
+        CurveChoice::of_rotations(method, options).of(self.arguments.output.quantity())
     }
 
     /// The result of this work, and the report about it.
@@ -360,7 +340,7 @@ impl EvaluationJob<'_> {
     /// Counts the times in gaps, and tells of ends between two frames.
     fn note_frames(&mut self, frames: &[ClipFrames], target: &ResultTarget) {
         self.in_gaps = frames.iter().map(|of_clip| of_clip.in_gaps).sum();
-        if self.arguments.end_frame.end_frame.is_some() {
+        if self.arguments.end_frame.is_given() {
             return;
         }
         self.left_out = frames.iter().find_map(|of_clip| of_clip.left_out);
@@ -402,26 +382,13 @@ impl EvaluationJob<'_> {
                  another format"
             )));
         }
-        let refused = |why: &str| Err(Failure::usage(format!("{name}: {why}")));
-        let end_frame = match (document.end_frame(), self.arguments.end_frame.end_frame) {
-            (None, Some(_)) => {
-                return refused(
-                    "the animations of a file that is kept keep their ends; leave out --end-frame",
-                );
-            }
-            (Some(EndFrame::Hold), Some(EndFrame::Key)) => {
-                return refused(
-                    "its arrays are frames of a rate, without times; give --end-frame hold or leave-out",
-                );
-            }
-            (of_document, asked) => asked.or(of_document).unwrap_or(EndFrame::Key),
-        };
+        let end_frame = self.arguments.end_frame.for_document(&*document);
+        let end_frame =
+            end_frame.map_err(|message| Failure::usage(format!("{name}: {message}")))?;
         let at = |clip: &&Motion| {
-            let times = document.times(clip.index, rate);
-            let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
-            let last = times.last().copied().unwrap_or(0.0);
-            let end = clip.set.time_span().map_or(last, |span| span.1);
-            ClipFrames::at_rate(SampleTimes::at(times), rate, (clip, end), end_frame, name)
+            let frames = document.frames(clip.index, rate);
+            let frames = frames.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+            ClipFrames::at_rate(clip, frames, end_frame, name)
         };
         let times: Vec<ClipFrames> = clips.iter().map(at).collect::<Result<_, Failure>>()?;
         self.written(name, clips, &times, target, Some(&*document))
@@ -543,21 +510,19 @@ impl EvaluationJob<'_> {
             notes: &notes,
         };
         self.explain(name, clip, frames, result.layout)?;
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
+        let curve = self.curve();
         let size = (set.track_count(), timeline.len());
         let extent = (size.0, size.1, span(&timeline));
         let quantity = arguments.output.quantity();
-        let rows = |engine: &Engine, at: &SampleTimes| match quantity {
-            Quantity::Rotation => methods.rotations(engine, clip, at, result.layout),
-            // Velocities are rows of four numbers too.
-            _ => {
-                let rates = methods.rates(engine, clip, at, result.layout)?;
-                Ok(rates.into_iter().map(Quat::from_vec4).collect())
-            }
+        let rows = |engine: &Engine, at: &SampleTimes| {
+            curve.with_methods(|methods| match quantity {
+                Quantity::Rotation => methods.rotations(engine, clip, at, result.layout),
+                // Velocities are rows of four numbers too.
+                _ => {
+                    let rates = methods.rates(engine, clip, at, result.layout)?;
+                    Ok(rates.into_iter().map(Quat::from_vec4).collect())
+                }
+            })
         };
         let ends = samples.end.map(|end| SampleTimes::at(vec![end.at]));
         let frame_count = timeline.len() - usize::from(ends.is_some());
@@ -565,7 +530,7 @@ impl EvaluationJob<'_> {
         let ends = ends.transpose();
         let ends = ends.map_err(|error| Failure::evaluating(name, &error))?;
         let mut ends = EndRows::new(ends.unwrap_or_default(), result.layout, frame_count);
-        let Some(method) = methods.method_of(clip) else {
+        let Some(method) = curve.with_methods(|methods| methods.method_of(clip)) else {
             // Tracks of different samplers are evaluated apart, and put together in memory.
             room::in_memory(name, set, frames, 2)?;
             let found = self
@@ -577,7 +542,7 @@ impl EvaluationJob<'_> {
             let method = "each channel's method";
             return Ok(self.evaluated(extent, method, written, order));
         };
-        let interpolation = with(method);
+        let interpolation = curve.interpolation(method);
         let written = target.write_rotations(&result, ends, |sink| {
             self.device
                 .stream(set, interpolation, frames, result.layout, sink)
@@ -606,7 +571,7 @@ impl EvaluationJob<'_> {
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
         self.explain(name, clip, frames, Layout::FrameMajor)?;
-        let (mut numbers, mut origins) = if clip.skeleton.is_empty() && !clip.has_vectors() {
+        let (mut numbers, mut origins) = if clip.is_chain() {
             let mut numbers = self.chain(name, clip, frames, kind)?;
             if let Some(end) = samples.end {
                 numbers.extend(self.chain(name, clip, &SampleTimes::at(vec![end.at]), kind)?);
@@ -706,12 +671,9 @@ impl EvaluationJob<'_> {
             .output
             .skeleton(tracks, length)
             .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
-        let interpolation = with(methods.method_of(clip).unwrap_or(SLERP));
+        let curve = self.curve();
+        let method = curve.with_methods(|methods| methods.method_of(clip));
+        let interpolation = curve.interpolation(method.unwrap_or(SLERP));
         let samples = frames.resolve(tracks, set.time_span());
         let evaluated = samples.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;

@@ -10,7 +10,7 @@ use crate::arguments::options::ResultOptions;
 use crate::arguments::time::SampleRequest;
 use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
-use crate::batch::shards::plan::ShardPlan;
+use crate::batch::shards::plan::{ShardPlan, ShardRequest};
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
@@ -112,9 +112,13 @@ impl EvaluationRequest {
         shard_bytes: u64,
     ) -> Result<ShardPlan, Failure> {
         let results = &arguments.results;
-        let naming = (results.format(), results.naming());
-        let options = self.options.text.clone();
-        let plan = ShardPlan::new(inputs, sizes, folder, naming, options, shard_bytes)?;
+        let request = ShardRequest {
+            format: results.format(),
+            naming: results.naming(),
+            options: self.options.text.clone(),
+            shard_bytes,
+        };
+        let plan = ShardPlan::new(inputs, sizes, folder, request)?;
         arguments.check_before(plan.format)?;
         Ok(plan)
     }
@@ -162,12 +166,10 @@ impl Evaluator {
         let records = Box::new(&mut *shard);
         let work = PipelineInputs {
             jobs,
+            prints_json: arguments.results.prints_json(),
             ..PipelineInputs::default()
         };
         let mut pipeline = Pipeline::of_batch(reader, work, options, records);
-        if arguments.results.prints_json() {
-            pipeline = pipeline.with_json();
-        }
         let samples = &self.request.samples;
         let rotations = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
         let (outcome, json) = pipeline.finish_with_json();

@@ -20,12 +20,12 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CURVE_OPTIONS, CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection,
-    curve_warning, each_once, method_arguments,
+    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, curve_warning,
+    each_once, method_arguments,
 };
 use crate::arguments::options::CommandLine;
-use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
-use crate::arguments::time::{SAMPLING_OPTIONS, SamplingArguments};
+use crate::arguments::path::{PATHS, PathArguments};
+use crate::arguments::time::SamplingArguments;
 use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::curves::PlotSubject;
@@ -169,7 +169,7 @@ enum PlotOutput {
 fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
     // No file asks for such a method.
     let named = choices.iter().filter_map(|choice| choice.method.0);
-    let interpolations = named.map(|method| choices[0].options.with(method));
+    let interpolations = named.map(|method| choices[0].interpolation(method));
     let warnings = interpolations.filter_map(|one| curve_warning(name, &clip.set, &one));
     for warning in warnings {
         words::note(&warning.to_string());
@@ -269,13 +269,7 @@ impl Arguments {
 
     /// The methods that draw a clip, each differently.
     fn choices(&self, name: &str, clip: &Motion) -> Result<Vec<CurveChoice>, Failure> {
-        let methods = MethodArgument::distinct(&self.methods(), clip);
-        self.interpolation.check_clip(name, clip, &methods)?;
-        let choice = |method| CurveChoice {
-            method,
-            options: self.interpolation,
-        };
-        Ok(methods.into_iter().map(choice).collect())
+        CurveChoice::of_clip(&self.methods(), self.interpolation, name, clip)
     }
 
     /// Refuses options that have no effect on what is drawn of these inputs.
@@ -283,22 +277,23 @@ impl Arguments {
         let line = &self.command_line;
         let path_files = inputs.iter().filter(|path| is_path_file(path)).count();
         if path_files == 0 {
-            let remedy = "it is for files of paths; leave it out";
-            line.refuse(&PATH_OPTIONS, "files of rotations", remedy)?;
+            PathArguments::refuse(line, "files of rotations")?;
         }
         if path_files == inputs.len() {
-            let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
-            line.refuse(&CURVE_OPTIONS, "files of paths", remedy)?;
+            line.refuse_rotation_options("files of paths")?;
         }
         let is_path = match self.show {
             Some(show) => show == PlotQuantity::Path,
             None => path_files == inputs.len(),
         };
         if is_path {
+            let (on, remedy) = (
+                "pictures of paths",
+                "each is drawn from its first key to its last; leave it out",
+            );
+            line.refuse_group::<SamplingArguments>(on, remedy)?;
             let subjects = [("boxes", "--box"), ("dimensions", "--dimension")];
-            let options = [&SAMPLING_OPTIONS[..], &subjects].concat();
-            let remedy = "each is drawn from its first key to its last; leave it out";
-            line.refuse(&options, "pictures of paths", remedy)?;
+            line.refuse(&subjects, on, remedy)?;
         }
         if self.show != Some(PlotQuantity::Sphere) {
             let remedy = "add --show sphere, or leave it out";

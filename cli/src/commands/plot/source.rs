@@ -96,14 +96,9 @@ impl<'a> PlotSource<'a> {
                 words::count(timeline.len(), "time")
             }
         };
-        if let SampleRequest::Rate { end, .. } = samples.request {
+        if let SampleRequest::Rate { .. } = samples.request {
             let times: Vec<f64> = timeline.times(0).collect();
-            let last_key = set.time_span().map(|span| span.1);
-            let end = end.map(|end| clip.time_in_set(end));
-            let last = match samples.outside.leaves_out()[1] {
-                true => end.into_iter().chain(last_key).reduce(f64::min),
-                false => end.or(last_key),
-            };
+            let last = samples.request.end_of(clip, samples.outside);
             let times = with_keys(times, last, clip, samples.is_rate_chosen);
             frames = SampleTimes::at(times);
             timeline = resolve(&frames)?;

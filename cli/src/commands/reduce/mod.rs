@@ -214,7 +214,7 @@ impl Arguments {
             }
             _ => None,
         };
-        let written = self.write(engine, work, (&all, quantize))?.with(plotted);
+        let written = self.write(engine, work, &all, quantize)?.with(plotted);
         let mut reports = Vec::new();
         let mut lines = Vec::new();
         for (reduced, input) in all.iter().zip(names) {
@@ -360,7 +360,8 @@ impl Arguments {
         &self,
         engine: &Engine,
         work: &ClipWork,
-        (reduced, quantize): (&[Reduced], Option<Quantization>),
+        reduced: &[Reduced],
+        quantize: Option<Quantization>,
     ) -> Result<WrittenFile, Failure> {
         let (name, clips, target) = (&*work.name, work.clips(), &work.target);
         let format = target.format();

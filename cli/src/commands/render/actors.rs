@@ -54,7 +54,7 @@ impl Subject {
         if let Some(reason) = &clip.no_world {
             return Err(Failure::new(ALL_INPUTS, format!("{name}: {reason}")));
         }
-        let is_chain = clip.skeleton.is_empty() && !clip.has_vectors();
+        let is_chain = clip.is_chain();
         Ok(Self {
             clip: if is_chain { chain(clip) } else { clip },
             is_chain,

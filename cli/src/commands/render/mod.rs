@@ -17,11 +17,11 @@ use tumble_formats::carried_mesh::CarriedMesh;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CURVE_OPTIONS, CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection,
-    each_once, method_arguments,
+    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
+    method_arguments,
 };
 use crate::arguments::options::CommandLine;
-use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
+use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
 use crate::arguments::tracks::selected;
 use crate::batch::room;
@@ -32,9 +32,7 @@ use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
-use crate::commands::travel::{
-    Maker, SCENERY_OPTIONS, Scenery, TravelSource, is_path_file, is_travel,
-};
+use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, signals, words};
@@ -278,8 +276,7 @@ impl Arguments {
             document,
             rest,
         } = self.inputs.load_one(path)?;
-        let is_chain = clip.skeleton.is_empty() && !clip.has_vectors();
-        let clip = match is_chain {
+        let clip = match clip.is_chain() {
             _ if is_travel(&clip) => tracks.select(&clip, name)?.into_owned(),
             true => match tracks.chain(&clip, name)? {
                 Some(chain) => selected(&clip, &chain, name)?,
@@ -307,15 +304,12 @@ impl Arguments {
         let line = &self.command_line;
         match source {
             TravelSource::Paths(..) => {
-                let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
-                line.refuse(&CURVE_OPTIONS, "a file of paths", remedy)?;
+                line.refuse_rotation_options("a file of paths")?;
             }
             TravelSource::Clip(clip) => {
-                let remedy = "it is for files of paths; leave it out";
-                line.refuse(&PATH_OPTIONS, "a file of rotations", remedy)?;
+                PathArguments::refuse(line, "a file of rotations")?;
                 if !is_travel(clip) {
-                    let remedy = "it is for bodies on paths; leave it out";
-                    line.refuse(&SCENERY_OPTIONS, "boxes and skeletons", remedy)?;
+                    Scenery::refuse(line)?;
                 }
             }
         }
@@ -340,13 +334,7 @@ impl Arguments {
         let TravelSource::Clip(clip) = source else {
             return Ok(Vec::new());
         };
-        let methods = MethodArgument::distinct(&methods, clip);
-        self.interpolation.check_clip(name, clip, &methods)?;
-        let choice = |method| CurveChoice {
-            method,
-            options: self.interpolation,
-        };
-        Ok(methods.into_iter().map(choice).collect())
+        CurveChoice::of_clip(&methods, self.interpolation, name, clip)
     }
 
     /// Bodies on paths, by each frame or method.

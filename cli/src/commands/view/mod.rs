@@ -18,15 +18,14 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{
-    CURVE_OPTIONS, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
-    method_arguments,
+    InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once, method_arguments,
 };
 use crate::arguments::options::CommandLine;
-use crate::arguments::path::{PATH_OPTIONS, PATHS, PathArguments};
+use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
 use crate::batch::target::Destination;
-use crate::commands::travel::{SCENERY_OPTIONS, Scenery, TravelSource, is_path_file};
+use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
@@ -182,16 +181,13 @@ impl Arguments {
     fn check_effects(&self, shown: &[ShownClip]) -> Result<(), Failure> {
         let line = &self.command_line;
         if !shown.iter().any(|one| one.path.is_some()) {
-            let remedy = "it is for files of paths; leave it out";
-            line.refuse(&PATH_OPTIONS, "files of rotations", remedy)?;
+            PathArguments::refuse(line, "files of rotations")?;
         }
         if !shown.is_empty() && shown.iter().all(|one| one.path.is_some()) {
-            let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
-            line.refuse(&CURVE_OPTIONS, "files of paths", remedy)?;
+            line.refuse_rotation_options("files of paths")?;
         }
         if !shown.iter().any(ShownClip::is_travel) {
-            let remedy = "it is for bodies on paths; leave it out";
-            line.refuse(&SCENERY_OPTIONS, "boxes and skeletons", remedy)?;
+            Scenery::refuse(line)?;
         }
         Ok(())
     }
@@ -199,7 +195,7 @@ impl Arguments {
     /// The clip with the selected tracks and their ancestors: joints, or the boxes of a chain before them.
     fn select_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
         let (name, tracks) = (names::input(path), &self.inputs.tracks);
-        if clip.skeleton.is_empty() && !clip.has_vectors() {
+        if clip.is_chain() {
             return match tracks.chain(&clip, &name)? {
                 Some(chain) => selected(&clip, &chain, &name),
                 None => Ok(clip),
@@ -287,7 +283,8 @@ impl Arguments {
             )));
         };
         let span = one.clip.set.time_span();
-        let end = self.end.or(span.map(|span| span.1)).unwrap_or(last);
+        let end = self.end.map(|end| one.clip.time_in_set(end));
+        let end = end.or(span.map(|span| span.1)).unwrap_or(last);
         let mut keys = one.key_times();
         keys.retain(|&key| key >= first && key <= end);
         if keys.len() <= times.len() {

@@ -4,17 +4,13 @@ use std::path::Path;
 
 use glam::{Quat, Vec3};
 use tumble::paths::PathFrame;
-use tumble::{
-    Axes, Channel, Error, Interpolation, Layout, Quantity, SampleTimes, Timeline, TrackError,
-    TrackSet,
-};
+use tumble::{Axes, Channel, Error, Layout, Quantity, SampleTimes, Timeline, TrackError, TrackSet};
 use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
+use crate::arguments::interpolation::{CurveChoice, InterpolationArguments, MethodArgument};
 use crate::arguments::path::frame_summary;
 use crate::batch::room;
 use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of};
@@ -266,19 +262,8 @@ impl ShownClip {
         // Rotations and velocities, and of joints with places vectors and poses too.
         let copies = if self.has_positions() { 7 } else { 3 };
         room::in_memory(name, &clip.set, &frames, copies)?;
-        let rotation = |method| interpolation.with(method);
-        let velocity = |method| Interpolation {
-            quantity: Quantity::Velocity(Axes::Body),
-            ..interpolation.with(method)
-        };
-        let rotations = ChannelMethods {
-            method: argument.0,
-            with: &rotation,
-        };
-        let velocities = ChannelMethods {
-            with: &velocity,
-            ..rotations
-        };
+        let rotations = CurveChoice::of_rotations(argument, interpolation);
+        let velocities = rotations.of(Quantity::Velocity(Axes::Body));
         let (samples, velocities) = device
             .choose(clip.set.track_count() * self.times.len())
             .and_then(|()| {
@@ -286,7 +271,8 @@ impl ShownClip {
                     let layout = Layout::FrameMajor;
                     Ok::<_, Error>((
                         rotations.sample(engine, clip, &frames)?,
-                        velocities.rates(engine, clip, &frames, layout)?,
+                        velocities
+                            .with_methods(|methods| methods.rates(engine, clip, &frames, layout))?,
                     ))
                 })
             })

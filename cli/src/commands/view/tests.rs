@@ -94,6 +94,20 @@ fn trajectory() -> Motion {
     }
 }
 
+/// `--end` counts as the file does, for the frames and for the keys that are shown beside them.
+#[test]
+fn keys_after_the_end_are_not_shown() {
+    let clip = Motion {
+        time_offset: 1_700_000_000,
+        ..trajectory()
+    };
+    let shown = ShownClip::new(Path::new("a.tum"), clip, None, false);
+    let shown = arguments("--end 1700000000.5 --fps 4")
+        .sampled(shown)
+        .unwrap();
+    assert_eq!(shown.times, [0.0, 0.25, 0.5]);
+}
+
 fn expected(shown: &ShownClip, argument: MethodArgument) -> Vec<WorldPose> {
     let interpolation = arguments("").interpolation;
     let with = |method| interpolation.with(method);

@@ -23,7 +23,7 @@ class Checked:
     faults: list[str]
     """What differs, and how."""
     unfinished: list[str]
-    """Inputs that failed or have no result yet, a line each."""
+    """Inputs that failed or do not have all their results yet, a line each."""
     shards: tuple[int, int] | None
     """Where they are not merged: how many are done, of how many."""
 
@@ -36,6 +36,7 @@ def check(out: str) -> Checked:
     if manifest is None and plan is None:
         raise DistributedError(f"{out}: has no manifest.jsonl", ALL_INPUTS)
     listed = {name: sha256 for name, sha256, _ in _tumble.manifest_results(manifest or "")}
+    records: list[str] = []
     shards = None
     if plan is not None:
         recorded_plan = json.loads(plan)
@@ -49,11 +50,12 @@ def check(out: str) -> Checked:
                 continue
             done += record.is_whole and record.plan == recorded_plan["plan"]
             listed.update((name, sha256) for name, sha256, _ in record.results())
+            records.append(text)
         shards = (done, recorded_plan["shards"])
     with ThreadPoolExecutor(_AT_ONCE) as threads:
         found = threads.map(lambda result: _fault(results, *result), listed.items())
         faults = [fault for fault in found if fault is not None]
-    unfinished = _tumble.manifest_unfinished(manifest or "")
+    unfinished = _tumble.manifest_unfinished(manifest or "", records)
     return Checked(len(listed), faults, unfinished, shards)
 
 
