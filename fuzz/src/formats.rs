@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::Vec3;
 use tumble::{Device, Engine, FrameRate, Interpolation, SampleTimes};
-use tumble_formats::end_frame::{EndFrame, FramesToEnd};
+use tumble_formats::end_frame::FramesToEnd;
 use tumble_formats::format::{FormatOption, MotionOptions, TimeUnit, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::Motion;
@@ -254,17 +254,18 @@ fn kept(loaded: &Loaded, format: &Format) -> Vec<Option<Code>> {
     let rate = FrameRate::new(7, 1).expect("a rate");
     let sampled = loaded.clips.iter().filter_map(|clip| {
         let frames = document.frames(clip.index, rate).ok()?;
-        let times = FramesToEnd::new(clip, frames, EndFrame::Key).ok()?.times();
+        let to_end = FramesToEnd::new(clip, frames, document.end_frame()).ok()?;
+        let times = to_end.times();
         let is_short = (1..500).contains(&times.len());
         is_short.then(|| {
             assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
             let samples = methods.sample(&engine, clip, &SampleTimes::at(times));
-            (clip, samples.expect("unit keys in order"))
+            (clip, samples.expect("unit keys in order"), to_end.rate)
         })
     });
-    let sampled: Vec<(&Motion, Samples)> = sampled.collect();
+    let sampled: Vec<(&Motion, Samples, Option<FrameRate>)> = sampled.collect();
     let clips: Vec<_> = (sampled.iter())
-        .map(|(clip, samples)| (clip.index, samples.of(clip, Some(rate), &[])))
+        .map(|(clip, samples, rate)| (clip.index, samples.of(clip, *rate, &[])))
         .collect();
     let endings = std::iter::once(&format.name).chain(format.extensions);
     let outcomes = endings.map(|ending| {

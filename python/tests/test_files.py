@@ -608,6 +608,19 @@ def test_clips_keep_their_end(tmp_path, name, end_frame, frames, last):
         assert found.evaluate(at=[found.duration])[0, 0] == pytest.approx([0, 0, 0, 1], abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("end_frame", "frames", "last"),
+    [(None, 35, 1.125), ("key", 35, 1.125), ("hold", 35, 34 / 30), ("leave-out", 34, 33 / 30)],
+)
+def test_a_kept_file_ends_as_it_is_asked_to(tmp_path, end_frame, frames, last):
+    door = [[0, 0, 0, 1], [0, 0, 0.6, 0.8], [0, 0, 0, 1]]
+    tumble.save(tmp_path / "door.glb", tumble.Clip([0.0, 0.5, 1.125], door, names=["door"]))
+    tumble.save(tmp_path / "out.glb", tumble.load(tmp_path / "door.glb"), fps=30, end_frame=end_frame)
+    found = tumble.load(tmp_path / "out.glb").clip
+    assert found.key_count == frames
+    assert found.duration == pytest.approx(last, abs=1e-7)
+
+
 def test_an_end_that_is_held_is_told(tmp_path):
     clip = tumble.Clip([0.0, 1.125], [[0, 0, 0, 1], [0, 0, 0.6, 0.8]])
     with pytest.warns(tumble.InputWarning, match="W210"):
