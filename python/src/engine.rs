@@ -612,7 +612,8 @@ impl Engine {
     /// `add(base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None)`
     ///
     /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each
-    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1.
+    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1. Tracks are
+    /// combined by index, as in `blend`.
     ///
     /// >>> import tumble
     /// >>> half = 0.5 ** 0.5

@@ -366,7 +366,7 @@ pub(crate) fn curve_warning(
     };
     let message = format!(
         "the angular acceleration of {} jumps at key {}, at {time} s{others}; add keys in long intervals \
-         beside short ones, or use -m bessel-overhauser",
+         beside short ones, or use `-m bessel-overhauser`",
         interpolation.method,
         key + 1
     );

@@ -1132,8 +1132,7 @@ class Motions:
     @staticmethod
     def of_clips(
         clips: Sequence[Clip],
-        skeleton: Clip | None,
-        arrays: tuple[Sequence[int], Sequence[Sequence[float]]] | None,
+        skeleton: Clip | tuple[Sequence[int | None], ArrayLike] | None,
         method: str,
     ) -> Motions: ...
     @staticmethod
