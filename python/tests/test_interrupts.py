@@ -1,7 +1,7 @@
 """Ctrl-C at random moments of every call that may take a tenth of a second.
 
 A child process makes the calls, and another one sends the signals: a thread of the first could only send them
-while the interpreter's lock is free. `SOAK=1` sends 100 to each call, else a few are sent.
+while the interpreter's lock is free. `SOAK=1` sends 100 to each call, else one is sent.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import textwrap
 
 import pytest
 
-SIGNALS = 100 if os.environ.get("SOAK") else 2
+SIGNALS = 100 if os.environ.get("SOAK") else 1
 
 # The calls, by their names: what is called, and the file that it writes, if any.
 CALLS: dict[str, tuple[str, str | None]] = {
@@ -96,7 +96,7 @@ import collections, faulthandler, gc, json, os, pickle, random, shutil, signal, 
 import numpy as np, tumble
 
 calls, endless, count, sender = json.loads(sys.argv[1]), json.loads(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
-is_soak = count > 2
+is_soak = count > 1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 warnings.simplefilter("always")
 warnings.showwarning = lambda *_: None
