@@ -232,11 +232,11 @@ impl FramesToEnd {
         })
     }
 
-    fn requested(clip: &Motion, samples: &SampleRequest, end_frame: EndFrame) -> PyResult<Self> {
-        let frames = samples.frames(clip, None)?;
-        if let &SampleRequest::Rate(rate, _, end) = samples {
-            let last = clip.set.time_span().map_or(0.0, |span| span.1);
-            let end = end.map_or(last, |end| clip.time_in_set(end));
+    fn requested(clip: &Motion, request: &Request, end_frame: EndFrame) -> PyResult<Self> {
+        let frames = request.frames(clip, None)?;
+        if let &SampleRequest::Rate(rate, _, end) = request.samples()? {
+            let end = end.map(|end| clip.time_in_set(end));
+            let end = request.outside().end(end, clip);
             return Self::of(clip, frames, (rate, end), end_frame);
         }
         Ok(Self {
@@ -305,10 +305,10 @@ impl Save {
             return self.baked(&motions, &*document, rate, out);
         }
         if self.format.takes_motion(&motions) {
-            return self.sampled(&motions, samples, out, times);
+            return self.sampled(&motions, out, times);
         }
         let written = match (&*motions, &self.format.write) {
-            ([motion], Some(write)) => self.rotations(motion, samples, write, out),
+            ([motion], Some(write)) => self.rotations(motion, write, out),
             (_, None) => Err(input(format!(
                 "{} is read, and not written",
                 self.format.name
@@ -504,15 +504,14 @@ impl Save {
     fn sampled(
         &self,
         clips: &[&Motion],
-        samples: &SampleRequest,
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
         let has_times = self.format.supports(Feature::UnevenTimes) || self.motion.times_apart;
         let end_frame = EndFrame::where_times_are(has_times);
-        let frames = clips
-            .iter()
-            .map(|clip| FramesToEnd::requested(clip, samples, self.end_frame.unwrap_or(end_frame)));
+        let end_frame = self.end_frame.unwrap_or(end_frame);
+        let frames = clips.iter();
+        let frames = frames.map(|clip| FramesToEnd::requested(clip, &self.request, end_frame));
         let frames: Vec<FramesToEnd> = frames.collect::<PyResult<_>>()?;
         let held = self.held(&frames);
         let mut warnings = self.written(clips, &frames, |sampled| {
@@ -560,7 +559,6 @@ impl Save {
     fn rotations(
         &self,
         clip: &Motion,
-        samples: &SampleRequest,
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
@@ -571,7 +569,7 @@ impl Save {
                 false => EndFrame::LeaveOut,
             }
         });
-        let all = FramesToEnd::requested(clip, samples, end_frame)?;
+        let all = FramesToEnd::requested(clip, &self.request, end_frame)?;
         let (frames, count) = (&all.frames, all.timeline.len());
         let timeline = match all.end {
             Some(end) => {

@@ -7,10 +7,11 @@ use clap::{Args, ValueEnum};
 use tumble::{FrameRate, SampleTimes, Timeline};
 use tumble_formats::end_frame::{EndFrame, EndSample};
 use tumble_formats::motion::Motion;
+use tumble_formats::outside::Outside;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
 
-use crate::arguments::interpolation::Outside;
+use crate::arguments::interpolation::{kept, of_outside};
 use crate::arguments::output::one_of;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
@@ -290,10 +291,7 @@ impl SampleRequest {
         let frames = self.of(clip, outside, name)?;
         let all = match *self {
             Self::Rate { rate, end, .. } => {
-                let last = clip.set.time_span().map_or(0.0, |span| span.1);
-                let end = end.map_or(last, |end| clip.time_in_set(end));
-                let [_, leaves_out_after] = outside.leaves_out();
-                let end = if leaves_out_after { end.min(last) } else { end };
+                let end = outside.end(end.map(|end| clip.time_in_set(end)), clip);
                 ClipFrames::at_rate(frames, rate, (clip, end), end_frame, name)?
             }
             Self::Times(_) | Self::Keys(_) => frames.into(),
@@ -398,7 +396,8 @@ impl SampleRequest {
                 // Each clip has its own time offset, in whole seconds.
                 let shift = (keys.from - clip.time_offset) as f64;
                 let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
-                outside.check_common(&times, clip, name)?;
+                let common = outside.check_common(&times, clip);
+                common.map_err(|error| of_outside(error, name))?;
                 at(times)
             }
         };
@@ -406,7 +405,7 @@ impl SampleRequest {
             Self::Rate { rate, .. } => Some(*rate),
             Self::Times(_) | Self::Keys(_) => None,
         };
-        outside.kept(frames, rate, clip, name)
+        kept(outside, frames, rate, clip, name)
     }
 }
 
@@ -428,12 +427,12 @@ pub(crate) fn in_frames(
     let (start, end) = clip.range_in_set(start, end, whole);
     warn_outside_keys(start, end, clip, outside, name);
     let frames = SampleTimes::rate(rate).between(start, end);
-    outside.kept(frames, Some(rate), clip, name)
+    kept(outside, frames, Some(rate), clip, name)
 }
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // `Outside::kept` prints how many are left out.
+    // `kept` prints how many are left out.
     let [before, after] = outside.leaves_out();
     if start < first && !before || end > last && !after {
         let [start, end, first, last] =
