@@ -11,11 +11,11 @@ use tumble::paths::{PathFrame, Twist};
 use tumble::reduce::ReducedCurve;
 use tumble::{
     Axes, Encoding, Ends, KeySigns, Layout, MatrixOrder, SmoothingEnds, Speed, VectorMethod,
-    WrapMode,
 };
 use tumble_formats::adjust::UpAxis;
 use tumble_formats::end_frame::EndFrame;
 use tumble_formats::format::TimeUnit;
+use tumble_formats::outside::OutsideValue;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::trajectory::Align;
 
@@ -47,6 +47,7 @@ fn options() -> Vec<(&'static str, Vec<&'static str>)> {
         ("_Major", names!(MatrixOrder)),
         ("_NamedEnds", names!(Ends)),
         ("_Order", names!(ComponentOrder)),
+        ("_Outside", names!(OutsideValue)),
         ("_SmoothingEnds", names!(SmoothingEnds)),
         ("_Speed", names!(Speed)),
         ("_TimeUnit", names!(TimeUnit)),
@@ -55,7 +56,6 @@ fn options() -> Vec<(&'static str, Vec<&'static str>)> {
         ("_Values", names!(CrowdValues)),
         ("_VectorMethod", names!(VectorMethod)),
         ("_Way", names!(KeySigns)),
-        ("_Wrap", names!(WrapMode)),
     ]
 }
 

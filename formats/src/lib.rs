@@ -53,6 +53,7 @@ pub mod npy;
 pub mod npz;
 pub mod origin;
 pub mod output;
+pub mod outside;
 pub mod packed;
 #[cfg(feature = "parquet")]
 pub mod parquet;

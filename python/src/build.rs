@@ -8,6 +8,7 @@ use tumble_formats::motion::{Joint, Motion, Transform, circle, clock_second};
 use crate::arrays::{ArrayValues, Order, doubles, has_arrays, parts, quaternions};
 use crate::errors::{input, of_track, of_track_since, warn_of};
 use crate::output::shown;
+use crate::samples::{joint_offsets, joint_parents};
 
 /// Key times: one list for all tracks, or one for each.
 enum Times {
@@ -355,28 +356,9 @@ impl ClipArguments<'_, '_> {
         if self.parents.is_none() && self.offsets.is_none() {
             return Ok(Vec::new());
         }
-        let wrong = |label: &str, count: usize| {
-            input(format!("{label}: there are {count} for {tracks} tracks"))
-        };
         let parents = match &self.parents {
             None => vec![None; tracks],
-            Some(parents) if parents.len() == tracks => parents
-                .iter()
-                .enumerate()
-                .map(|(track, &parent)| match parent {
-                    None | Some(-1) => Ok(None),
-                    Some(parent) => usize::try_from(parent)
-                        .ok()
-                        .filter(|&parent| parent < tracks && parent != track)
-                        .map(Some)
-                        .ok_or_else(|| {
-                            input(format!(
-                                "parents: track {track} cannot have the parent {parent}"
-                            ))
-                        }),
-                })
-                .collect::<PyResult<_>>()?,
-            Some(parents) => return Err(wrong("parents", parents.len())),
+            Some(parents) => joint_parents(parents, tracks)?,
         };
         if let Some(track) = circle(&parents) {
             let name = names.map_or_else(String::new, |names| format!(" (`{}`)", names[track]));
@@ -386,16 +368,7 @@ impl ClipArguments<'_, '_> {
         }
         let offsets = match self.offsets {
             None => vec![Vec3::ZERO; tracks],
-            Some(value) => match doubles(value, "offsets")? {
-                ArrayValues { shape, values } if *shape == [tracks, 3] => {
-                    threes(&values).map(DVec3::as_vec3).collect()
-                }
-                ArrayValues { shape, .. } => {
-                    return Err(input(format!(
-                        "offsets: the shape is {shape:?}; give ({tracks}, 3)"
-                    )));
-                }
-            },
+            Some(value) => joint_offsets(value, tracks)?,
         };
         if let Some(track) = offsets.iter().position(|offset| !offset.is_finite()) {
             return Err(input(format!(
@@ -466,7 +439,8 @@ fn threes(numbers: &[f64]) -> impl Iterator<Item = DVec3> {
 }
 
 /// The numbers of each track, of arrays (keys, …) or (tracks, keys, …), or lists with an array, or
-/// None, for each track.
+/// None, for each track. By frames, arrays are (frames, tracks, …) and lists have an array for each frame, as those of
+/// the keys; a list that contains None is one of tracks.
 fn rows(
     value: Option<&Bound<'_, PyAny>>,
     label: &str,
@@ -478,20 +452,22 @@ fn rows(
         return Ok(Vec::new());
     };
     let wrong = |shape: &[usize]| {
-        let axes = match layout {
-            Layout::TrackMajor => format!("{tracks}, keys"),
-            Layout::FrameMajor => format!("frames, {tracks}"),
+        let (axes, list) = match layout {
+            Layout::TrackMajor => (format!("{tracks}, keys"), "a list with"),
+            Layout::FrameMajor => (
+                format!("frames, {tracks}"),
+                "a list with an array for each frame, or, where some tracks have none,",
+            ),
         };
         let numbers: Vec<String> = each.iter().map(usize::to_string).collect();
         input(format!(
-            "{label}: the shape is {}; give ({axes}, {}), or a list with an array or None for each of the {tracks} \
-             tracks",
+            "{label}: the shape is {}; give ({axes}, {}), or {list} an array or None for each of the {tracks} tracks",
             shown(shape),
             numbers.join(", ")
         ))
     };
     if let Some(parts) = parts(value)?
-        && (parts.iter().any(Bound::is_none) || has_arrays(&parts)?)
+        && (parts.iter().any(Bound::is_none) || layout == Layout::TrackMajor && has_arrays(&parts)?)
     {
         if parts.len() != tracks {
             return Err(wrong(&[parts.len()]));

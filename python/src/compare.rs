@@ -616,8 +616,7 @@ pub(crate) fn path_errors(
         let found = differences::PathDifference::of(&engine, clips, &measure);
         found.map_err(of_compare)
     })?;
-    let warnings = found.warnings.iter().map(|warning| in_python(warning));
-    warn_of(py, &warnings.collect::<Vec<_>>())?;
+    warn_of(py, &found.warnings)?;
     let Some(absolute) = found.ape else {
         return Err(input("there is no pose to compare"));
     };

@@ -11,11 +11,13 @@ use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input, warn_of};
-use crate::motions::{ChosenSkeleton, SharedSkeleton, of_crowd, order_assumption, push};
+use crate::motions::{
+    ChosenSkeleton, ListedClip, SharedSkeleton, of_crowd, order_assumption, push,
+};
 use crate::options::{method_named, one_of, option_named};
 use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
-use crate::samples::{joint_offsets, joint_parents, matrices, skeleton};
+use crate::samples::matrices;
 
 /// Ticks of a second, unless others are asked for.
 const TICKS: u32 = 705_600;
@@ -119,25 +121,21 @@ impl Crowd {
             return Err(input("clips: give at least one"));
         };
         let method = method_named(method)?;
-        let joints = first.motion.set.track_count();
+        let tracks = first.motion.set.track_count();
         let chosen = match parents {
-            Some(parents) => {
-                skeleton(&parents.0, offsets, joints)?;
-                let offsets = offsets.map(|value| joint_offsets(value, joints));
-                ChosenSkeleton::Arrays(joint_parents(&parents.0, joints)?, offsets.transpose()?)
-            }
+            Some(parents) => ChosenSkeleton::of_arrays(&parents.0, offsets, tracks)?,
             None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
             None => ChosenSkeleton::First,
         };
-        let Some(shared) = SharedSkeleton::new(&chosen, first)? else {
+        let Some(shared) = SharedSkeleton::new(&chosen, &clips)? else {
             return Err(input(
                 "clips[0]: it has no skeleton; give `parents` and `offsets`",
             ));
         };
         warn_of(py, order_assumption(&clips).as_slice())?;
         let skeleton = shared.of_engine()?;
-        let unplaced =
-            (clips.iter().enumerate()).find_map(|(index, it)| shared.unplaced(index, it));
+        let joints = skeleton.len();
+        let unplaced = ListedClip::all(&clips).find_map(|listed| shared.unplaced(listed));
         let inverse_bind = inverse_bind.map(|value| matrices(value, joints));
         let inverse_bind = inverse_bind.transpose()?;
         let mut poses: Vec<(usize, usize, f64)> = Vec::new();
@@ -154,8 +152,8 @@ impl Crowd {
             stoppable(|| {
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks_per_second);
                 let mut library = made.map_err(of_crowd)?;
-                for clip in clips.iter().enumerate() {
-                    push(&mut library, &shared, clip, method, |_| Ok(()))?;
+                for listed in ListedClip::all(&clips) {
+                    push(&mut library, &shared, listed, method, |_| Ok(()))?;
                 }
                 for (index, mask) in masks.iter().flat_map(|masks| &masks.0).enumerate() {
                     library

@@ -229,7 +229,7 @@ impl Engine {
     /// where it gives none; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
     /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
     /// rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop", "mirror",
-    /// "extrapolate"), `tension`, `continuity`, `bias`.
+    /// "extrapolate", "leave-out": no samples there), `tension`, `continuity`, `bias`.
     ///
     /// >>> import numpy as np, tumble
     /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -612,7 +612,8 @@ impl Engine {
     /// `add(base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None)`
     ///
     /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each
-    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1.
+    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1. Tracks are
+    /// combined by index, as in `blend`.
     ///
     /// >>> import tumble
     /// >>> half = 0.5 ** 0.5
@@ -844,8 +845,8 @@ impl Engine {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Verification> {
         let request = Request::new(options)?;
-        let (motion, samples) = (&clip.get().motion, request.samples()?);
-        let (_, count) = samples.resolved(motion)?;
+        let motion = &clip.get().motion;
+        let (_, count) = request.resolved(motion)?;
         let engine = self.engine_for(motion.set.track_count() * count)?;
         let motion = Arc::clone(motion);
         interruptible(clip.py(), move || {

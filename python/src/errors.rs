@@ -116,7 +116,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 13] = [
+    const WORDS: [(&str, &str); 11] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -134,11 +134,6 @@ pub(crate) fn in_python(message: &str) -> String {
             r#"duplicates="first" or "last""#,
         ),
         ("--linear NAME, in Python linear=[NAME]", "linear=[NAME]"),
-        (
-            "use -m bessel-overhauser",
-            r#"use method="bessel-overhauser""#,
-        ),
-        ("pass -m slerp", r#"pass method="slerp""#),
         ("`tumble eval --fps`", "`fps`"),
         ("--animation", "its name or index"),
         ("; --tracks chooses some", ""),

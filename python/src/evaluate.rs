@@ -1,5 +1,6 @@
 //! Results of clips: rotations, what follows from them, and whole poses.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -143,7 +144,7 @@ impl OutputRequest {
             }
             return self.ragged(py, engine, clip, request, lists);
         }
-        let (frames, count) = samples.resolved(clip)?;
+        let (frames, count) = request.resolved(clip)?;
         let shape = self.shape(samples, tracks, count, self.encoding.shape());
         if self.on_card {
             let engine = engine((tracks * count).max(MIN_DEVICE_ROTATIONS))?;
@@ -234,7 +235,7 @@ impl OutputRequest {
             }
             return Ok(results.into_any());
         }
-        let (_, count) = samples.resolved(clip)?;
+        let (_, count) = request.resolved(clip)?;
         let shape = self.shape(samples, clip.set.track_count(), count, &[3]);
         let array = array(py, &shape, out, inputs)?;
         let found = rotations.of(py, engine, clip, request, None, &[])?;
@@ -340,7 +341,10 @@ impl OutputRequest {
             };
             // Tracks of other methods lie between these.
             let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
-            let frames = samples.frames(clip, Some(&group))?;
+            let frames = match samples {
+                SampleRequest::Each { .. } => Cow::Owned(samples.frames(clip, Some(&group))?),
+                _ => Cow::Borrowed(frames),
+            };
             // As the results in NumPy's memory are aligned.
             let mut found = vec![0_u32; (group.len() * count * size).div_ceil(4)];
             let found: &mut [u8] = bytemuck::cast_slice_mut(&mut found);

@@ -29,11 +29,26 @@ use crate::run::interruptible;
 /// >>> len(file), file.clip
 /// (1, Clip(1 track, 2 keys, 0 to 1 s, 1 fps))
 #[pyclass(frozen, eq, weakref, module = "tumble", mapping)]
-#[derive(PartialEq)]
 pub(crate) struct File {
     clips: Vec<Clip>,
     path: PathBuf,
     refused: Vec<String>,
+}
+
+impl PartialEq for File {
+    /// Whether both have the same clips, and the same reasons why others could not be read, wherever they were read.
+    fn eq(&self, other: &Self) -> bool {
+        self.clips == other.clips && self.reasons().eq(other.reasons())
+    }
+}
+
+impl File {
+    /// Why other clips could not be read, without the path that the messages begin with.
+    fn reasons(&self) -> impl Iterator<Item = &str> {
+        let path = self.path.display().to_string();
+        let texts = self.refused.iter();
+        texts.map(move |text| text.strip_prefix(&path).unwrap_or(text))
+    }
 }
 
 #[pymethods]
@@ -88,10 +103,10 @@ impl File {
         self.refused.clone()
     }
 
-    /// That of files that are the same is the same.
+    /// That of equal files is the same.
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
-        (&self.path, self.clips.len()).hash(&mut hasher);
+        (self.names(), self.refused.len()).hash(&mut hasher);
         hasher.finish()
     }
 

@@ -1,6 +1,8 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
 use std::borrow::Cow;
+use std::fmt;
+use std::sync::Arc;
 
 use glam::Vec3;
 use numpy::{
@@ -15,12 +17,14 @@ use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
 
+use crate::arrays::ListArgument;
 use crate::build::NO_OFFSETS;
-use crate::clip::Clip;
+use crate::clip::{Clip, Source};
 use crate::engine::Engine;
 use crate::errors::{guarded, in_python, input, of_engine, warn_of};
 use crate::options::method_named;
 use crate::run::stoppable;
+use crate::samples::{joint_offsets, joint_parents};
 
 /// A whole number of ticks is a frame of all usual rates.
 const TICKS: u32 = 705_600;
@@ -58,43 +62,107 @@ pub(crate) enum ChosenSkeleton {
     Arrays(Vec<Option<usize>>, Option<Vec<Vec3>>),
 }
 
+impl ChosenSkeleton {
+    /// That of arrays, for so many tracks.
+    pub(crate) fn of_arrays(
+        parents: &[Option<i64>],
+        offsets: Option<&Bound<'_, PyAny>>,
+        tracks: usize,
+    ) -> PyResult<Self> {
+        let parents = joint_parents(parents, tracks)?;
+        let offsets = offsets.map(|value| joint_offsets(value, tracks));
+        Ok(Self::Arrays(parents, offsets.transpose()?))
+    }
+}
+
+/// A clip of a library's list.
+#[derive(Clone, Copy)]
+pub(crate) struct ListedClip<'a> {
+    index: usize,
+    clip: &'a Clip,
+}
+
+impl ListedClip<'_> {
+    /// All clips of a list.
+    pub(crate) fn all(clips: &[Clip]) -> impl Iterator<Item = ListedClip<'_>> {
+        let listed = clips.iter().enumerate();
+        listed.map(|(index, clip)| ListedClip { index, clip })
+    }
+}
+
+/// What the clip is called in messages: the path of its file, else its place in the list.
+impl fmt::Display for ListedClip<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.clip.source {
+            Some(source) => write!(f, "{}", source.path.display()),
+            None => write!(f, "clips[{}]", self.index),
+        }
+    }
+}
+
 /// The skeleton of a library or a crowd.
 pub(crate) struct SharedSkeleton {
     skeleton: ClipSkeleton,
     offsets: OffsetSource,
+    /// The file whose clips need not have all joints: it says where the others rest.
+    file: Option<Arc<Source>>,
 }
 
 /// What the skeleton is called in messages.
 const SKELETON: &str = "the skeleton";
 
 impl SharedSkeleton {
-    /// The chosen skeleton; `None` if it is to be that of a clip that has none.
-    pub(crate) fn new(chosen: &ChosenSkeleton, first: &Clip) -> PyResult<Option<Self>> {
-        let (motion, offsets) = match chosen {
-            ChosenSkeleton::First => (&first.motion, OffsetSource::Clip),
-            ChosenSkeleton::Clip(clip) if clip.motion.lacks_offsets() => {
-                (&clip.motion, OffsetSource::Clip)
-            }
-            ChosenSkeleton::Clip(clip) => (&clip.motion, OffsetSource::Skeleton),
+    /// The chosen skeleton; `None` if it is to be that of a clip that has none. Animations of one file may move
+    /// different joints of it: the skeleton of a clip is extended by the joints that other clips of its file have.
+    pub(crate) fn new(chosen: &ChosenSkeleton, clips: &[Clip]) -> PyResult<Option<Self>> {
+        let Some(first) = ListedClip::all(clips).next() else {
+            return Err(input("clips: give at least one"));
+        };
+        let (clip, offsets) = match chosen {
+            ChosenSkeleton::First => (first.clip, OffsetSource::Clip),
+            ChosenSkeleton::Clip(clip) if clip.motion.lacks_offsets() => (clip, OffsetSource::Clip),
+            ChosenSkeleton::Clip(clip) => (clip, OffsetSource::Skeleton),
             ChosenSkeleton::Arrays(parents, offsets) => {
                 let at_zero = || vec![Vec3::ZERO; parents.len()];
                 let positions = offsets.clone().unwrap_or_else(at_zero);
-                let names = [SKELETON, &*shown(0, first)];
-                let made = ClipSkeleton::of_arrays(parents, &positions, &first.motion, names);
+                let names = [SKELETON, &*first.to_string()];
+                let made = ClipSkeleton::of_arrays(parents, &positions, &first.clip.motion, names);
                 return Ok(Some(Self {
                     skeleton: made.map_err(|error| input(error.to_string()))?,
                     offsets: match offsets {
                         Some(_) => OffsetSource::Skeleton,
                         None => OffsetSource::Clip,
                     },
+                    file: None,
                 }));
             }
         };
-        let skeleton = || Self {
-            skeleton: ClipSkeleton::of(motion),
+        if clip.motion.skeleton.is_empty() {
+            return Ok(None);
+        }
+        let mut shared = Self {
+            skeleton: ClipSkeleton::of(&clip.motion),
             offsets,
+            file: clip.source.clone(),
         };
-        Ok((!motion.skeleton.is_empty()).then(skeleton))
+        for listed in ListedClip::all(clips) {
+            if shared.is_of_file(listed.clip) {
+                let names = [SKELETON, &*listed.to_string()];
+                let extended = shared.skeleton.extend(&listed.clip.motion, names);
+                extended.map_err(|error| input(error.to_string()))?;
+            }
+        }
+        Ok(Some(shared))
+    }
+
+    /// Whether a clip is of the file of the skeleton, and read in the same way.
+    fn is_of_file(&self, clip: &Clip) -> bool {
+        let (Some(file), Some(source)) = (&self.file, &clip.source) else {
+            return false;
+        };
+        let is_same = Arc::ptr_eq(file, source)
+            || file.path == source.path && !file.is_adjusted && !source.is_adjusted;
+        is_same && !clip.motion.skeleton.is_empty()
     }
 
     /// The skeleton of a library of the engine.
@@ -113,19 +181,23 @@ impl SharedSkeleton {
     }
 
     /// The tracks of a clip in the order of the joints.
-    fn tracks<'a>(&self, index: usize, clip: &'a Clip) -> PyResult<Cow<'a, tumble::TrackSet>> {
-        let name = shown(index, clip);
-        let matched = self.skeleton.all_pairs(&clip.motion, [SKELETON, &name]);
+    fn tracks<'a>(&self, listed: ListedClip<'a>) -> PyResult<Cow<'a, tumble::TrackSet>> {
+        let (motion, name) = (&listed.clip.motion, listed.to_string());
+        let matched = match self.is_of_file(listed.clip) {
+            true => self.skeleton.some_pairs(motion, [SKELETON, &name]),
+            false => self.skeleton.all_pairs(motion, [SKELETON, &name]),
+        };
         let matched = matched.map_err(|error| input(error.to_string()))?;
-        let fitted = (self.skeleton).tracks(&clip.motion, &matched, self.offsets, &name);
+        let fitted = (self.skeleton).tracks(motion, &matched, self.offsets, &name);
         fitted.map_err(|error| input(in_python(&error.to_string())))
     }
 
     /// Why the positions of a clip's joints are unknown; `None` if they are known.
-    pub(crate) fn unplaced(&self, index: usize, clip: &Clip) -> Option<String> {
+    pub(crate) fn unplaced(&self, listed: ListedClip<'_>) -> Option<String> {
         if self.offsets == OffsetSource::Skeleton {
             return None;
         }
+        let clip = listed.clip;
         let reason = match &clip.motion.no_world {
             Some(reason) => in_python(reason),
             None => {
@@ -142,7 +214,7 @@ impl SharedSkeleton {
                 NO_OFFSETS.to_owned()
             }
         };
-        Some(format!("{}: {reason}", shown(index, clip)))
+        Some(format!("{listed}: {reason}"))
     }
 }
 
@@ -170,12 +242,12 @@ pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
 pub(crate) fn push(
     library: &mut CrowdLibrary,
     skeleton: &SharedSkeleton,
-    (index, clip): (usize, &Clip),
+    listed: ListedClip<'_>,
     method: Option<Method>,
     check: impl Fn(&tumble::TrackSet) -> Result<(), &'static str>,
 ) -> PyResult<()> {
-    let named = |error: &str| input(format!("{}: {error}", shown(index, clip)));
-    let motion = &clip.motion;
+    let named = |error: &str| input(format!("{listed}: {error}"));
+    let motion = &listed.clip.motion;
     let methods = ChannelMethods {
         method,
         with: &Interpolation::from,
@@ -191,7 +263,7 @@ pub(crate) fn push(
         quantity: Quantity::Rotation,
         ..Interpolation::from(of_rotations)
     };
-    let tracks = skeleton.tracks(index, clip)?;
+    let tracks = skeleton.tracks(listed)?;
     check(&tracks).map_err(named)?;
     let pushed = library.push(&tracks, interpolation, of_vectors);
     pushed.map(drop).map_err(|error| match error {
@@ -202,39 +274,38 @@ pub(crate) fn push(
 
 #[pymethods]
 impl Motions {
-    /// Prepares clips by a method. All have the joints of `skeleton`, of the arrays `(parents, offsets)`, or of the first
-    /// clip.
+    /// Prepares clips by a method. All have the joints of `skeleton`, a clip or the arrays `(parents, offsets)`; `None`:
+    /// those of the first clip.
     #[staticmethod]
     fn of_clips(
         py: Python<'_>,
         clips: Vec<Clip>,
-        skeleton: Option<Clip>,
-        arrays: Option<(Vec<i64>, Vec<[f32; 3]>)>,
+        skeleton: Option<&Bound<'_, PyAny>>,
         method: &str,
     ) -> PyResult<Self> {
         let method = method_named(method)?;
-        let chosen = match (skeleton, arrays) {
-            (Some(clip), _) => ChosenSkeleton::Clip(clip),
-            (None, None) => ChosenSkeleton::First,
-            (None, Some((parents, offsets))) => {
-                let parents = parents.iter().map(|&parent| usize::try_from(parent).ok());
-                let offsets = offsets.into_iter().map(Vec3::from_array).collect();
-                ChosenSkeleton::Arrays(parents.collect(), Some(offsets))
+        let tracks = |clips: &[Clip]| {
+            clips
+                .first()
+                .map_or(0, |clip| clip.motion.set.track_count())
+        };
+        let chosen = match skeleton {
+            None => ChosenSkeleton::First,
+            Some(clip) if clip.is_instance_of::<Clip>() => ChosenSkeleton::Clip(clip.extract()?),
+            Some(arrays) => {
+                let (parents, offsets): (ListArgument<Option<i64>>, Bound<'_, PyAny>) =
+                    arrays.extract()?;
+                ChosenSkeleton::of_arrays(&parents.0, Some(&offsets), tracks(&clips))?
             }
         };
-        let Some(first) = clips.first() else {
-            return Err(input("clips: give at least one"));
-        };
-        let Some(shared) = SharedSkeleton::new(&chosen, first)? else {
+        let Some(shared) = SharedSkeleton::new(&chosen, &clips)? else {
             return Err(input(
                 "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, or (parents, offsets)",
             ));
         };
         warn_of(py, order_assumption(&clips).as_slice())?;
-        let reasons = clips.iter().enumerate();
-        let reasons: Vec<_> = reasons
-            .map(|(index, clip)| shared.unplaced(index, clip))
-            .collect();
+        let reasons = ListedClip::all(&clips).map(|listed| shared.unplaced(listed));
+        let reasons: Vec<_> = reasons.collect();
         let unplaced = match reasons.iter().any(Option::is_some) {
             true => reasons.into_iter().map(Option::unwrap_or_default).collect(),
             false => Vec::new(),
@@ -252,8 +323,8 @@ impl Motions {
                 };
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks);
                 let mut library = made.map_err(of_crowd)?;
-                for clip in clips.iter().enumerate() {
-                    push(&mut library, &shared, clip, method, check)?;
+                for listed in ListedClip::all(&clips) {
+                    push(&mut library, &shared, listed, method, check)?;
                 }
                 Ok(library.into_tables())
             })
@@ -498,9 +569,4 @@ fn check(set: &tumble::TrackSet) -> Result<(), &'static str> {
         }
         false => Ok(()),
     }
-}
-
-fn shown(index: usize, clip: &Clip) -> String {
-    let path = clip.source.as_ref().map(|source| source.path.display());
-    path.map_or_else(|| format!("clips[{index}]"), |path| path.to_string())
 }

@@ -10,10 +10,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
     Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
-    UnknownNameError, WrapMode,
+    UnknownNameError,
 };
 use tumble_cli::host;
 use tumble_formats::motion::Motion;
+use tumble_formats::outside::{Outside, OutsideError};
 
 use crate::arrays;
 use crate::errors::{input, of_engine};
@@ -47,8 +48,7 @@ struct InterpolationOptions {
     signs: KeySigns,
     ends: Option<Ends>,
     speed: Speed,
-    before: WrapMode,
-    after: WrapMode,
+    outside: Outside,
     tcb: Tcb,
 }
 
@@ -65,8 +65,7 @@ impl Request {
                 signs: KeySigns::Shortest,
                 ends: None,
                 speed: Speed::AsKeyed,
-                before: WrapMode::Hold,
-                after: WrapMode::Hold,
+                outside: Outside::default(),
                 tcb: Tcb::default(),
             },
         };
@@ -96,8 +95,8 @@ impl Request {
                 "speed" => {
                     interpolation.speed = option_of(&value, "speed")?;
                 }
-                "before" => interpolation.before = option_of(&value, "before")?,
-                "after" => interpolation.after = option_of(&value, "after")?,
+                "before" => interpolation.outside.before = option_of(&value, "before")?,
+                "after" => interpolation.outside.after = option_of(&value, "after")?,
                 "tension" => {
                     interpolation.tcb.tension = arrays::number(&value, "tension", "a number")?;
                 }
@@ -110,12 +109,50 @@ impl Request {
             }
         }
         request.samples = samples(rate, times, start, end)?;
+        let leaves_out = request.interpolation.outside.leaves_out();
+        let is_of_each = |samples: &SampleRequest| {
+            matches!(
+                samples,
+                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
+            )
+        };
+        if leaves_out != [false; 2] && request.samples.as_ref().is_some_and(is_of_each) {
+            let keyword = if leaves_out[0] { "before" } else { "after" };
+            return Err(input(format!(
+                "{keyword}=\"leave-out\": a result has as many samples for each track; give one list of times for all \
+                 tracks, or leave out the times yourself"
+            )));
+        }
         Ok(request)
     }
 
     /// The samples, of which there must be some.
     pub(crate) fn samples(&self) -> PyResult<&SampleRequest> {
         self.samples.as_ref().ok_or_else(none_asked_for)
+    }
+
+    /// What is done with times outside the keys.
+    pub(crate) fn outside(&self) -> Outside {
+        self.interpolation.outside
+    }
+
+    /// As [`SampleRequest::frames`], without the times that are left out.
+    pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
+        let samples = self.samples()?;
+        let rate = match samples {
+            &SampleRequest::Rate(rate, ..) => Some(rate),
+            _ => None,
+        };
+        let kept = (self.outside()).kept(samples.frames(clip, tracks)?, rate, clip);
+        kept.map(|kept| kept.samples).map_err(|error| match error {
+            OutsideError::Samples(error) => of_engine(&error.into()),
+            error => input(error.to_string()),
+        })
+    }
+
+    /// As [`Self::frames`] of all tracks, and how many there are.
+    pub(crate) fn resolved(&self, clip: &Motion) -> PyResult<(SampleTimes, usize)> {
+        count_of(self.frames(clip, None)?, clip)
     }
 
     /// The interpolation by a method, for a quantity.
@@ -128,8 +165,8 @@ impl Request {
             tcb: interpolation.tcb,
             quantity,
             speed: interpolation.speed,
-            before: interpolation.before,
-            after: interpolation.after,
+            before: interpolation.outside.before.wrap_mode(),
+            after: interpolation.outside.after.wrap_mode(),
         }
     }
 
@@ -178,14 +215,17 @@ impl SampleRequest {
         })
     }
 
-    /// As [`Samples::frames`], and how many there are.
+    /// As [`Self::frames`] of all tracks, and how many there are.
     pub(crate) fn resolved(&self, clip: &Motion) -> PyResult<(SampleTimes, usize)> {
-        let frames = self.frames(clip, None)?;
-        let timeline = frames
-            .resolve(clip.set.track_count(), clip.set.time_span())
-            .map_err(|error| of_engine(&error.into()))?;
-        Ok((frames, timeline.len()))
+        count_of(self.frames(clip, None)?, clip)
     }
+}
+
+fn count_of(frames: SampleTimes, clip: &Motion) -> PyResult<(SampleTimes, usize)> {
+    let timeline = frames
+        .resolve(clip.set.track_count(), clip.set.time_span())
+        .map_err(|error| of_engine(&error.into()))?;
+    Ok((frames, timeline.len()))
 }
 
 /// Which samples some keywords mean, of which there must be some.

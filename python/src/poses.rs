@@ -101,7 +101,7 @@ fn samples(
     ) {
         return Err(input("at: poses need the same times for all tracks"));
     }
-    let (frames, count) = requested.resolved(motion)?;
+    let (frames, count) = request.resolved(motion)?;
     let tracks = motion.set.track_count();
     let engine = engine.engine_for(tracks * count)?;
     let motion = Arc::clone(motion);

@@ -337,7 +337,7 @@ fn in_words<E: std::fmt::Display>(
 ) -> RouteResults {
     let found = found.into_iter();
     found
-        .map(|route| route.map_err(|error| in_python(&error.to_string())))
+        .map(|route| route.map_err(|error| error.to_string()))
         .collect()
 }
 
@@ -483,7 +483,7 @@ impl Surface {
             let found = options.routes(&pair)?.pop();
             found
                 .unwrap_or_else(|| Err("no route was computed".to_owned()))
-                .map_err(input)
+                .map_err(|error| input(in_python(&error)))
         })?;
         let mut moved = Vec::new();
         let route = self.route_of("", found, &mut moved);

@@ -499,7 +499,7 @@ pub(crate) fn skeleton(
     skeleton.map_err(|error| input(format!("parents: {error}")))
 }
 
-/// The parent of each track.
+/// The parent of each track; roots have None or -1.
 pub(crate) fn joint_parents(
     parents: &[Option<i64>],
     tracks: usize,
@@ -510,12 +510,22 @@ pub(crate) fn joint_parents(
             parents.len()
         )));
     }
-    let parent = |parent: &Option<i64>| match parent {
-        None | Some(-1) => None,
-        // What is no track is refused as one.
-        Some(parent) => Some(usize::try_from(*parent).unwrap_or(usize::MAX)),
+    let parent = |(track, &parent): (usize, &Option<i64>)| {
+        match parent {
+        None | Some(-1) => Ok(None),
+        Some(parent) => usize::try_from(parent)
+            .ok()
+            .filter(|&parent| parent < tracks)
+            .map(Some)
+            .ok_or_else(|| {
+                input(format!(
+                    "parents: track {track} cannot have the parent {parent}; give the index of a track, or None for \
+                     a root"
+                ))
+            }),
+    }
     };
-    Ok(parents.iter().map(parent).collect())
+    parents.iter().enumerate().map(parent).collect()
 }
 
 /// The offset of each track.

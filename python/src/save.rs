@@ -209,12 +209,12 @@ struct Save {
 }
 
 /// The samples of a clip that are asked for.
-fn requested(clip: &Motion, samples: &SampleRequest, end_frame: EndFrame) -> PyResult<FramesToEnd> {
-    let frames = samples.frames(clip, None)?;
-    let found = match *samples {
+fn requested(clip: &Motion, request: &Request, end_frame: EndFrame) -> PyResult<FramesToEnd> {
+    let frames = request.frames(clip, None)?;
+    let found = match *request.samples()? {
         SampleRequest::Rate(rate, _, end) => {
-            let last = clip.set.time_span().map_or(0.0, |span| span.1);
-            let end = end.map_or(last, |end| clip.time_in_set(end));
+            let end = end.map(|end| clip.time_in_set(end));
+            let end = request.outside().end(end, clip);
             FramesToEnd::new(clip, RateFrames { frames, rate, end }, end_frame)
         }
         _ => FramesToEnd::at(clip, frames),
@@ -276,10 +276,10 @@ impl Save {
             return self.baked(&motions, &*document, rate, out);
         }
         if self.format.takes_motion(&motions) {
-            return self.sampled(&motions, samples, out, times);
+            return self.sampled(&motions, out, times);
         }
         let written = match (&*motions, &self.format.write) {
-            ([motion], Some(write)) => self.rotations(motion, samples, write, out),
+            ([motion], Some(write)) => self.rotations(motion, write, out),
             (_, None) => Err(input(format!(
                 "{} is read, and not written",
                 self.format.name
@@ -474,12 +474,12 @@ impl Save {
     fn sampled(
         &self,
         clips: &[&Motion],
-        samples: &SampleRequest,
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
         let end_frame = self.end_frame_of(SampledKind::Clips)?;
-        let frames = clips.iter().map(|clip| requested(clip, samples, end_frame));
+        let frames = clips.iter();
+        let frames = frames.map(|clip| requested(clip, &self.request, end_frame));
         let frames: Vec<FramesToEnd> = frames.collect::<PyResult<_>>()?;
         let held = self.held(&frames);
         let mut warnings = self.written(clips, &frames, |sampled| {
@@ -527,12 +527,11 @@ impl Save {
     fn rotations(
         &self,
         clip: &Motion,
-        samples: &SampleRequest,
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
         let end_frame = self.end_frame_of(SampledKind::Rotations)?;
-        let all = requested(clip, samples, end_frame)?;
+        let all = requested(clip, &self.request, end_frame)?;
         let (frames, count) = (&all.frames, all.timeline.len());
         let timeline = match all.end {
             Some(_) => {

@@ -82,7 +82,7 @@ impl Chunks {
         chunk: usize,
         (order, layout): (Order, Layout),
     ) -> PyResult<Self> {
-        let (frames, samples) = request.samples()?.resolved(motion)?;
+        let (frames, samples) = request.resolved(motion)?;
         if chunk == 0 {
             return Err(input(
                 "chunk: give the number of rotations of a piece, over 0",
@@ -98,12 +98,11 @@ impl Chunks {
         let source = match uniform(motion, request) {
             Some(method) if !is_prepared => ChunkSource::Tracks(Box::new(with(method)), frames),
             _ => {
-                let requested = request.samples()?;
                 let group = |(method, set, tracks): MethodTracks| -> PyResult<PreparedTracks> {
                     let clip = engine.upload(&set, with(method));
                     Ok(PreparedTracks {
                         clip: clip.map_err(|error| of_engine(&error))?,
-                        frames: requested.frames(motion, tracks.as_deref())?,
+                        frames: request.frames(motion, tracks.as_deref())?,
                         tracks,
                     })
                 };

@@ -71,7 +71,7 @@ impl Verification {
         let sets = sets(clip, request)?;
         let is_one = sets.len() == 1;
         for (method, set, tracks) in sets {
-            let frames = request.samples()?.frames(clip, tracks.as_deref())?;
+            let frames = request.frames(clip, tracks.as_deref())?;
             let found = verify(engine, &set, with(method), &frames);
             let found = found.map_err(|error| of_engine(&error))?;
             if is_one {

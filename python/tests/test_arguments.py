@@ -324,11 +324,24 @@ def test_keys_of_frames_are_read_by_their_layout():
     """(frames, tracks, 4), as engines of physics and of machine learning hold poses."""
     by_frame = np.swapaxes(KEYS, 0, 1)
     moves = np.arange(36.0).reshape(3, 4, 3)
+    moves_by_frame = np.swapaxes(moves, 0, 1)
     expected = tumble.Clip(TIMES, KEYS, translations=moves, velocities=moves)
     found = tumble.Clip(
-        TIMES, by_frame, layout="frame", translations=np.swapaxes(moves, 0, 1), velocities=list(moves)
+        TIMES, by_frame, layout="frame", translations=moves_by_frame, velocities=list(moves_by_frame)
     )
     assert found == expected
+    # A list that contains None is one of tracks; where there are as many, others are frames all the same.
+    rooted = tumble.Clip(TIMES, KEYS, translations=[moves[0], None, None])
+    assert tumble.Clip(TIMES, by_frame, layout="frame", translations=[moves[0], None, None]) == rooted
+    square = [KEYS[:, :3], np.arange(27.0).reshape(3, 3, 3)]
+    tracks = tumble.Clip(TIMES[:3], square[0], layout="track", translations=square[1], scales=1 + square[1])
+    keys, moves_of_frames = (np.swapaxes(array, 0, 1) for array in square)
+    frames = tumble.Clip(
+        TIMES[:3], list(keys), layout="frame", translations=list(moves_of_frames), scales=list(1 + moves_of_frames)
+    )
+    assert frames == tracks
+    with pytest.raises(tumble.InputError, match=r"velocities: the shape is \(3, 4, 3\); give \(frames, 3, 3\), or a list"):
+        tumble.Clip(TIMES, by_frame, layout="frame", velocities=list(moves))
     assert tumble.Clip(TIMES, list(by_frame), layout="frame") == CLIP
     for call_of_it in (tumble.Clip, lambda *of: tumble.evaluate(*of, fps=10)):
         with pytest.raises(tumble.InputError, match=r'layout="frame".*swapaxes\(keys, 0, 1\)'):

@@ -326,3 +326,42 @@ def test_an_engine_keeps_files_where_it_is_told(tmp_path, monkeypatch):
     assert not user.exists() and not given.exists()
     tumble.Engine(0, cache=given).warm(method="slerp")
     assert not user.exists() and any(given.iterdir())
+
+
+def test_times_outside_the_keys_are_left_out(clip, engine, tmp_path):
+    both = dict(before="leave-out", after="leave-out")
+    for options, times in [
+        (dict(fps=4, start=-1, end=3, **both), np.arange(9) / 4),
+        (dict(fps=4, start=-0.5, end=3, after="leave-out"), np.arange(-2, 9) / 4),
+        (dict(fps=4, start=-0.25, end=2.25, before="leave-out", after="loop"), np.arange(10) / 4),
+        (dict(at=[-0.1, 1.1, 2.0, 3.0], **both), [1.1, 2.0]),
+        (dict(fps=4, **both), np.arange(9) / 4),
+    ]:
+        kept = dict(at=times, after=options["after"].replace("leave-out", "hold"))
+        assert np.array_equal(engine.evaluate(clip, **options), engine.evaluate(clip, **kept)), options
+        assert np.array_equal(engine.velocity(clip, **options), engine.velocity(clip, **kept))
+        for found, expected in zip(engine.poses(clip, **options), engine.poses(clip, **kept)):
+            assert np.array_equal(found, expected)
+        for layout in ["track", "frame"]:
+            chunks = [chunk.rotations for chunk in engine.stream(clip, layout=layout, **options)]
+            assert np.array_equal(np.concatenate(chunks), engine.evaluate(clip, layout=layout, **kept))
+        assert engine.verify(clip, **options).rotations == 3 * len(times)
+        tumble.save(tmp_path / "kept.csv", clip, method="slerp", **options)
+        assert tumble.load(tmp_path / "kept.csv").clip.times(0).tolist() == pytest.approx(times)
+    assert engine.evaluate(clip, at=1.0, **both).shape == (3, 4)
+    for at in [2.5, [-1.0, 2.5]]:
+        words = "none of the times lies between its keys: asked for .* to 2.5 s, keys lie from 0 to 2 s"
+        with pytest.raises(tumble.InputError, match=words):
+            engine.evaluate(clip, at=at, **both)
+    for at in [[[0.0]] * 3, [[0.0, 1.0], [0.0], [0.0]]]:
+        with pytest.raises(tumble.InputError, match='after="leave-out": .* give one list of times for all tracks'):
+            engine.evaluate(clip, at=at, after="leave-out")
+    with pytest.raises(tumble.InputError, match="before: there is no `leave`; there are hold, .*, leave-out"):
+        engine.evaluate(clip, fps=4, before="leave")
+    # Clips of a clock keep theirs, and the sample at the end of a clip is its last key.
+    late = tumble.Clip(1e9 + TIMES + 0.125, clip.keys(0))
+    found = engine.evaluate(late, fps=4, start=1e9, end=1e9 + 3, **both)
+    assert np.array_equal(found, engine.evaluate(late, at=1e9 + np.arange(1, 9) / 4))
+    tumble.save(tmp_path / "late.csv", late, fps=4, start=1e9, end=1e9 + 3, method="slerp", **both)
+    kept = tumble.load(tmp_path / "late.csv").clip
+    assert kept.span[1] + kept.time_offset == 1e9 + 2.125

@@ -1,7 +1,7 @@
 """Ctrl-C at random moments of every call that may take a tenth of a second.
 
 A child process makes the calls, and another one sends the signals: a thread of the first could only send them
-while the interpreter's lock is free. `SOAK=1` sends 100 to each call, else a few are sent.
+while the interpreter's lock is free. `SOAK=1` sends 100 to each call, else one is sent.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import textwrap
 
 import pytest
 
-SIGNALS = 100 if os.environ.get("SOAK") else 2
+SIGNALS = 100 if os.environ.get("SOAK") else 1
 
 # The calls, by their names: what is called, and the file that it writes, if any.
 CALLS: dict[str, tuple[str, str | None]] = {
@@ -73,7 +73,7 @@ CALLS: dict[str, tuple[str, str | None]] = {
     "advance a crowd": ("(crowd.advance(1 / 60), crowd.evaluate('model'))", None),
     "set a crowd": ("crowd.set(range(20_000), 0, time=np.linspace(0, 9, 20_000))", None),
     "devices": ("tumble.devices()", None),
-    "page": ("clip_of_page.view(fps=30).save('page.html')", "page.html"),
+    "page": ("clip_of_page.view(methods='slerp', fps=30).save('page.html')", "page.html"),
     "plan": ("tumble._tumble.Plan(command, folder, None, 'shards', '1M', 'files')", None),
     "shard": ("worker.run('shards', 1, 1, 'plan', inputs, record=False)", None),
     "merge": ("tumble._tumble.merge('merged')", None),
@@ -96,7 +96,7 @@ import collections, faulthandler, gc, json, os, pickle, random, shutil, signal, 
 import numpy as np, tumble
 
 calls, endless, count, sender = json.loads(sys.argv[1]), json.loads(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
-is_soak = count > 2
+is_soak = count > 1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 warnings.simplefilter("always")
 warnings.showwarning = lambda *_: None
@@ -200,6 +200,10 @@ for name, (call, output) in calls.items():
             deadline = time.monotonic() + delay + 15
             while time.monotonic() < deadline:  # a call that ends sooner is made again
                 work()
+                # The system may deliver the signal to another thread. Up to Python 3.12, the main thread then sees it
+                # when it takes the interpreter's lock again, and in a loop of calls that keep the lock never.
+                time.sleep(0)
+            ended = time.monotonic()
             found["swallowed"] += 1
         except KeyboardInterrupt:
             ended = time.monotonic()
@@ -235,9 +239,7 @@ print(json.dumps(["still", {}, engine.evaluate(clip, at=0.5).shape[0], 0]))
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
 def test_ctrl_c_at_any_moment_is_a_keyboard_interrupt(tmp_path):
-    # Beside other tests this call failed now and then, its signal coming after it had ended; alone it took 1 200.
-    calls = {name: call for name, call in CALLS.items() if SIGNALS > 2 or name != "an index that runs Python"}
-    arguments = [json.dumps(calls), json.dumps(ENDLESS), str(SIGNALS), SENDER]
+    arguments = [json.dumps(CALLS), json.dumps(ENDLESS), str(SIGNALS), SENDER]
     command = [sys.executable, "-c", textwrap.dedent(CHILD), *arguments]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=300 + 90 * SIGNALS, cwd=tmp_path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import warnings
 import numpy as np
 import pytest
 from conftest import ROOT, unit
+from scipy.spatial.transform import Rotation
 
 import tumble
 
@@ -79,6 +81,99 @@ def test_other_clocks_and_rates_are_the_same_motion(keys):
     positions, rotations = states([first, later, coarse], [0.0, 2 / 30])
     np.testing.assert_allclose(positions[1], positions[0], atol=1e-5)
     assert np.array_equal(rotations[2], rotations[0]) and np.array_equal(positions[2], positions[0])
+    crowd = tumble.Crowd([first, later, coarse], 3)
+    crowd.set([0, 1, 2], [0, 1, 2], time=2 / 30, wrap="hold")
+    a, b, c = crowd.evaluate("model")
+    np.testing.assert_allclose(b, a, atol=1e-5)
+    np.testing.assert_allclose(c, a, atol=1e-6)
+    # The times are those of the first clip, wherever the keys of the other lie.
+    found = tumble.compare(coarse, first, at=TIMES[::2])
+    assert (found.tracks, found.samples) == (5, 2) and found.rotation.largest < 1e-6
+
+
+def test_clips_of_other_clocks_are_compared_where_both_have_keys(keys):
+    first, shifted = made(keys), made(keys, ORDERS[0], times=TIMES + 1 / 30)
+    found = tumble.compare(first, shifted)
+    # The same keys a frame later are another motion.
+    assert found.rotation.largest > 0.1
+    with pytest.raises(tumble.InputError, match="no time|in common|overlap"):
+        tumble.compare(first, made(keys, times=TIMES + 1e9))
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A hip with a knee and a tail; the animations move different joints."""
+    half = np.sqrt(0.5)
+    arrays = [np.array([0, 1]), np.array([[0, 0, 0, 1], [half, 0, 0, half]]), np.array([[0, -0.5, 0], [0.25, -0.75, 0]])]
+    data = [array.astype("<f4").tobytes() for array in arrays]
+    starts = np.cumsum([0, *map(len, data)])
+    moved = {"kick": [(1, "rotation")], "wag": [(2, "rotation")], "both": [(2, "rotation"), (1, "translation")]}
+    animations = [
+        {
+            "name": name,
+            "samplers": [{"input": 0, "output": 1 + (path == "translation")} for _, path in channels],
+            "channels": [
+                {"sampler": index, "target": {"node": node, "path": path}} for index, (node, path) in enumerate(channels)
+            ],
+        }
+        for name, channels in moved.items()
+    ]
+    nodes = [
+        {"name": "hip", "translation": [0, 1, 0], "children": [1, 2]},
+        {"name": "knee", "translation": [0, -0.5, 0]},
+        {"name": "tail", "translation": [0, 0, -1], "rotation": [0, half, 0, half]},
+    ]
+    file = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "animations": animations,
+        "buffers": [{"uri": "rig.bin", "byteLength": int(starts[-1])}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": int(start), "byteLength": len(part)} for start, part in zip(starts, data)
+        ],
+        "accessors": [
+            {"bufferView": index, "componentType": 5126, "count": 2, "type": kind}
+            for index, kind in enumerate(["SCALAR", "VEC4", "VEC3"])
+        ],
+    }
+    file["accessors"][0] |= {"min": [0], "max": [1]}
+    (tmp_path / "rig.bin").write_bytes(b"".join(data))
+    (tmp_path / "rig.gltf").write_text(json.dumps(file))
+    return tumble.load(tmp_path / "rig.gltf")
+
+
+def test_animations_of_a_file_may_move_different_joints(rig):
+    """The joints are those of all of them; those that an animation lacks rest, as in C."""
+    turned, at = Rotation.from_rotvec([np.pi / 4, 0, 0]), [0.5]
+    tail = Rotation.from_quat([0, np.sqrt(0.5), 0, np.sqrt(0.5)])
+    one = Rotation.identity()
+    expected = {
+        "kick": ([[0, 1, 0], [0, 0.5, 0], [0, 1, -1]], [one, turned, tail]),
+        "wag": ([[0, 1, 0], [0, 0.5, 0], [0, 1, -1]], [one, one, turned]),
+        "both": ([[0, 1, 0], [0.125, 0.375, 0], [0, 1, -1]], [one, one, turned]),
+    }
+    orders = [["kick", "wag", "both"], ["wag", "both", "kick"]]
+    for order in orders:
+        clips = [rig[name] for name in order]
+        library = tumble.MotionLibrary(clips, method="slerp")
+        assert sorted(library.joint_names) == ["hip", "knee", "tail"]
+        joints = [["hip", "knee", "tail"].index(name) for name in library.joint_names]
+        crowd = tumble.Crowd(clips, 3, method="slerp")
+        crowd.set([0, 1, 2], [0, 1, 2], time=0.5, wrap="hold")
+        model = crowd.evaluate("model")
+        for index, name in enumerate(order):
+            positions, rotations = expected[name]
+            state = library.sample([index], at)
+            np.testing.assert_allclose(state.positions[0], np.array(positions)[joints], atol=1e-6)
+            np.testing.assert_allclose(model[index, ..., 3], np.array(positions)[joints], atol=1e-6)
+            for joint, found in zip(joints, Rotation.from_quat(state.rotations[0])):
+                assert (rotations[joint].inv() * found).magnitude() < 1e-6, (name, joint)
+    # A clip that is made of arrays has nothing that says where the others rest.
+    kick = rig["kick"]
+    alone = tumble.Clip(
+        [kick.times(name) for name in kick.names], [kick.keys(name) for name in kick.names], names=kick.names, parents=kick.parents,
+        offsets=kick.offsets,
+    )
+    with pytest.raises(tumble.InputError, match="joint `tail`"):
+        tumble.MotionLibrary([rig["both"], alone])
 
 
 @pytest.mark.parametrize("ending", ["npz", "bvh", "glb", "gltf", "parquet"])
@@ -141,6 +236,20 @@ def test_other_joints_are_refused(keys):
     with pytest.raises(tumble.InputError, match="compare them in the world with world=True"):
         tumble.compare(first, other)
     assert tumble.compare(first, other, world=True).tracks == 5
+
+
+def test_a_parent_is_a_track_or_none(keys):
+    clip = made(keys)
+    for wrong in [-2, 5]:
+        parents = [None, 0, 0, 1, wrong]
+        for call in [
+            lambda: tumble.Clip(TIMES, keys, parents=parents),
+            lambda: tumble.MotionLibrary([clip], skeleton=(parents, OFFSETS)),
+            lambda: tumble.Crowd([clip], 1, parents=parents, offsets=OFFSETS),
+            lambda: tumble.Engine("cpu").local_to_model(keys, parents),
+        ]:
+            with pytest.raises(tumble.InputError, match=f"track 4 cannot have the parent {wrong}; give the index of a track"):
+                call()
 
 
 def test_each_clip_keeps_its_offsets(keys):
@@ -215,6 +324,27 @@ def test_a_skeleton_places_the_joints_of_a_body(body):
     np.testing.assert_allclose(library.sample([0], [0.0]).positions, expected, rtol=1e-6)
     with pytest.raises(tumble.InputError, match="body_model"):
         library.sample([0, 1], [0.0, 0.0])
+
+
+def test_a_body_model_places_the_joints_of_its_body(tmp_path):
+    """The same motion at another rate, and with its keys at times of another clock; another person has other bones."""
+    folder = ROOT / "formats/tests/fixtures/body"
+    model = folder / "models/SMPL_MALE.npz"
+    poses = dict(np.load(folder / "male.npz"))
+    slow = tmp_path / "slow.npz"
+    np.savez(slow, **{**poses, "mocap_framerate": 15.0})
+    male, twice = (tumble.load(path, body_model=model).clip for path in (folder / "male.npz", slow))
+    assert np.array_equal(male.offsets, twice.offsets)
+    state = tumble.MotionLibrary([male, twice]).sample([0, 1, 0, 1], [1 / 30, 2 / 30, 2 / 30, 4 / 30]).positions
+    np.testing.assert_allclose(state[1::2], state[::2], atol=1e-5)
+    female = tumble.load(folder / "female.npz", body_model=folder / "models/SMPL_FEMALE.npz").clip
+    assert np.abs(female.offsets - male.offsets).max() > 0.01
+    # Each keeps its bones; a skeleton that is chosen holds for both.
+    own = tumble.MotionLibrary([male, female]).sample([1], [0.0]).positions
+    expected = tumble.Engine("cpu").world(female, at=[0.0], layout="frame")[0]
+    np.testing.assert_allclose(own, expected, atol=1e-5)
+    chosen = tumble.MotionLibrary([female], skeleton=male).sample([0], [0.0]).positions
+    assert np.abs(chosen - expected).max() > 0.01
 
 
 def test_a_model_of_another_body_is_refused(body):

@@ -50,7 +50,7 @@ def test_ten_thousand_poses_leave_nothing(rng):
     engine = tumble.Engine()
     at = rng.uniform(0, 2, 10_000)
 
-    def all_of_them():
+    def all_of_them(at):
         for time in at:
             engine.evaluate(clip, at=time)
             engine.matrices(clip, at=time)
@@ -62,9 +62,9 @@ def test_ten_thousand_poses_leave_nothing(rng):
 
     if not sys.platform.startswith("linux"):
         pytest.skip("memory is read from /proc")
-    all_of_them()
+    all_of_them(at[:1000])
     before = size()
-    all_of_them()
+    all_of_them(at)
     assert size() - before < 1 << 20
 
 

@@ -202,6 +202,13 @@ def test_files_and_engines_are_pickled(clip, tmp_path):
     file = tumble.load(path)
     for other in copies(file):
         assert (other.names, other.path, other.clips) == (file.names, file.path, file.clips)
+    # Equal files have equal clips, wherever they lie; and the same reasons why others could not be read.
+    elsewhere = tmp_path / "folder" / "wave.glb"
+    elsewhere.parent.mkdir()
+    elsewhere.write_bytes(path.read_bytes())
+    assert tumble.load(elsewhere) == file and hash(tumble.load(elsewhere)) == hash(file)
+    tumble.save(elsewhere, tumble.Clip([0.0, 1.0], clip.keys(0)[:2], name="wave"), overwrite=True)
+    assert tumble.load(elsewhere) != file
     engine = tumble.Engine("cpu", threads=2)
     expected = engine.evaluate(clip, fps=30)
     for again in copies(engine):

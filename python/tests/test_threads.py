@@ -14,8 +14,8 @@ import tumble
 
 @pytest.fixture
 def long(rng):
-    """A call that takes about a second, and does all of it in one piece."""
-    clip = tumble.Clip(np.arange(400.0), unit(rng, 8, 400))
+    """A call that takes some tenths of a second, and does all of it in one piece."""
+    clip = tumble.Clip(np.arange(120.0), unit(rng, 8, 120))
     engine = tumble.Engine("cpu", threads=1)
 
     def work():
@@ -59,9 +59,9 @@ def test_two_threads_evaluate_at_once(rng):
 
 
 def test_one_output_is_not_written_by_two(long, rng):
-    clip = tumble.Clip(np.arange(400.0), unit(rng, 8, 400))
+    clip = tumble.Clip(np.arange(120.0), unit(rng, 8, 120))
     engine = tumble.Engine("cpu", threads=1)
-    out = np.zeros((8, 799, 4), np.float32)
+    out = np.zeros((8, 239, 4), np.float32)
 
     def work():
         engine.evaluate(clip, fps=2, method="c2", speed="constant", out=out)

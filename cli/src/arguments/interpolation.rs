@@ -11,6 +11,7 @@ use tumble::{
     Quantity, SampleTimes, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::motion::Motion;
+use tumble_formats::outside::{Outside, OutsideError, OutsideValue};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{Code, Diagnostic};
 
@@ -33,10 +34,10 @@ pub(crate) struct InterpolationArguments {
     speed: Speed,
     /// The values before the first key
     #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = outside())]
-    before: OutsideArgument,
+    before: OutsideValue,
     /// The values after the last key
     #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = outside())]
-    after: OutsideArgument,
+    after: OutsideValue,
     /// kochanek-bartels: 0 is neutral, 1 stops at the keys, -1 doubles the speed at the keys
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     tension: Option<f64>,
@@ -175,147 +176,50 @@ fn speed() -> impl TypedValueParser<Value = Speed> {
     one_of(Speed::ALL.map(|speed| (speed.name(), help(speed), speed)))
 }
 
-/// What is done with times before the first or after the last key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OutsideArgument {
-    Wrap(WrapMode),
-    LeaveOut,
-}
-
-const LEAVE_OUT: &str = "leave-out";
-
-impl Default for OutsideArgument {
-    fn default() -> Self {
-        Self::Wrap(WrapMode::default())
-    }
-}
-
-impl fmt::Display for OutsideArgument {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Wrap(mode) => f.write_str(mode.name()),
-            Self::LeaveOut => f.write_str(LEAVE_OUT),
-        }
-    }
-}
-
-impl OutsideArgument {
-    /// Of times that are left out none is evaluated.
-    fn wrap_mode(self) -> WrapMode {
-        match self {
-            Self::Wrap(mode) => mode,
-            Self::LeaveOut => WrapMode::default(),
-        }
-    }
-
-    /// Whether a value there says anything of the motion: where the end value is held it does not.
-    fn is_motion(self) -> bool {
-        !matches!(self, Self::Wrap(WrapMode::Hold) | Self::LeaveOut)
-    }
-}
-
-/// What is done with times outside the keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Outside {
-    before: OutsideArgument,
-    after: OutsideArgument,
-}
-
-impl Outside {
-    /// Whether times before the first and after the last key are left out.
-    pub(crate) fn leaves_out(self) -> [bool; 2] {
-        [self.before, self.after].map(|it| it == OutsideArgument::LeaveOut)
-    }
-
-    /// Whether tracks hold their first and their last key outside the keys, the default.
-    pub(crate) fn is_default(self) -> [bool; 2] {
-        [self.before, self.after].map(|it| it == OutsideArgument::default())
-    }
-
-    /// The samples without those that are left out; frames of a rate stay such.
-    ///
-    /// # Errors
-    /// When none is left.
-    pub(crate) fn kept(
-        self,
-        frames: SampleTimes,
-        rate: Option<FrameRate>,
-        clip: &Motion,
-        name: &str,
-    ) -> Result<SampleTimes, Failure> {
-        let leaves = self.leaves_out();
-        let (true, Some((first, last))) = (leaves != [false; 2], clip.set.time_span()) else {
-            return Ok(frames);
-        };
-        let timeline = frames
-            .resolve(clip.set.track_count(), clip.set.time_span())
-            .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let is_left_out = |time: f64| leaves[0] && time < first || leaves[1] && time > last;
-        let all = timeline.len();
-        let kept: Vec<f64> = timeline.times(0).filter(|&it| !is_left_out(it)).collect();
-        let (Some(&start), Some(&end)) = (kept.first(), kept.last()) else {
-            return Err(Self::nothing_in_common(timeline.times(0), clip, name));
-        };
-        let left_out = all - kept.len();
-        if left_out == 0 {
-            return Ok(frames);
-        }
+/// The samples that [`Outside::kept`] keeps; says how many are left out.
+///
+/// # Errors
+/// When none is left.
+pub(crate) fn kept(
+    outside: Outside,
+    frames: SampleTimes,
+    rate: Option<FrameRate>,
+    clip: &Motion,
+    name: &str,
+) -> Result<SampleTimes, Failure> {
+    let found = outside.kept(frames, rate, clip);
+    let kept = found.map_err(|error| of_outside(error, name))?;
+    if kept.left_out > 0 {
         words::note(&format!(
-            "{name}: {left_out} of {} lie outside the keys; they are left out",
-            words::count(all, "time")
+            "{name}: {} of {} lie outside the keys; they are left out",
+            kept.left_out,
+            words::count(kept.all, "time")
         ));
-        Ok(match rate {
-            Some(rate) => SampleTimes::rate(rate).between(start, end),
-            None => SampleTimes::at(kept),
-        })
     }
+    Ok(kept.samples)
+}
 
-    /// Refuses times that all lie outside the keys, where values do not depend on time.
-    pub(crate) fn check_common(
-        self,
-        times: &[f64],
-        clip: &Motion,
-        name: &str,
-    ) -> Result<(), Failure> {
-        let Some((first, last)) = clip.set.time_span() else {
-            return Ok(());
-        };
-        let says_something = |&time: &f64| {
-            (time >= first || self.before.is_motion()) && (time <= last || self.after.is_motion())
-        };
-        match times.is_empty() || times.iter().any(says_something) {
-            true => Ok(()),
-            false => Err(Self::nothing_in_common(times.iter().copied(), clip, name)),
-        }
-    }
-
-    fn nothing_in_common(times: impl Iterator<Item = f64>, clip: &Motion, name: &str) -> Failure {
-        let (start, end) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| {
-            (time.min(low), time.max(high))
-        });
-        let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-        let clock = clip.time_offset as f64;
-        let [start, end, first, last] = [start, end, first, last].map(|time| time + clock);
-        let message = format!(
-            "{name}: none of the times lies between its keys: asked for {start} to {end} s, keys lie from \
-             {first} to {last} s"
-        );
-        Failure::new(ALL_INPUTS, message)
+/// Why no time of a clip can be evaluated.
+pub(crate) fn of_outside(error: OutsideError, name: &str) -> Failure {
+    match error {
+        OutsideError::Samples(error) => Failure::evaluating(name, &error.into()),
+        error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
     }
 }
 
-fn outside() -> impl TypedValueParser<Value = OutsideArgument> {
+fn outside() -> impl TypedValueParser<Value = OutsideValue> {
     let help = |mode| match mode {
         WrapMode::Hold => "the end value",
         WrapMode::Loop => "the track repeats",
         WrapMode::Mirror => "the track runs backwards and forwards in turn",
         WrapMode::Extrapolate => "continues at the velocity of the end",
     };
-    let wrapped = WrapMode::ALL.map(|mode| (mode.name(), help(mode), OutsideArgument::Wrap(mode)));
+    let wrapped = WrapMode::ALL.map(|mode| (mode.name(), help(mode), OutsideValue::Wrap(mode)));
+    let left_out = OutsideValue::LeaveOut;
     let left_out = (
-        LEAVE_OUT,
+        left_out.name(),
         "no value: times there are left out",
-        OutsideArgument::LeaveOut,
+        left_out,
     );
     one_of(wrapped.into_iter().chain([left_out]).collect::<Vec<_>>())
 }
@@ -354,7 +258,7 @@ pub(crate) fn curve_warning(
     };
     let message = format!(
         "the angular acceleration of {} jumps at key {}, at {time} s{others}; add keys in long intervals \
-         beside short ones, or use -m bessel-overhauser",
+         beside short ones, or use `-m bessel-overhauser`",
         interpolation.method,
         key + 1
     );

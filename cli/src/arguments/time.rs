@@ -10,10 +10,11 @@ use tumble_formats::end_frame::{
 };
 use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
+use tumble_formats::outside::Outside;
 use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
 
-use crate::arguments::interpolation::Outside;
+use crate::arguments::interpolation::{kept, of_outside};
 use crate::arguments::output::one_of;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
@@ -300,16 +301,12 @@ impl SampleRequest {
     /// Where the frames of a rate end in a clip, in seconds: at its last key or where the command line says; `None` for
     /// listed times, or where neither is known.
     pub(crate) fn end_of(&self, clip: &Motion, outside: Outside) -> Option<f64> {
-        let Self::Rate { end, .. } = self else {
+        let Self::Rate { end, .. } = *self else {
             return None;
         };
-        let last = clip.set.time_span().map(|span| span.1);
         let end = end.map(|end| clip.time_in_set(end));
-        let [_, leaves_out_after] = outside.leaves_out();
-        match leaves_out_after {
-            true => end.into_iter().chain(last).reduce(f64::min),
-            false => end.or(last),
-        }
+        let is_known = end.is_some() || clip.set.time_span().is_some();
+        is_known.then(|| outside.end(end, clip))
     }
 
     /// The samples for one clip; warns when they exceed its keys, and of those in gaps.
@@ -433,7 +430,8 @@ impl SampleRequest {
                 // Each clip has its own time offset, in whole seconds.
                 let shift = (keys.from - clip.time_offset) as f64;
                 let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
-                outside.check_common(&times, clip, name)?;
+                let common = outside.check_common(&times, clip);
+                common.map_err(|error| of_outside(error, name))?;
                 at(times)
             }
         };
@@ -441,7 +439,7 @@ impl SampleRequest {
             Self::Rate { rate, .. } => Some(*rate),
             Self::Times(_) | Self::Keys(_) => None,
         };
-        outside.kept(frames, rate, clip, name)
+        kept(outside, frames, rate, clip, name)
     }
 }
 
@@ -463,12 +461,12 @@ pub(crate) fn in_frames(
     let (start, end) = clip.range_in_set(start, end, whole);
     warn_outside_keys(start, end, clip, outside, name);
     let frames = SampleTimes::rate(rate).between(start, end);
-    outside.kept(frames, Some(rate), clip, name)
+    kept(outside, frames, Some(rate), clip, name)
 }
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // What tracks do there was said; `Outside::kept` prints how many times are left out.
+    // What tracks do there was said; `kept` prints how many times are left out.
     let [is_default_before, is_default_after] = outside.is_default();
     if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =

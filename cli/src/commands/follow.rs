@@ -8,13 +8,13 @@ use tumble::paths::{Follow, FollowError, Followed, PathFrame};
 use tumble::{Engine, Error, Layout, SampleTimes, TrackSet, VectorMethod};
 use tumble_formats::PATHS;
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
+use tumble_formats::outside::Outside;
 use tumble_formats::path::PathFormat;
 use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{GatheredInputs, InputSelection};
-use crate::arguments::interpolation::Outside;
 use crate::arguments::options::{CommandLine, ResultOptions};
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;

@@ -123,7 +123,7 @@ class MotionLibrary:
         self.names = list(names) if names is not None else [_name(clip) for clip in clips]
         self.lengths = np.array([clip.duration for clip in clips])
         self.rates = np.array([_rate(clip) for clip in clips])
-        self._motions = Motions.of_clips(clips, *_skeleton_of(skeleton), method)
+        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method)
         self._engine = engine if engine is not None else Engine()
         self._method = method
         self._file: str | None = None
@@ -347,15 +347,11 @@ def _opened(file: str, engine: Engine) -> MotionLibrary:
 
 def _skeleton_of(
     skeleton: _Skeleton | None,
-) -> tuple[Clip | None, tuple[list[int], list[list[float]]] | None]:
+) -> Clip | tuple[Sequence[int | None], ArrayLike] | None:
     """A clip, or the parents and offsets of joints."""
-    if skeleton is None or isinstance(skeleton, Clip):
-        return skeleton, None
-    if isinstance(skeleton, tuple):
-        joint_parents, offsets = skeleton
-        parents = [-1 if parent is None else int(parent) for parent in joint_parents]
-        return None, (parents, np.asarray(offsets, np.float32).reshape(len(parents), 3).tolist())
-    return load(skeleton)[0], None
+    if skeleton is None or isinstance(skeleton, Clip | tuple):
+        return skeleton
+    return load(skeleton)[0]
 
 
 def _name(clip: Clip) -> str:

@@ -9,6 +9,12 @@ from tumble import _tumble
 from tumble.distributed import _worker
 
 
+def prepare() -> None:
+    """What every worker of the tests' connection begins with."""
+    kill_on_the_clip_that_says_so()
+    another_wheel()
+
+
 def kill_on_the_clip_that_says_so() -> None:
     """An input that ends whatever process evaluates it."""
 

@@ -5,9 +5,10 @@ pub(crate) mod curves;
 use glam::Quat;
 use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
 use tumble_formats::motion::Motion;
+use tumble_formats::outside::Outside;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::{CurveChoice, Outside};
+use crate::arguments::interpolation::CurveChoice;
 use crate::arguments::time::SampleRequest;
 use crate::batch::room;
 use crate::commands::plot::figure::TimeAxis;

@@ -50,7 +50,8 @@ def evaluate(
     Inputs that are refused are listed in the report; the others are evaluated. An error that stops the
     whole run, such as an output that cannot be written, raises `DistributedError`. After it, or after
     Ctrl-C, a second call continues with the rest. If Ray is already connected, this connection is used
-    and left open; tasks that were submitted before an error then run to their end.
+    and left open; tasks that were submitted before an error then run to their end. One that ends after the
+    next call has merged the results leaves a record in `manifest.d`, which a further call merges.
     """
     paths = [local(library), local(out)]
     return _driver.evaluate(
