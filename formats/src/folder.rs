@@ -73,9 +73,15 @@ impl Folder {
         let mut folder = self.clone();
         for part in name.parent().into_iter().flat_map(Path::iter) {
             before(&folder, part)?;
+            let path = folder.path.join(part);
+            let opened = system::open_below(&folder, part);
+            let handle = opened.map_err(|error| match fs::symlink_metadata(&path) {
+                Ok(found) if found.is_symlink() => leads_out(),
+                _ => error,
+            })?;
             folder = Self {
-                handle: Arc::new(system::open_below(&folder, part)?),
-                path: folder.path.join(part),
+                handle: Arc::new(handle),
+                path,
             };
         }
         Ok(folder)
@@ -327,6 +333,7 @@ mod system {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beneath::is_refused;
 
     fn names(path: &Path) -> Vec<String> {
         let entries = fs::read_dir(path).unwrap().map(Result::unwrap);
@@ -386,7 +393,8 @@ mod tests {
         let folder = Folder::open(&path).unwrap();
         for name in ["up/file", "../file", "/file"] {
             let name = Path::new(name);
-            assert!(folder.parent_of(name).is_err(), "{}", name.display());
+            let refused = folder.parent_of(name).unwrap_err();
+            assert!(is_refused(&refused), "{}: {refused}", name.display());
             assert!(folder.create_parent_of(name).is_err());
             assert!(folder.remove_file(name).is_err());
         }

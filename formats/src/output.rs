@@ -16,6 +16,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::beneath::is_refused;
 use crate::folder::Folder;
 
 /// Why an output cannot be written.
@@ -124,10 +125,11 @@ impl OutputPlace {
             Ok(parent) => Err(moved(parent.path())),
             // It was there when the output was planned.
             Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::NotADirectory | io::ErrorKind::NotFound
-                ) =>
+                if is_refused(&error)
+                    || matches!(
+                        error.kind(),
+                        io::ErrorKind::NotADirectory | io::ErrorKind::NotFound
+                    ) =>
             {
                 Err(moved(&parent(path)))
             }
