@@ -20,7 +20,7 @@ use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::batch::shards::run::Shard;
-use crate::batch::{entry, output_plan, result_names};
+use crate::batch::{entry, output_plan, result_names, target};
 use crate::commands::eval::Arguments;
 use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
 use crate::host::Refused;
@@ -319,7 +319,8 @@ impl Worker {
         };
         let valid_names: Vec<&str> = names.iter().flatten().map(|name| &**name).collect();
         let resume = self.arguments.results.is_resumed();
-        let mut shard = Shard::new(folder, header, &valid_names, resume);
+        let folder = target::opened(folder)?;
+        let mut shard = Shard::new(&folder, header, &valid_names, resume);
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);

@@ -17,6 +17,8 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is not a frame rate
 2 | eval a.dat -o o.npy --fps 1e13               | at most 1099511627776 frames
 7 | eval a.dat -o o.npy --fps 5e11               | 32000000000032 bytes) are needed for 2 tracks × 1000000000001 frames, and
+ 7 | eval a.dat -o o.csv --fps 5e11               | 16.0 TB
+ 7 | eval a.dat -o o.arrow --fps 5e11             | 72.0 TB
 0 | eval a.dat -o o.npy --fps 1e-9               | 1 frame,
 0 | eval a.dat -o o.npy --fps 29.97              | 30000/1001
 0 | eval a.dat -o o.npy --fps 23.976             | 24000/1001

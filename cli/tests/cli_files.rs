@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::program::{command, finish, is_writing, run, sample_folder, with_signals};
+use crate::program::{command, finish, is_writing, run, sample_folder, succeed, with_signals};
 
 #[cfg(unix)]
 #[test]
@@ -275,5 +275,31 @@ fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
             run.words
         );
         assert!(!folder.join("o.npy").exists());
+    }
+}
+
+/// What a result takes on the disk at least is asked for before it is written, of every format; a result that stands
+/// still, and is compressed best, takes that much.
+#[test]
+fn no_result_is_smaller_than_what_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("still.dat"),
+        "# 2 1\n0 1 0 0 0 1 0 0 0\n5 1 0 0 0 1 0 0 0\n",
+    )
+    .unwrap();
+    for format in tumble_formats::FORMATS {
+        let Some(write) = &format.write else { continue };
+        let out = format!("out.{}", format.name);
+        succeed(
+            folder.path(),
+            &["eval", "still.dat", "--fps", "1000", "-o", &out],
+        );
+        let bytes = fs::metadata(folder.path().join(&out)).unwrap().len() as f64;
+        let each = (write.rotation_bytes)(tumble::Encoding::default());
+        assert!(
+            each > 0.0 && each * 10_002.0 <= bytes,
+            "{out}: {each}, {bytes}"
+        );
     }
 }

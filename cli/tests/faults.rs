@@ -290,8 +290,22 @@ fn absence_is_told_within_a_second() {
         r#"{{"file_format_version": "1.0.0", "ICD": {{"library_path": {library:?}, "api_version": "1.3.0"}}}}"#
     );
     fs::write(&crashing, manifest).unwrap();
+    // A manifest that is no JSON, and one that names a library of garbage.
+    let [no_manifest, no_library] =
+        ["garbage.json", "library.json"].map(|name| folder.path().join(name));
+    fs::write(&no_manifest, "garbage").unwrap();
+    let garbage = folder.path().join("garbage.so");
+    fs::write(&garbage, "\x7fELF\x02\x01\x01 garbage").unwrap();
+    let manifest = fs::read_to_string(&crashing).unwrap();
+    let manifest = manifest.replace(&format!("{library:?}"), &format!("{garbage:?}"));
+    fs::write(&no_library, manifest).unwrap();
     let set = |variable: &'static str, value: &Path| (variable, value.as_os_str().to_owned());
     let cases = [
+        (
+            "a manifest of garbage",
+            set("VK_DRIVER_FILES", &no_manifest),
+        ),
+        ("a library of garbage", set("VK_DRIVER_FILES", &no_library)),
         ("no loader", set("LD_LIBRARY_PATH", broken.path())),
         (
             "no driver",
@@ -330,6 +344,7 @@ fn absence_is_told_within_a_second() {
                 "no Vulkan device: "
             };
             assert!(run.words.contains(words), "{case}: {}", run.words);
+            assert!(!run.words.contains("memory"), "{case}: {}", run.words);
         }
     }
 }

@@ -68,7 +68,7 @@ enum OpenRefusal {
     NoFile,
 }
 
-fn leads_out() -> io::Error {
+pub(crate) fn leads_out() -> io::Error {
     io::Error::other(OpenRefusal::LeadsOut)
 }
 
@@ -77,7 +77,7 @@ fn no_file() -> io::Error {
 }
 
 /// The name without `.` and `..`; `None` if it is absolute, is empty or leads out of the folder.
-fn plain(name: &Path) -> Option<PathBuf> {
+pub(crate) fn plain(name: &Path) -> Option<PathBuf> {
     let mut path = PathBuf::new();
     for part in name.components() {
         match part {
@@ -90,7 +90,7 @@ fn plain(name: &Path) -> Option<PathBuf> {
     (!path.as_os_str().is_empty()).then_some(path)
 }
 
-fn or_here(folder: &Path) -> &Path {
+pub(crate) fn or_here(folder: &Path) -> &Path {
     match folder.as_os_str().is_empty() {
         true => Path::new("."),
         false => folder,

@@ -36,6 +36,7 @@ pub mod euroc;
 #[cfg(feature = "fbx")]
 pub mod fbx;
 pub mod feature;
+pub mod folder;
 mod foreign;
 pub mod format;
 pub mod generate;

@@ -1,17 +1,23 @@
 //! Writes files completely or not at all. A file that is being written has no name or a temporary one, in the
 //! directory of the output; it gets its name at the end. Standard output is the exception, for pipes.
 //!
+//! The directory is opened once ([`Folder`]): if another one or a link is put in its place, nothing is written there,
+//! and the output fails.
+//!
 //! On Linux, a file that is being written has no name (`O_TMPFILE`), so that nothing remains if its writer is ended.
 //! If the file system does not support this, the file is called `.tumble-….part` and locked. A file without a lock
 //! has no writer any more, and the next writer removes it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::NamedTempFile;
+use crate::beneath::is_refused;
+use crate::folder::Folder;
 
 /// Why an output cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -51,9 +57,19 @@ pub enum OutputError {
         /// Path of the input.
         input: PathBuf,
     },
-    /// Standard output is closed, so that what is written to it would be lost.
-    #[error("standard output is closed; give a file, or leave standard output open")]
-    Closed,
+    /// The directory of the output was renamed, removed or replaced since it was opened. Nothing was written into the
+    /// one that has its path now.
+    #[error(
+        "{}: is not written, because its directory {} was moved or replaced meanwhile; put it back and repeat this",
+        path.display(),
+        folder.display()
+    )]
+    Moved {
+        /// Path of the output.
+        path: PathBuf,
+        /// Path of the directory.
+        folder: PathBuf,
+    },
     /// Writing failed; an existing file is unchanged.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
@@ -81,9 +97,52 @@ pub struct Output {
 enum OutputSink {
     File {
         temporary: BufWriter<Temporary>,
-        overwrite: bool,
+        place: OutputPlace,
     },
     Standard(BufWriter<io::Stdout>),
+}
+
+/// The name that an output gets.
+struct OutputPlace {
+    folder: Folder,
+    /// Below the folder.
+    name: PathBuf,
+    overwrite: bool,
+}
+
+impl OutputPlace {
+    /// The directory of the file; opened again, because many files may wait for their names.
+    fn parent(&self, path: &Path) -> Result<Folder, OutputError> {
+        let moved = |folder: &Path| OutputError::Moved {
+            path: path.to_owned(),
+            folder: folder.to_owned(),
+        };
+        if !self.folder.is_in_place() {
+            return Err(moved(self.folder.path()));
+        }
+        match self.folder.parent_of(&self.name) {
+            Ok(parent) if parent.is_in_place() => Ok(parent),
+            Ok(parent) => Err(moved(parent.path())),
+            // It was there when the output was planned.
+            Err(error)
+                if is_refused(&error)
+                    || matches!(
+                        error.kind(),
+                        io::ErrorKind::NotADirectory | io::ErrorKind::NotFound
+                    ) =>
+            {
+                Err(moved(&parent(path)))
+            }
+            Err(source) => Err(OutputError::Write {
+                path: path.to_owned(),
+                source,
+            }),
+        }
+    }
+
+    fn file_name(&self) -> &OsStr {
+        self.name.file_name().unwrap_or_default()
+    }
 }
 
 const BUFFER: usize = 1 << 18;
@@ -95,33 +154,92 @@ const SUFFIX: &str = ".part";
 /// Number of random letters and digits before the suffix. A mark before them ends in `-`.
 const RANDOM: usize = 6;
 
-/// The temporary files that this process is writing.
-static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// The temporary files that this process is writing, with their directories.
+static UNFINISHED: Mutex<BTreeMap<PathBuf, Folder>> = Mutex::new(BTreeMap::new());
 
-fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+type Unfinished = MutexGuard<'static, BTreeMap<PathBuf, Folder>>;
+
+fn unfinished() -> Unfinished {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The entry of a temporary file in [`UNFINISHED`], removed when this is dropped.
-struct UnfinishedEntry(PathBuf);
+/// The temporary name of a file. When this is dropped, a file that still has it is removed.
+struct TemporaryName {
+    folder: Folder,
+    name: OsString,
+    is_renamed: bool,
+}
 
-impl Drop for UnfinishedEntry {
+impl TemporaryName {
+    /// A new file; `create` makes it by the name that it is given, unless there is one.
+    fn new<T>(
+        folder: &Folder,
+        mark: &str,
+        create: impl Fn(&OsStr) -> io::Result<T>,
+    ) -> io::Result<(Self, T)> {
+        const LETTERS: &[u8] = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
+        const TRIES: usize = 1000;
+        for _ in 0..TRIES {
+            // Seeded by the system, and different for each state.
+            let mut number = RandomState::new().hash_one(std::process::id());
+            let mut random = String::new();
+            for _ in 0..RANDOM {
+                random.push(char::from(
+                    LETTERS[(number % LETTERS.len() as u64) as usize],
+                ));
+                number /= LETTERS.len() as u64;
+            }
+            let name = OsString::from(format!("{PREFIX}{mark}{random}{SUFFIX}"));
+            // A process that is about to end waits until the new file is listed.
+            let mut unfinished = unfinished();
+            match create(&name) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+                Ok(created) => {
+                    let folder = folder.clone();
+                    unfinished.insert(folder.path().join(&name), folder.clone());
+                    let is_renamed = false;
+                    let name = Self {
+                        folder,
+                        name,
+                        is_renamed,
+                    };
+                    return Ok((name, created));
+                }
+            }
+        }
+        Err(io::Error::from(io::ErrorKind::AlreadyExists))
+    }
+
+    /// Gives the file its final name.
+    fn rename(mut self, to: &OsStr, overwrite: bool) -> io::Result<()> {
+        self.folder.rename(&self.name, to, overwrite)?;
+        self.is_renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for TemporaryName {
     fn drop(&mut self) {
-        unfinished().remove(&self.0);
+        if !self.is_renamed {
+            let _ = self.folder.remove_file(Path::new(&self.name)); // a signal was quicker
+        }
+        unfinished().remove(&self.folder.path().join(&self.name));
     }
 }
 
 /// A guard: while it lives, this process creates no temporary file.
 pub struct NoMoreOutputs {
-    _unfinished: MutexGuard<'static, BTreeSet<PathBuf>>,
+    _unfinished: Unfinished,
 }
 
 /// Removes all temporary files of this process, which is about to end. The returned guard must live until then.
 #[must_use]
 pub fn remove_unfinished() -> NoMoreOutputs {
     let unfinished = unfinished();
-    for path in &*unfinished {
-        let _ = fs::remove_file(path); // it has its name, or its writer was quicker
+    for (path, folder) in &*unfinished {
+        let name = Path::new(path.file_name().unwrap_or_default());
+        let _ = folder.remove_file(name); // it has its name, or its writer was quicker
     }
     NoMoreOutputs {
         _unfinished: unfinished,
@@ -131,43 +249,51 @@ pub fn remove_unfinished() -> NoMoreOutputs {
 /// Removes the temporary files in a directory whose writers were killed. Files that are being written are locked, and
 /// remain.
 pub fn remove_abandoned(directory: &Path) {
-    for path in temporary_files(directory, |_| true) {
-        if File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
-            let _ = fs::remove_file(path); // the next run tries again
-        }
-    }
+    remove_temporary(directory, |folder, name, _| {
+        let file = folder.open_file(name);
+        file.is_ok_and(|file| file.try_lock().is_ok())
+    });
 }
 
 /// Removes the temporary files in a directory that were created with `mark`, whether or not they are locked: locks
 /// have no effect on other machines.
 pub fn remove_marked(directory: &Path, mark: &str) {
-    for path in temporary_files(directory, |name| name.starts_with(mark)) {
-        let _ = fs::remove_file(path); // the next run tries again
+    remove_temporary(directory, |_, _, of_file| of_file.starts_with(mark));
+}
+
+/// Removes those of a directory's temporary files for which `is_removed` is true; it gets the directory, the name and
+/// the mark in the name.
+fn remove_temporary(directory: &Path, is_removed: impl Fn(&Folder, &OsStr, &str) -> bool) {
+    let Ok(folder) = Folder::open(directory) else {
+        return;
+    };
+    for (name, mark) in temporary_files(directory) {
+        if is_removed(&folder, &name, &mark) {
+            let _ = folder.remove_file(Path::new(&name)); // the next run tries again
+        }
     }
 }
 
-/// The files in a directory with names of temporary files and with a mark for which `is_good` is true. Links, pipes
-/// and directories are left out.
-fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+/// The files in a directory with names of temporary files, and the marks in their names. Links, pipes and directories
+/// are left out.
+fn temporary_files(directory: &Path) -> Vec<(OsString, String)> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let temporary = entries.filter(|entry| {
+    let temporary = entries.filter_map(|entry| {
         let name = entry.file_name();
-        let name = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
-        let Some(stem) = name.and_then(|name| name.strip_suffix(SUFFIX)) else {
-            return false;
-        };
+        let stem = name.to_str()?.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
         let (mark, random) = stem.split_at(stem.rfind('-').map_or(0, |at| at + 1));
         // Python's temporary files have eight, underscores among them.
         let is_random = random.len() == RANDOM || !mark.is_empty() && random.len() == 8;
-        is_random
+        let is_temporary = is_random
             && random
                 .bytes()
                 .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
             && (mark.is_empty() || mark.starts_with("shard"))
-            && is_good(mark)
-            && entry.file_type().is_ok_and(|kind| kind.is_file())
+            && entry.file_type().is_ok_and(|kind| kind.is_file());
+        let mark = mark.to_owned();
+        is_temporary.then_some((name, mark))
     });
-    temporary.map(|entry| entry.path()).collect()
+    temporary.collect()
 }
 
 impl Output {
@@ -177,41 +303,56 @@ impl Output {
     /// # Errors
     /// An [`OutputError`]; no file has been changed then.
     pub fn create(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
-        Self::create_marked(path, overwrite, inputs, "")
+        if path.as_os_str() == "-" {
+            let writer = OutputSink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
+            let path = path.to_owned();
+            return Ok(Self { path, writer });
+        }
+        check_target(path, overwrite, inputs)?;
+        let folder = Folder::open(&parent(path)).map_err(|source| OutputError::Write {
+            path: path.to_owned(),
+            source,
+        })?;
+        let name = PathBuf::from(path.file_name().unwrap_or_default());
+        let place = OutputPlace {
+            folder,
+            name,
+            overwrite,
+        };
+        Self::begin(path.to_owned(), place, "")
     }
 
-    /// As [`Output::create`], with a mark in the name of the temporary file, by which [`remove_marked`] finds it.
+    /// As [`Output::create`], of a file below an open directory, and with a mark in the name of the temporary file, by
+    /// which [`remove_marked`] finds it. If the directory was moved or replaced, nothing is written.
     ///
     /// # Errors
     /// An [`OutputError`]; no file has been changed then.
-    pub fn create_marked(
-        path: &Path,
+    pub fn create_in(
+        folder: &Folder,
+        name: &Path,
         overwrite: bool,
-        inputs: &[PathBuf],
         mark: &str,
     ) -> Result<Self, OutputError> {
-        let path = path.to_owned();
-        if path.as_os_str() == "-" {
-            if is_standard_closed() {
-                return Err(OutputError::Closed);
-            }
-            let writer = OutputSink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
-            return Ok(Self { path, writer });
-        }
-        check_target(&path, overwrite, inputs)?;
-        let failed = |source| OutputError::Write {
+        let place = OutputPlace {
+            folder: folder.clone(),
+            name: name.to_owned(),
+            overwrite,
+        };
+        let path = folder.path().join(name);
+        place.parent(&path)?;
+        check_target(&path, overwrite, &[])?;
+        Self::begin(path, place, mark)
+    }
+
+    fn begin(path: PathBuf, place: OutputPlace, mark: &str) -> Result<Self, OutputError> {
+        let parent = place.parent(&path)?;
+        let temporary = Temporary::new(&parent, mark).map_err(|source| OutputError::Write {
             path: path.clone(),
             source,
-        };
-        let temporary = Temporary::new(&parent(&path), mark).map_err(failed)?;
+        })?;
         let temporary = BufWriter::with_capacity(BUFFER, temporary);
-        Ok(Self {
-            path,
-            writer: OutputSink::File {
-                temporary,
-                overwrite,
-            },
-        })
+        let writer = OutputSink::File { temporary, place };
+        Ok(Self { path, writer })
     }
 
     /// Passes everything to the system and frees the buffer, for files that get their names later, together with
@@ -222,17 +363,14 @@ impl Output {
     pub fn settle(self) -> Result<Self, OutputError> {
         let Self { path, writer } = self;
         let writer = match writer {
-            OutputSink::File {
-                temporary,
-                overwrite,
-            } => {
+            OutputSink::File { temporary, place } => {
                 let file = temporary.into_inner().map_err(|e| OutputError::Write {
                     path: path.clone(),
                     source: e.into_error(),
                 })?;
                 OutputSink::File {
                     temporary: BufWriter::with_capacity(0, file),
-                    overwrite,
+                    place,
                 }
             }
             standard @ OutputSink::Standard(_) => standard,
@@ -260,12 +398,10 @@ impl Output {
         };
         match writer {
             OutputSink::Standard(mut writer) => writer.flush().map(|()| None).map_err(named),
-            OutputSink::File {
-                temporary,
-                overwrite,
-            } => {
+            OutputSink::File { temporary, place } => {
                 let temporary = temporary.into_inner().map_err(|e| named(e.into_error()))?;
-                match temporary.persist(&path, overwrite) {
+                let parent = place.parent(&path)?;
+                match temporary.persist(&parent, place.file_name(), place.overwrite) {
                     Ok(file) => Ok(Some(file)),
                     Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                         Err(OutputError::Exists { path: path.clone() })
@@ -282,19 +418,19 @@ enum Temporary {
     /// A file without a name.
     #[cfg(target_os = "linux")]
     Unnamed { file: File, mark: String },
-    /// A file with a temporary name. It is removed before its entry.
-    Named(NamedTempFile, UnfinishedEntry),
+    /// A file with a temporary name.
+    Named { file: File, name: TemporaryName },
 }
 
 impl Temporary {
-    fn new(parent: &Path, mark: &str) -> io::Result<Self> {
+    fn new(parent: &Folder, mark: &str) -> io::Result<Self> {
         #[cfg(target_os = "linux")]
-        if let Some(file) = unnamed_in(parent) {
+        if let Some(file) = parent.create_unnamed() {
             let _ = file.try_lock(); // for the moment between its two names
             let mark = mark.to_owned();
             return Ok(Self::Unnamed { file, mark });
         }
-        remove_abandoned_once(parent);
+        remove_abandoned_once(parent.path());
         named_in(parent, mark)
     }
 
@@ -302,34 +438,30 @@ impl Temporary {
         match self {
             #[cfg(target_os = "linux")]
             Self::Unnamed { file, .. } => file,
-            Self::Named(file, _) => file.as_file_mut(),
+            Self::Named { file, .. } => file,
         }
     }
 
-    fn persist(mut self, path: &Path, overwrite: bool) -> io::Result<File> {
+    fn persist(mut self, parent: &Folder, to: &OsStr, overwrite: bool) -> io::Result<File> {
         self.file().sync_all()?;
         match self {
             #[cfg(target_os = "linux")]
-            Self::Unnamed { file, .. } if !overwrite => link(&file, path).map(|()| file),
-            #[cfg(target_os = "linux")]
             Self::Unnamed { file, mark } => {
-                // Only a file that has a name can replace another one.
-                let prefix = format!("{PREFIX}{mark}");
-                let mut unfinished = unfinished();
-                let named = builder(&prefix).make_in(parent(path), |name| link(&file, name))?;
-                let name = named.path().to_owned();
-                unfinished.insert(name.clone());
-                drop(unfinished);
-                let _listed = UnfinishedEntry(name);
-                named.persist(path).map_err(|error| error.error)?;
-                Ok(file)
+                match name_unnamed(&file, parent, &mark, to, overwrite) {
+                    // Sandboxes and Android forbid links, and without one the file gets no name.
+                    Err(error)
+                        if matches!(
+                            error.kind(),
+                            io::ErrorKind::PermissionDenied | io::ErrorKind::Unsupported
+                        ) =>
+                    {
+                        copied(file, parent, &mark)?.persist(parent, to, overwrite)
+                    }
+                    named => named.map(|()| file),
+                }
             }
-            Self::Named(file, _listed) => {
-                let persisted = match overwrite {
-                    true => file.persist(path),
-                    false => file.persist_noclobber(path),
-                };
-                let file = persisted.map_err(|error| error.error)?;
+            Self::Named { file, name } => {
+                name.rename(to, overwrite)?;
                 // It has a writer still, perhaps, but nobody looks for it any more. Windows lets nobody else
                 // read what is locked.
                 let _ = file.unlock();
@@ -337,6 +469,33 @@ impl Temporary {
             }
         }
     }
+}
+
+/// Names a file that has no name.
+#[cfg(target_os = "linux")]
+fn name_unnamed(
+    file: &File,
+    parent: &Folder,
+    mark: &str,
+    to: &OsStr,
+    overwrite: bool,
+) -> io::Result<()> {
+    if !overwrite {
+        return parent.name_new(file, to);
+    }
+    // Only a file that has a name can replace another one.
+    let create = |name: &OsStr| parent.name_new(file, name);
+    let (name, ()) = TemporaryName::new(parent, mark, create)?;
+    name.rename(to, overwrite)
+}
+
+/// A copy of a file without a name that has a temporary one.
+#[cfg(target_os = "linux")]
+fn copied(mut file: File, parent: &Folder, mark: &str) -> io::Result<Temporary> {
+    let mut copy = named_in(parent, mark)?;
+    io::Seek::rewind(&mut file)?;
+    io::copy(&mut file, copy.file())?;
+    Ok(copy)
 }
 
 impl Write for Temporary {
@@ -349,68 +508,15 @@ impl Write for Temporary {
     }
 }
 
-fn builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix).suffix(SUFFIX).rand_bytes(RANDOM);
-    builder
-}
-
-/// A file without a name; `None` if the file system does not support this, or if the directory has another fault,
-/// which the creation of a named file then reports.
-#[cfg(target_os = "linux")]
-fn unnamed_in(parent: &Path) -> Option<File> {
-    use rustix::fs::{Mode, OFlags, open};
-
-    // As `File::create` does: readable by all, less the umask.
-    let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
-    let file = File::from(open(parent, flags, Mode::from_raw_mode(0o666)).ok()?);
-    fs::symlink_metadata(descriptor(&file))
-        .is_ok()
-        .then_some(file)
-}
-
-/// The path of an open file's descriptor.
-#[cfg(target_os = "linux")]
-fn descriptor(file: &File) -> PathBuf {
-    use std::os::fd::AsRawFd;
-    PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
-}
-
-/// Names a file, if no other file has the name.
-#[cfg(target_os = "linux")]
-fn link(file: &File, path: &Path) -> io::Result<()> {
-    use rustix::fs::{AtFlags, CWD, linkat};
-    linkat(CWD, descriptor(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?;
-    Ok(())
-}
-
 /// A locked file with a temporary name: a process with the lock is still writing; see `remove_abandoned`. On a file
 /// system without locks, such files are not removed.
-fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
-    let prefix = format!("{PREFIX}{mark}");
-    #[cfg_attr(not(unix), expect(unused_mut, reason = "Unix alone has permissions"))]
-    let mut builder = builder(&prefix);
-    #[cfg(unix)]
-    {
-        // As `File::create` does: readable by all, less the umask.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
+fn named_in(parent: &Folder, mark: &str) -> io::Result<Temporary> {
     loop {
-        // A process that is about to end waits until the new file is listed.
-        let mut unfinished = unfinished();
-        let temporary = builder.tempfile_in(parent)?;
-        let path = temporary.path().to_owned();
-        unfinished.insert(path.clone());
-        drop(unfinished);
-        let listed = UnfinishedEntry(path);
+        let (name, file) = TemporaryName::new(parent, mark, |name| parent.create_new(name))?;
         // Whoever looks for abandoned files may have met it before it was locked.
-        let is_locked = matches!(
-            temporary.as_file().try_lock(),
-            Err(fs::TryLockError::WouldBlock)
-        );
-        if !is_locked && is_there(&temporary) {
-            return Ok(Temporary::Named(temporary, listed));
+        let is_locked = matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock));
+        if !is_locked && is_there(&file) {
+            return Ok(Temporary::Named { file, name });
         }
     }
 }
@@ -428,14 +534,14 @@ fn remove_abandoned_once(parent: &Path) {
 }
 
 #[cfg(unix)]
-fn is_there(temporary: &NamedTempFile) -> bool {
+fn is_there(file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;
-    let file = temporary.as_file().metadata();
+    let file = file.metadata();
     file.is_ok_and(|file| file.nlink() > 0)
 }
 
 #[cfg(not(unix))]
-fn is_there(_: &NamedTempFile) -> bool {
+fn is_there(_: &File) -> bool {
     true
 }
 
@@ -499,25 +605,6 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
     }
 }
 
-/// Whether this process was started with its standard output closed. Rust's runtime then opens `/dev/null` in its
-/// place, for reading and writing; redirections to `/dev/null` open it for writing alone.
-#[cfg(target_os = "linux")]
-fn is_standard_closed() -> bool {
-    use rustix::fs::{OFlags, fcntl_getfl, fstat, stat};
-
-    let out = io::stdout();
-    let is_null = fstat(&out)
-        .ok()
-        .zip(stat("/dev/null").ok())
-        .is_some_and(|(out, null)| (out.st_dev, out.st_ino) == (null.st_dev, null.st_ino));
-    is_null && fcntl_getfl(&out).is_ok_and(|flags| flags & OFlags::RWMODE == OFlags::RDWR)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn is_standard_closed() -> bool {
-    false
-}
-
 fn parent(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
@@ -568,17 +655,17 @@ mod tests {
         for name in mine {
             fs::write(directory.path().join(name), "mine").unwrap();
         }
-        let current = named_in(directory.path(), "").unwrap();
+        let folder = Folder::open(directory.path()).unwrap();
+        let current = named_in(&folder, "").unwrap();
         #[cfg_attr(not(target_os = "linux"), allow(irrefutable_let_patterns))]
-        let Temporary::Named(current, _) = &current else {
+        let Temporary::Named { name: current, .. } = &current else {
             panic!("it has a name");
         };
-        let current_name = current.path().file_name().unwrap();
         remove_abandoned(directory.path());
         let left = names(directory.path());
         assert_eq!(left.len(), 4);
         assert!(mine.iter().all(|name| left.contains(&(*name).to_owned())));
-        assert!(left.contains(&current_name.to_str().unwrap().to_owned()));
+        assert!(left.contains(&current.name.to_str().unwrap().to_owned()));
     }
 
     /// Writers and those who look for abandoned files run at once.
@@ -592,11 +679,13 @@ mod tests {
                     remove_abandoned(directory.path());
                 }
             });
+            let folder = Folder::open(directory.path()).unwrap();
             for number in 0..300 {
-                let path = directory.path().join(number.to_string());
-                let mut file = named_in(directory.path(), "").unwrap();
+                let name = number.to_string();
+                let mut file = named_in(&folder, "").unwrap();
                 file.write_all(b"whole").unwrap();
-                file.persist(&path, number % 2 == 0).unwrap();
+                file.persist(&folder, OsStr::new(&name), number % 2 == 0)
+                    .unwrap();
             }
             done.store(true, std::sync::atomic::Ordering::Relaxed);
         });
@@ -606,21 +695,20 @@ mod tests {
     #[test]
     fn marked_files_are_removed_by_their_mark() {
         let directory = tempfile::tempdir().unwrap();
-        let first = named_in(directory.path(), "shard1-").unwrap();
-        let second = named_in(directory.path(), "shard2-").unwrap();
+        let folder = Folder::open(directory.path()).unwrap();
+        let first = named_in(&folder, "shard1-").unwrap();
+        let second = named_in(&folder, "shard2-").unwrap();
         remove_marked(directory.path(), "shard1-");
         if cfg!(unix) {
             assert_eq!(names(directory.path()).len(), 1);
-            assert!(first.persist(&directory.path().join("out"), false).is_err());
+            assert!(first.persist(&folder, OsStr::new("out"), false).is_err());
         } else {
             // Windows keeps the name of an open file until it is closed.
             drop(first);
             remove_marked(directory.path(), "shard1-");
             assert_eq!(names(directory.path()).len(), 1);
         }
-        second
-            .persist(&directory.path().join("out"), false)
-            .unwrap();
+        second.persist(&folder, OsStr::new("out"), false).unwrap();
         assert_eq!(names(directory.path()), ["out"]);
     }
 
@@ -632,7 +720,9 @@ mod tests {
 
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("out");
-        let Some(file) = unnamed_in(directory.path()) else {
+        let folder = Folder::open(directory.path()).unwrap();
+        let out = OsStr::new("out");
+        let Some(file) = folder.create_unnamed() else {
             return; // this file system has none
         };
         let unnamed = |file: File| Temporary::Unnamed {
@@ -642,18 +732,85 @@ mod tests {
         let mut first = unnamed(file);
         first.write_all(b"first").unwrap();
         assert_eq!(names(directory.path()), Vec::<String>::new());
-        first.persist(&path, false).unwrap();
-        let second = || unnamed(unnamed_in(directory.path()).unwrap());
-        let refused = second().persist(&path, false).unwrap_err();
+        first.persist(&folder, out, false).unwrap();
+        let second = || unnamed(folder.create_unnamed().unwrap());
+        let refused = second().persist(&folder, out, false).unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&path).unwrap(), b"first");
-        second().persist(&path, true).unwrap();
+        second().persist(&folder, out, true).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"");
         assert_eq!(names(directory.path()), ["out"]);
         let created = directory.path().join("created");
         File::create(&created).unwrap();
         let mode = |path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&path), mode(&created));
+    }
+
+    /// Catches outputs that are named by a path that leads elsewhere by then.
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_a_link_in_the_place_of_the_directory() {
+        for (overwrite, is_deep) in [(false, false), (true, false), (false, true), (true, true)] {
+            let directory = tempfile::tempdir().unwrap();
+            let [path, moved, foreign] =
+                ["out", "moved", "foreign"].map(|name| directory.path().join(name));
+            fs::create_dir_all(path.join("deep")).unwrap();
+            fs::create_dir_all(foreign.join("deep")).unwrap();
+            fs::write(foreign.join("file"), "theirs").unwrap();
+            fs::write(foreign.join("deep/file"), "theirs").unwrap();
+            let folder = Folder::open(&path).unwrap();
+            let name = Path::new(if is_deep { "deep/file" } else { "file" });
+            let begin = || {
+                let mut output = Output::create_in(&folder, name, overwrite, "").unwrap();
+                output.write_all(b"ours").unwrap();
+                output
+            };
+            let alone = Output::create(&path.join(name), overwrite, &[]).unwrap();
+            let named = Output {
+                writer: OutputSink::File {
+                    temporary: BufWriter::new(named_in(&folder, "").unwrap()),
+                    place: OutputPlace {
+                        folder: folder.clone(),
+                        name: name.to_owned(),
+                        overwrite,
+                    },
+                },
+                path: path.join(name),
+            };
+            let waiting = [begin(), alone, named];
+            fs::rename(&path, &moved).unwrap();
+            std::os::unix::fs::symlink(&foreign, &path).unwrap();
+            for output in waiting {
+                let refused = output.commit().unwrap_err();
+                assert!(matches!(refused, OutputError::Moved { .. }), "{refused}");
+            }
+            let refused = Output::create_in(&folder, name, overwrite, "").err();
+            assert!(matches!(refused, Some(OutputError::Moved { .. })));
+            let all = |path: &Path| {
+                let mut all = names(path);
+                all.sort();
+                all
+            };
+            assert_eq!(all(&moved), ["deep"]);
+            assert_eq!(all(&foreign), ["deep", "file"]);
+            assert_eq!(fs::read(foreign.join(name)).unwrap(), b"theirs");
+        }
+    }
+
+    /// As where a sandbox forbids links.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_that_cannot_be_linked_is_copied() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = Folder::open(directory.path()).unwrap();
+        let Some(mut file) = folder.create_unnamed() else {
+            return; // this file system has none
+        };
+        file.write_all(b"whole").unwrap();
+        let copy = copied(file, &folder, "").unwrap();
+        copy.persist(&folder, OsStr::new("out"), false).unwrap();
+        assert_eq!(fs::read(directory.path().join("out")).unwrap(), b"whole");
+        assert_eq!(names(directory.path()), ["out"]);
     }
 
     #[test]

@@ -73,8 +73,12 @@ impl Instance {
         }
         let has_extension = |layer: Option<&CStr>, name: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
-            let found = unsafe { entry.enumerate_instance_extension_properties(layer) }
-                .named("vkEnumerateInstanceExtensionProperties")?;
+            let found = unsafe { entry.enumerate_instance_extension_properties(layer) };
+            // So loaders say that a driver's manifest (VK_DRIVER_FILES) is no JSON.
+            if found.as_ref().err() == Some(&vk::Result::ERROR_OUT_OF_HOST_MEMORY) {
+                return Err(VulkanError::NoDevice);
+            }
+            let found = found.named("vkEnumerateInstanceExtensionProperties")?;
             let mut found = found.iter();
             Ok(found.any(|extension| extension.extension_name_as_c_str() == Ok(name)))
         };

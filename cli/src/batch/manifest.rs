@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tumble_formats::beneath::parent_beneath;
-use tumble_formats::output::Output;
+use tumble_formats::folder::Folder;
+use tumble_formats::output::{Output, OutputError};
 
 use crate::batch::digest;
 use crate::batch::entry::{
@@ -27,13 +28,15 @@ use crate::batch::entry::{
 };
 use crate::batch::owner::Owner;
 use crate::batch::shards::{plan::RecordedPlan, record};
-use crate::batch::target::WrittenFile;
+use crate::batch::target::{self, WrittenFile};
 use crate::messages::exit::{Failure, OUTPUT};
 use crate::messages::{names, words};
 
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
+    /// The directory, which stays open: whatever is put in its place meanwhile is not written into.
+    opened: Folder,
     previous: Arc<BTreeMap<String, ManifestEntry>>,
     /// The results of inputs that earlier batches have not finished.
     unfinished: Arc<BTreeSet<String>>,
@@ -68,13 +71,13 @@ pub(crate) struct ManifestOptions {
 }
 
 /// Locks a directory of results; `None` where the system or the file system has no such locks.
-pub(crate) fn lock(folder: &Path) -> Result<Option<File>, Failure> {
-    let Ok(file) = File::open(folder) else {
+pub(crate) fn lock(folder: &Folder) -> Result<Option<File>, Failure> {
+    let Ok(file) = folder.to_lock() else {
         return Ok(None);
     };
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
-            let folder = folder.display();
+            let folder = folder.path().display();
             let message = format!("{folder}: another tumble is writing into it; wait for it");
             Err(Failure::new(OUTPUT, message))
         }
@@ -90,7 +93,8 @@ impl Manifest {
             overwrite,
             prune,
         } = options;
-        let lock = lock(folder)?;
+        let opened = target::opened(folder)?;
+        let lock = lock(&opened)?;
         let mut bytes = Vec::new();
         let exists = match entry::open(folder) {
             Ok(None) => false,
@@ -115,6 +119,7 @@ impl Manifest {
         }
         Ok(Self {
             folder: folder.to_owned(),
+            opened,
             unfinished: Arc::new(lines.unfinished()),
             previous: Arc::new(lines.entries),
             added: BTreeMap::new(),
@@ -127,6 +132,11 @@ impl Manifest {
             has_shards,
             _lock: lock,
         })
+    }
+
+    /// Its directory.
+    pub(crate) fn folder(&self) -> &Folder {
+        &self.opened
     }
 
     /// The directories of its results, if they are below its own.
@@ -192,6 +202,7 @@ impl Manifest {
     fn finish(mut self) -> Result<(), Failure> {
         // Windows replaces no file that is open.
         self.journal = None;
+        self.check_in_place()?;
         let orphans = self.orphans();
         let pruned = match self.prune {
             true => self.remove(&orphans)?,
@@ -262,16 +273,15 @@ impl Manifest {
             );
             match whole {
                 Ok(true) => {
-                    let parent = parent_beneath(&self.folder, Path::new(output));
-                    let removal = parent.and_then(|parent| {
-                        std::fs::remove_file(&path)?;
-                        Ok(parent)
-                    });
-                    let mut parent =
-                        removal.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
+                    let removed = self.opened.remove_file(Path::new(output));
+                    removed.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
                     // The first that is not empty stays, and those above it.
-                    while parent != self.folder && std::fs::remove_dir(&parent).is_ok() {
-                        parent.pop();
+                    let parents = Path::new(output).ancestors().skip(1);
+                    let mut parents = parents.filter(|parent| parent.file_name().is_some());
+                    while parents
+                        .next()
+                        .is_some_and(|parent| self.opened.remove_folder(parent).is_ok())
+                    {
                     }
                     words::note(&format!("{shown}: removed; its input is gone"));
                 }
@@ -290,8 +300,7 @@ impl Manifest {
 
     /// Replaces the file whole, without the lines of some results; gives it, open at its end.
     fn replace(&self, without: &BTreeSet<String>) -> Result<Option<File>, Failure> {
-        let path = self.folder.join(NAME);
-        let output = Output::create(&path, self.exists, &[]);
+        let output = Output::create_in(&self.opened, Path::new(NAME), self.exists, "");
         let mut output = output.map_err(|error| Failure::output(&error))?;
         let results = self.results().into_values();
         let results = results.filter(|entry| !without.contains(&entry.output));
@@ -310,8 +319,19 @@ impl Manifest {
     /// Removes the record of shards: the manifest has their lines.
     fn forget_shards(&self) -> Result<(), Failure> {
         match self.has_shards {
-            true => RecordedPlan::remove(&self.folder),
+            true => RecordedPlan::remove(&self.opened),
             false => Ok(()),
+        }
+    }
+
+    /// Refuses to go on if the directory was moved or replaced: its results are not where they are looked for.
+    fn check_in_place(&self) -> Result<(), Failure> {
+        match self.opened.is_in_place() {
+            true => Ok(()),
+            false => Err(Failure::output(&OutputError::Moved {
+                path: self.folder.join(NAME),
+                folder: self.folder.clone(),
+            })),
         }
     }
 

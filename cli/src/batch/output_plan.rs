@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use tumble_formats::beneath::parent_beneath;
+use tumble_formats::folder::Folder;
 use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
 
@@ -145,7 +145,7 @@ fn in_folder(
     for name in names.iter().flatten().filter(|name| !overwrites(name)) {
         refuse_existing(folder, name, is_known(name))?;
     }
-    let mut result_folder = ResultFolder::new(folder);
+    let mut result_folder = ResultFolder::new(manifest.folder());
     let mut plan = OutputPlan::default();
     let mut replaced = ReplacedOwners::default();
     for (found, name) in files.iter().zip(names) {
@@ -169,9 +169,10 @@ fn in_folder(
     }
     replaced.note();
     // Locked files are being written: they are kept.
-    result_folder.made.extend(manifest.folders());
-    result_folder.made.insert(folder.to_owned());
-    for folder in &result_folder.made {
+    let mut folders = result_folder.made;
+    folders.extend(manifest.folders());
+    folders.insert(folder.to_owned());
+    for folder in &folders {
         remove_abandoned(folder);
     }
     plan.skipped.clone_from(&inputs.skipped);
@@ -262,13 +263,13 @@ fn refuse_shards(
 
 /// A directory of results. It makes the subdirectories of results, and refuses links.
 pub(crate) struct ResultFolder<'a> {
-    folder: &'a Path,
+    folder: &'a Folder,
     /// The subdirectories made so far.
     pub(crate) made: BTreeSet<PathBuf>,
 }
 
 impl<'a> ResultFolder<'a> {
-    pub(crate) fn new(folder: &'a Path) -> Self {
+    pub(crate) fn new(folder: &'a Folder) -> Self {
         Self {
             folder,
             made: BTreeSet::new(),
@@ -281,17 +282,16 @@ impl<'a> ResultFolder<'a> {
         name: &str,
         overwrite: bool,
     ) -> Result<Destination, Failure> {
-        let path = self.folder.join(name);
-        let parent = path.parent().unwrap_or(self.folder);
+        let path = self.folder.path().join(name);
+        let parent = path.parent().unwrap_or(self.folder.path());
         if !self.made.contains(parent) {
-            let parent = parent_beneath(self.folder, Path::new(name)).map_err(|error| {
+            let made = self.folder.create_parent_of(Path::new(name));
+            made.map_err(|error| {
                 let shown = path.display();
                 Failure::usage(format!("{shown}: its directory cannot be used: {error}"))
             })?;
-            std::fs::create_dir_all(&parent)
-                .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
-            self.made.insert(parent);
+            self.made.insert(parent.to_owned());
         }
-        Destination::new(&path, overwrite, &[])
+        Destination::below(self.folder, Path::new(name), overwrite, &[])
     }
 }

@@ -646,7 +646,10 @@ impl BatchRecords<'_> {
             one_of: (name != whole).then(|| (whole.to_owned(), clips)),
             warnings,
         };
-        self.records.keep(entry, result.written)?;
+        let kept = self.records.keep(entry, result.written);
+        kept.inspect_err(|_| {
+            self.made.remove(name);
+        })?;
         if let Some(line) = self.summary.result(&result.message) {
             self.records.tell(line);
         }

@@ -10,6 +10,7 @@ use glam::Quat;
 use tumble::{Chunk, Encoding, Error};
 use tumble_formats::Diagnostic;
 use tumble_formats::end_frame::EndRows;
+use tumble_formats::folder::Folder;
 use tumble_formats::format::{
     Document, Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
@@ -146,7 +147,7 @@ impl ResultTarget {
     pub(crate) fn of_clip(&self, clip: &str) -> Result<Self, Failure> {
         let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
         let name = with(Path::new(&self.name));
-        let destination = self.destination.renamed(&with(self.destination.path()))?;
+        let destination = self.destination.renamed(with)?;
         Ok(Self::new(
             destination,
             self.format,
@@ -370,6 +371,9 @@ impl fmt::Display for ResultTarget {
 #[derive(Debug, Clone)]
 pub(crate) struct Destination {
     path: PathBuf,
+    /// The open directory that it is below, and its path in it. `None` for a single file, whose directory is opened
+    /// when its writing begins.
+    below: Option<(Folder, PathBuf)>,
     overwrite: bool,
     /// Files that it must not replace.
     inputs: Vec<PathBuf>,
@@ -425,10 +429,26 @@ impl Destination {
         }
         Ok(Self {
             path: path.to_owned(),
+            below: None,
             overwrite,
             inputs: inputs.to_vec(),
             hashed: false,
             mark: String::new(),
+        })
+    }
+
+    /// As [`Destination::new`], of one of the files below an open directory: if another directory or a link is put in
+    /// its place, nothing is written there.
+    pub(crate) fn below(
+        folder: &Folder,
+        name: &Path,
+        overwrite: bool,
+        inputs: &[PathBuf],
+    ) -> Result<Self, Failure> {
+        let destination = Self::new(&folder.path().join(name), overwrite, inputs)?;
+        Ok(Self {
+            below: Some((folder.clone(), name.to_owned())),
+            ..destination
         })
     }
 
@@ -467,13 +487,18 @@ impl Destination {
         ))
     }
 
-    /// The same destination with another name.
-    pub(crate) fn renamed(&self, path: &Path) -> Result<Self, Failure> {
-        let destination = Self::new(path, self.overwrite, &self.inputs)?;
+    /// The same destination with another name, which `rename` gives it.
+    pub(crate) fn renamed(&self, rename: impl Fn(&Path) -> PathBuf) -> Result<Self, Failure> {
+        let renamed = match &self.below {
+            Some((folder, name)) => {
+                Self::below(folder, &rename(name), self.overwrite, &self.inputs)
+            }
+            None => Self::new(&rename(&self.path), self.overwrite, &self.inputs),
+        };
         Ok(Self {
             hashed: self.hashed,
             mark: self.mark.clone(),
-            ..destination
+            ..renamed?
         })
     }
 
@@ -506,8 +531,11 @@ impl Destination {
     }
 
     fn open(&self) -> Result<Output, Failure> {
-        Output::create_marked(&self.path, self.overwrite, &self.inputs, &self.mark)
-            .map_err(|error| Failure::output(&error))
+        let opened = match &self.below {
+            Some((folder, name)) => Output::create_in(folder, name, self.overwrite, &self.mark),
+            None => Output::create(&self.path, self.overwrite, &self.inputs),
+        };
+        opened.map_err(|error| Failure::output(&error))
     }
 
     /// Runs `write`; a file appears under its name once it is whole.
@@ -587,6 +615,20 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Opens a directory of results, creating it if there is none.
+pub(crate) fn open_folder(path: &Path) -> Result<Folder, Failure> {
+    create_folder(path)?;
+    opened(path)
+}
+
+/// Opens a directory of results that exists.
+pub(crate) fn opened(path: &Path) -> Result<Folder, Failure> {
+    Folder::open(path).map_err(|error| {
+        let path = path.display();
+        Failure::new(OUTPUT, format!("{path}: cannot be opened: {error}"))
+    })
 }
 
 /// A progress bar, and by how much bytes advance it.

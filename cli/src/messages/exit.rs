@@ -119,7 +119,7 @@ impl Failure {
             OutputError::Write { path, source } => {
                 Self::writing(&path.display().to_string(), source)
             }
-            OutputError::Closed => Self::new(OUTPUT, error.to_string()),
+            OutputError::Moved { .. } => Self::new(OUTPUT, error.to_string()),
             OutputError::NoDirectory { .. } => Self {
                 is_of_one: true,
                 ..Self::new(OUTPUT, error.to_string())

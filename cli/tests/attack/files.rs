@@ -1,11 +1,13 @@
 //! Nothing that is somebody's is lost, and nothing leaves its folder.
 
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Stdio;
 
-use crate::attack::{entries, line, pipe, run, succeed, two_animations};
-use crate::program::sample_folder;
+use crate::attack::{ended, entries, line, pipe, run, succeed, two_animations};
+use crate::program::{command, sample_folder};
 use crate::tree::tree;
 
 const BATCH: [&str; 5] = ["eval", "a.dat", "b.dat", "-o", "out"];
@@ -98,6 +100,74 @@ fn a_manifest_that_is_a_link_a_pipe_or_a_directory_is_refused() {
             ours,
             "{kind}"
         );
+    }
+}
+
+/// While the program waits for a named pipe, its directory of results, or one below it, is renamed, and a link to
+/// another one put in its place: the other one is not written into, and no manifest in it is replaced.
+#[test]
+fn another_directory_in_the_place_of_that_of_the_results_is_not_written_into() {
+    let commands: [(&[&str], &str); 9] = [
+        (&["eval"], "out"),
+        (&["eval"], "out/deep"),
+        (&["eval", "--overwrite"], "out"),
+        (&["eval", "--overwrite", "--prune"], "out/deep"),
+        (&["convert", "--format", "csv"], "out"),
+        (&["convert", "--format", "csv", "--overwrite"], "out/deep"),
+        (&["eval", "--shard", "1/1", "--overwrite"], "out"),
+        (&["eval", "--shard", "1/1", "--overwrite"], "out/deep"),
+        (&["plot", "--overwrite"], "out"),
+    ];
+    for (words, swapped) in commands {
+        let temporary = sample_folder();
+        let folder = temporary.path();
+        let keys = fs::read(folder.join("b.dat")).unwrap();
+        fs::create_dir_all(folder.join("in/deep")).unwrap();
+        fs::copy(folder.join("a.dat"), folder.join("in/deep/a.dat")).unwrap();
+        let late = folder.join("in/deep/late.dat");
+        pipe(&late);
+        let foreign = folder.join("foreign");
+        fs::create_dir_all(foreign.join("deep")).unwrap();
+        for name in ["manifest.jsonl", "a.npy", "late.npy", "late.csv"] {
+            fs::write(foreign.join(name), "theirs").unwrap();
+            fs::write(foreign.join("deep").join(name), "theirs").unwrap();
+        }
+        let before = tree(&foreign);
+        let line = with(words, &["in", "--pipes", "-o", "out"]);
+        let [place, moved] = [swapped, "out-moved"].map(|name| folder.join(name));
+        let swap = std::thread::spawn({
+            let (late, place, moved, foreign) =
+                (late.clone(), place.clone(), moved.clone(), foreign.clone());
+            move || {
+                // Opening it waits for its reader: by then the directory of results is open.
+                let mut writer = fs::File::options().write(true).open(late).unwrap();
+                fs::rename(&place, &moved).unwrap();
+                symlink(&foreign, &place).unwrap();
+                writer.write_all(&keys).unwrap();
+            }
+        });
+        let mut program = command(folder, &line);
+        let run = ended(program.stdout(Stdio::piped()).stderr(Stdio::piped()));
+        swap.join().unwrap();
+        assert_eq!(tree(&foreign), before, "{line:?}: {}", run.words);
+        assert_eq!(run.code, 7, "{line:?}: {}", run.words);
+        let said = run.words.matches("was moved or replaced meanwhile").count();
+        assert_eq!(said, 1, "{line:?}: {}", run.words);
+        if words[0] == "plot" {
+            continue;
+        }
+        // Put back, it is continued.
+        fs::remove_file(&place).unwrap();
+        fs::rename(&moved, &place).unwrap();
+        fs::remove_file(&late).unwrap();
+        fs::copy(folder.join("b.dat"), &late).unwrap();
+        let again = line.iter().filter(|&&word| word != "--overwrite");
+        let again: Vec<&str> = again.copied().chain(["--resume"]).collect();
+        succeed(folder, &again);
+        if words.contains(&"--shard") {
+            succeed(folder, &["merge", "out"]);
+        }
+        succeed(folder, &["check", "out"]);
     }
 }
 

@@ -38,7 +38,7 @@ fn refusal<T>(length: usize, read: impl FnOnce() -> Result<T, Diagnostic>) -> Di
 }
 
 /// A glTF file of these parts, whose only buffer has these bytes.
-fn gltf(buffer: &[u8], parts: &str) -> Vec<u8> {
+pub(crate) fn gltf(buffer: &[u8], parts: &str) -> Vec<u8> {
     let data = BASE64_STANDARD.encode(buffer);
     let length = buffer.len();
     format!(
@@ -53,7 +53,7 @@ fn list(count: usize, entry: impl Fn(usize) -> String) -> String {
 }
 
 /// Times from 0 on, then a rotation for each.
-fn keys(count: usize) -> Vec<u8> {
+pub(crate) fn keys(count: usize) -> Vec<u8> {
     let times = (0..count).flat_map(|key| (key as f32).to_le_bytes());
     let unit = [0.0f32, 0.0, 0.0, 1.0].map(f32::to_le_bytes).concat();
     times.chain(unit.repeat(count)).collect()

@@ -10,8 +10,12 @@ use peak_alloc::PeakAlloc;
 mod bombs;
 #[path = "../../../formats/tests/cases.rs"]
 mod cases;
+mod growth;
 #[cfg(target_arch = "x86_64")]
 mod instructions;
+#[path = "../../../formats/tests/mcap/log.rs"]
+#[expect(dead_code, reason = "no log is interrupted here")]
+mod log;
 mod memory;
 
 #[global_allocator]

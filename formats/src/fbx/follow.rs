@@ -62,11 +62,22 @@ pub(super) enum FollowedKeys {
     Cubic(Vec<(f64, ChannelValue, [ChannelValue; 2])>),
 }
 
+/// Why a node cannot be followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unfollowed {
+    /// Its transform at this time has a number that is not finite.
+    NotFinite { time: f64 },
+    /// Its curves would be evaluated more often than a file of its length allows.
+    TooMuchWork,
+    /// A channel takes more than [`max_keys`](ChannelFollower::max_keys).
+    TooManyKeys,
+}
+
 /// Follows one channel.
 pub(super) struct ChannelFollower<'a> {
     pub(super) kind: ChannelKind,
     /// The value of the channel at a time of the file.
-    pub(super) value: &'a dyn Fn(f64) -> Option<ChannelValue>,
+    pub(super) value: &'a dyn Fn(f64) -> Result<ChannelValue, Unfollowed>,
     /// The rate of the file; intervals are divided on its frames.
     pub(super) rate: Option<FrameRate>,
     /// Whether keys are added only where rotations need them.
@@ -114,13 +125,15 @@ impl Cubic {
 
 impl ChannelFollower<'_> {
     /// The keys for a channel with these stops, whose values at the thirds between them are known, and whether the
-    /// keys follow the channel everywhere. `None` if the channel cannot be evaluated so often, or if it takes more keys
-    /// than [`max_keys`](Self::max_keys).
+    /// keys follow the channel everywhere.
+    ///
+    /// # Errors
+    /// When the channel cannot be evaluated, or when it takes more keys than [`max_keys`](Self::max_keys).
     pub(super) fn keys(
         &self,
         stops: &[KeyStop],
         thirds: &[[ChannelValue; 2]],
-    ) -> Option<(FollowedKeys, bool)> {
+    ) -> Result<(FollowedKeys, bool), Unfollowed> {
         let first = stops[0].at;
         let each = stops
             .iter()
@@ -133,12 +146,12 @@ impl ChannelFollower<'_> {
         let still = 1e-9 * largest.max(1e-9);
         let is_still = |value: ChannelValue| (value - first).abs().max_element() <= still;
         if stops.len() == 1 || all.clone().all(is_still) && self.stays_between(stops)? {
-            return Some((FollowedKeys::Rest(first), true));
+            return Ok((FollowedKeys::Rest(first), true));
         }
         if let Some(steps) = steps(stops, thirds)
             && self.stays_between(stops)?
         {
-            return Some((FollowedKeys::Step(steps), true));
+            return Ok((FollowedKeys::Step(steps), true));
         }
         let bound = match self.kind {
             ChannelKind::Rotation => BOUND,
@@ -146,7 +159,7 @@ impl ChannelFollower<'_> {
         };
         let (stops, pieces) = self.pieces(stops, thirds);
         if self.keyframes {
-            return Some((
+            return Ok((
                 FollowedKeys::Linear(self.linear_keys(&stops, &pieces)?),
                 true,
             ));
@@ -156,24 +169,24 @@ impl ChannelFollower<'_> {
             are_lines = are_lines && self.is_line(piece, bound)?;
         }
         match are_lines {
-            true => Some((FollowedKeys::Linear(stops), true)),
+            true => Ok((FollowedKeys::Linear(stops), true)),
             false => self.cubics(&stops, &pieces, bound),
         }
     }
 
     /// Whether a rotation that is the same at the ends and the thirds of each interval is also the same between them.
-    fn stays_between(&self, stops: &[KeyStop]) -> Option<bool> {
+    fn stays_between(&self, stops: &[KeyStop]) -> Result<bool, Unfollowed> {
         if self.kind == ChannelKind::Vector {
-            return Some(true);
+            return Ok(true);
         }
         for pair in stops.windows(2) {
             let [from, to] = [pair[0].file, pair[1].file];
             let middle = (self.value)(from + BETWEEN * (to - from))?;
             if self.off(pair[0].after, middle) > BOUND {
-                return Some(false);
+                return Ok(false);
             }
         }
-        Some(true)
+        Ok(true)
     }
 
     /// The stops as keys with continued signs, a stop at a jump as two keys; and the intervals between them, `None`
@@ -241,11 +254,11 @@ impl ChannelFollower<'_> {
         }
     }
 
-    fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Option<bool> {
+    fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
         // Of half a turn an arc may go either way.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
-            return Some(false);
+            return Ok(false);
         }
         let at = |u: f64| match self.kind {
             ChannelKind::Vector => p.lerp(q, u),
@@ -264,10 +277,10 @@ impl ChannelFollower<'_> {
             .into_iter()
             .any(|(u, exact)| self.off(at(u), exact) > bound)
         {
-            return Some(false);
+            return Ok(false);
         }
         let middle = BETWEEN;
-        Some(self.off(at(middle), (self.value)(piece.time(middle))?) <= bound)
+        Ok(self.off(at(middle), (self.value)(piece.time(middle))?) <= bound)
     }
 
     /// Keys with tangents that follow all intervals.
@@ -276,7 +289,7 @@ impl ChannelFollower<'_> {
         stops: &[(f64, ChannelValue)],
         pieces: &[Option<FollowedInterval>],
         bound: f64,
-    ) -> Option<(FollowedKeys, bool)> {
+    ) -> Result<(FollowedKeys, bool), Unfollowed> {
         let mut keys = vec![(stops[0].0, stops[0].1, [ChannelValue::ZERO; 2])];
         let mut is_whole = true;
         let mut open: Vec<FollowedInterval> = Vec::new();
@@ -304,12 +317,12 @@ impl ChannelFollower<'_> {
                 let [leaves, arrives] = cubic.tangents.map(|tangent| tangent / seconds);
                 keys[last].2[1] = leaves;
                 if keys.len() >= self.max_keys {
-                    return None;
+                    return Err(Unfollowed::TooManyKeys);
                 }
                 keys.push((piece.clip[1], piece.ends[1], [arrives, ChannelValue::ZERO]));
             }
         }
-        Some((FollowedKeys::Cubic(keys), is_whole))
+        Ok((FollowedKeys::Cubic(keys), is_whole))
     }
 
     /// The stops, and as many keys between them as are needed for arcs that follow the channel.
@@ -317,7 +330,7 @@ impl ChannelFollower<'_> {
         &self,
         stops: &[(f64, ChannelValue)],
         pieces: &[Option<FollowedInterval>],
-    ) -> Option<Vec<(f64, ChannelValue)>> {
+    ) -> Result<Vec<(f64, ChannelValue)>, Unfollowed> {
         let mut keys = vec![stops[0]];
         let mut open: Vec<FollowedInterval> = Vec::new();
         for (piece, &stop) in pieces.iter().zip(&stops[1..]) {
@@ -340,12 +353,12 @@ impl ChannelFollower<'_> {
                     continue;
                 }
                 if keys.len() >= self.max_keys {
-                    return None;
+                    return Err(Unfollowed::TooManyKeys);
                 }
                 keys.push((piece.clip[1], q));
             }
         }
-        Some(keys)
+        Ok(keys)
     }
 
     /// An interval whose signs continue those of the key before it.
@@ -359,12 +372,12 @@ impl ChannelFollower<'_> {
         }
     }
 
-    /// Divides an interval in two, the later one first; `Some(None)` if it cannot be divided any more.
-    fn cut(&self, piece: &FollowedInterval) -> Option<Option<[FollowedInterval; 2]>> {
+    /// Divides an interval in two, the later one first; `None` if it cannot be divided any more.
+    fn cut(&self, piece: &FollowedInterval) -> Result<Option<[FollowedInterval; 2]>, Unfollowed> {
         let [from, to] = piece.file;
         let length = to - from;
         if piece.cuts >= MAX_CUTS || length < 1e-7 {
-            return Some(None);
+            return Ok(None);
         }
         let middle = f64::midpoint(from, to);
         let frame = self.rate.map(|rate| frame_time(rate, 0.0, middle));
@@ -378,7 +391,7 @@ impl ChannelFollower<'_> {
         let value = (self.value)(time)?;
         let half = |file: [f64; 2], clip, ends| {
             let third = |u: f64| (self.value)(file[0] + u * (file[1] - file[0]));
-            Some(FollowedInterval {
+            Ok(FollowedInterval {
                 file,
                 clip,
                 ends,
@@ -386,7 +399,7 @@ impl ChannelFollower<'_> {
                 cuts: piece.cuts + 1,
             })
         };
-        Some(Some([
+        Ok(Some([
             half([time, to], [clip, piece.clip[1]], [value, piece.ends[1]])?,
             half([from, time], [piece.clip[0], clip], [piece.ends[0], value])?,
         ]))
@@ -454,7 +467,7 @@ mod tests {
         let thirds: Vec<_> = times.windows(2).map(third).collect();
         let follow = ChannelFollower {
             kind,
-            value: &|time| Some(curve(time)),
+            value: &|time| Ok(curve(time)),
             rate: FrameRate::new(24, 1).ok(),
             keyframes,
             max_keys: usize::MAX,
@@ -532,7 +545,7 @@ mod tests {
             at: ChannelValue::X * at,
             after: ChannelValue::X * after,
         };
-        let held = |time: f64| Some(ChannelValue::X * if time < 1.0 { 1.0 } else { 2.0 });
+        let held = |time: f64| Ok(ChannelValue::X * if time < 1.0 { 1.0 } else { 2.0 });
         let mut follow = ChannelFollower {
             kind: ChannelKind::Vector,
             value: &held,
@@ -551,7 +564,7 @@ mod tests {
         let found = follow.keys(&stops, &thirds).unwrap();
         assert_eq!(found, (FollowedKeys::Step(keys.to_vec()), true));
         // Straight up to 1, where it falls to 0, and stays.
-        let saw = |time: f64| Some(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
+        let saw = |time: f64| Ok(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
         follow.value = &saw;
         let stops = [
             stop(0.0, 0.0, 0.0, 0.0),

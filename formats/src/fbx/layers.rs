@@ -10,6 +10,9 @@ use ufbx::{
     RotationOrder, Scene,
 };
 
+use crate::budget::{Budget, OverBudget};
+use crate::fbx::times::inherits_scale;
+
 /// The property that the weight of a layer scales.
 const TRANSLATION: &str = "Lcl Translation";
 
@@ -22,9 +25,49 @@ pub(super) struct StackLayers {
     audible_anim: Option<AnimRoot>,
     /// The same, in which nodes of the spheric order have the order XYZ; `None` if there are no such nodes.
     spheric_anim: Option<AnimRoot>,
-    /// By the index of the node: the layers with curves of its translation, and the index of the property in each. Only
-    /// nodes that a layer overrides with a weight below 1.
-    weighted: HashMap<usize, Vec<(usize, usize)>>,
+    /// The animations of some of these layers, for nodes that the others do not move: each layer of an animation costs
+    /// time at every evaluation.
+    partial: Vec<LayerAnim>,
+    /// By the index of the node: the index of its animation in `partial`.
+    partial_of: HashMap<usize, usize>,
+    /// By the index of the node: the layers with curves of its translation. Only nodes that a layer overrides with a
+    /// weight below 1.
+    weighted: HashMap<usize, Vec<WeightedLayer>>,
+}
+
+/// The animation of some layers.
+struct LayerAnim {
+    anim: AnimRoot,
+    layers: usize,
+}
+
+/// A layer with curves of the translation of a node.
+struct WeightedLayer {
+    /// Index in the stack.
+    layer: usize,
+    /// Index of the translation among the animated properties of the layer.
+    translation: usize,
+    /// The same of the layer's weight, if that is animated.
+    weight: Option<usize>,
+}
+
+/// Why the layers of a stack cannot be evaluated.
+pub(super) enum LayerFault {
+    /// The library refuses them.
+    Ufbx(Box<ufbx::Error>),
+    Memory(OverBudget),
+}
+
+impl From<Box<ufbx::Error>> for LayerFault {
+    fn from(error: Box<ufbx::Error>) -> Self {
+        Self::Ufbx(error)
+    }
+}
+
+impl From<OverBudget> for LayerFault {
+    fn from(error: OverBudget) -> Self {
+        Self::Memory(error)
+    }
 }
 
 /// Whether a layer is muted.
@@ -77,8 +120,12 @@ pub(super) fn without_spheric_orders(
 
 impl StackLayers {
     /// # Errors
-    /// When the library has no memory.
-    pub(super) fn of(scene: &Scene, stack: &AnimStack) -> Result<Self, Box<ufbx::Error>> {
+    /// When the library has no memory, or when the budget has none.
+    pub(super) fn of(
+        scene: &Scene,
+        stack: &AnimStack,
+        budget: &Budget,
+    ) -> Result<Self, LayerFault> {
         let layers = || stack.layers.iter().enumerate();
         let audible: Vec<usize> = layers()
             .filter(|(_, layer)| !is_muted(layer))
@@ -92,52 +139,110 @@ impl StackLayers {
         };
         let mut found = Self::default();
         if audible.len() < stack.layers.len() {
-            let options = AnimOpts {
-                layer_ids: ids().into(),
-                ..AnimOpts::default()
-            };
-            found.audible_anim = Some(ufbx::create_anim(scene, options)?);
+            found.audible_anim = Some(anim_of(scene, ids())?);
         }
         if scene.nodes.iter().any(|node| is_spheric(node)) {
             found.spheric_anim = Some(without_spheric_orders(scene, ids())?);
         }
         found.audible = audible;
+        found.find_partial(scene, stack, budget)?;
         found.find_weighted(stack);
         Ok(found)
     }
 
-    fn find_weighted(&mut self, stack: &AnimStack) {
-        let mut translations: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
+    /// Finds the nodes that some of the layers do not move, and makes their animations.
+    fn find_partial(
+        &mut self,
+        scene: &Scene,
+        stack: &AnimStack,
+        budget: &Budget,
+    ) -> Result<(), LayerFault> {
+        if self.audible.len() < 2 {
+            return Ok(());
+        }
+        let mut layers_of: Vec<Vec<u32>> = vec![Vec::new(); scene.nodes.len()];
+        budget.take(layers_of.len(), size_of::<Vec<u32>>())?;
         for &index in &self.audible {
-            let properties = stack.layers[index].anim_props.iter().enumerate();
-            for (position, property) in properties {
+            let layer = &stack.layers[index];
+            for property in layer.anim_props.iter() {
+                let id = layer.element.typed_id;
+                if property.element.type_ == ElementType::Node
+                    && let Some(layers) = layers_of.get_mut(property.element.typed_id as usize)
+                    && layers.last() != Some(&id)
+                {
+                    // In the list, in a key of the map, and in the animation.
+                    budget.take(1, 4 * size_of::<usize>())?;
+                    layers.push(id);
+                }
+            }
+        }
+        let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
+        for (index, layers) in layers_of.into_iter().enumerate() {
+            let node = &scene.nodes[index];
+            // The scales of others determine its transform too.
+            if layers.len() == self.audible.len() || inherits_scale(node) || is_spheric(node) {
+                continue;
+            }
+            let partial = match known.get(&layers) {
+                Some(&partial) => partial,
+                None => {
+                    budget.take(1, size_of::<Anim>() + size_of::<LayerAnim>())?;
+                    self.partial.push(LayerAnim {
+                        anim: anim_of(scene, layers.clone())?,
+                        layers: layers.len(),
+                    });
+                    known.insert(layers, self.partial.len() - 1);
+                    self.partial.len() - 1
+                }
+            };
+            self.partial_of.insert(index, partial);
+        }
+        Ok(())
+    }
+
+    fn find_weighted(&mut self, stack: &AnimStack) {
+        let mut translations: HashMap<usize, Vec<WeightedLayer>> = HashMap::new();
+        for &index in &self.audible {
+            let layer = &stack.layers[index];
+            let weight = weight_of(layer).filter(|_| layer.weight_is_animated);
+            for (position, property) in layer.anim_props.iter().enumerate() {
                 let is_node = property.element.type_ == ElementType::Node;
                 if is_node && &*property.prop_name == TRANSLATION {
                     let node = property.element.typed_id as usize;
-                    translations
-                        .entry(node)
-                        .or_default()
-                        .push((index, position));
+                    translations.entry(node).or_default().push(WeightedLayer {
+                        layer: index,
+                        translation: position,
+                        weight,
+                    });
                 }
             }
         }
         // The lowest layer has no others to override.
         let lowest = self.audible.first().copied();
-        let is_weighted = |&(index, _): &(usize, usize)| {
-            let layer = &stack.layers[index];
+        let is_weighted = |weighted: &WeightedLayer| {
+            let layer = &stack.layers[weighted.layer];
             let has_weight = layer.weight != 1.0 || layer.weight_is_animated;
-            Some(index) != lowest && overrides(layer) && has_weight
+            Some(weighted.layer) != lowest && overrides(layer) && has_weight
         };
         translations.retain(|_, layers| layers.iter().any(is_weighted));
         self.weighted = translations;
     }
 
+    /// How many layers are evaluated for each transform of a node.
+    pub(super) fn count(&self, node: &Node) -> usize {
+        let index = node.element.typed_id as usize;
+        let partial = self.partial_of.get(&index);
+        let layers = partial.map_or(self.audible.len(), |&partial| self.partial[partial].layers);
+        layers + self.weighted.get(&index).map_or(0, Vec::len)
+    }
+
     /// The animation to evaluate for a node.
     pub(super) fn anim<'a>(&'a self, stack: &'a AnimStack, node: &Node) -> &'a Anim {
-        let plain = || self.audible_anim.as_deref().unwrap_or(&stack.anim);
-        match &self.spheric_anim {
-            Some(anim) if is_spheric(node) => anim,
-            _ => plain(),
+        let partial = self.partial_of.get(&(node.element.typed_id as usize));
+        match (&self.spheric_anim, partial) {
+            (Some(anim), _) if is_spheric(node) => anim,
+            (_, Some(&partial)) => &self.partial[partial].anim,
+            _ => self.audible_anim.as_deref().unwrap_or(&stack.anim),
         }
     }
 
@@ -152,15 +257,15 @@ impl StackLayers {
         let layers = self.weighted.get(&(node.element.typed_id as usize))?;
         let lowest = self.audible.first().copied();
         let mut off = DVec3::ZERO;
-        for &(index, position) in layers {
-            let layer = &stack.layers[index];
-            if Some(index) == lowest || layer.additive {
+        for weighted in layers {
+            let layer = &stack.layers[weighted.layer];
+            if Some(weighted.layer) == lowest || layer.additive {
                 continue;
             }
-            let weight = weight(layer, time);
+            let weight = weighted.weight(layer, time);
             off = match overrides(layer) {
                 true => {
-                    let value = &layer.anim_props[position].anim_value;
+                    let value = &layer.anim_props[weighted.translation].anim_value;
                     let value = ufbx::evaluate_anim_value_vec3(value, time);
                     (weight - 1.0) * DVec3::new(value.x, value.y, value.z)
                 }
@@ -171,17 +276,33 @@ impl StackLayers {
     }
 }
 
-/// The weight of a layer at a time, from 0 to 1.
-fn weight(layer: &AnimLayer, time: f64) -> f64 {
-    let curve = layer.anim_props.iter().find(|property| {
+impl WeightedLayer {
+    /// The weight of the layer at a time, from 0 to 1.
+    fn weight(&self, layer: &AnimLayer, time: f64) -> f64 {
+        match self.weight {
+            Some(weight) => {
+                let curve = &layer.anim_props[weight].anim_value;
+                let percent = ufbx::evaluate_anim_value_real(curve, time);
+                (percent / 100.0).clamp(0.0, 1.0)
+            }
+            None => layer.weight,
+        }
+    }
+}
+
+/// The index of a layer's weight among its animated properties.
+fn weight_of(layer: &AnimLayer) -> Option<usize> {
+    layer.anim_props.iter().position(|property| {
         let of_layer = property.element.element_id == layer.element.element_id;
         of_layer && &*property.prop_name == "Weight"
-    });
-    match curve.filter(|_| layer.weight_is_animated) {
-        Some(curve) => {
-            let percent = ufbx::evaluate_anim_value_real(&curve.anim_value, time);
-            (percent / 100.0).clamp(0.0, 1.0)
-        }
-        None => layer.weight,
-    }
+    })
+}
+
+/// The animation of some layers.
+fn anim_of(scene: &Scene, layer_ids: Vec<u32>) -> Result<AnimRoot, Box<ufbx::Error>> {
+    let options = AnimOpts {
+        layer_ids: layer_ids.into(),
+        ..AnimOpts::default()
+    };
+    ufbx::create_anim(scene, options).map_err(Box::new)
 }

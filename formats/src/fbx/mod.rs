@@ -27,8 +27,10 @@ use ufbx::{
 use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::fbx::direct::DirectEvaluator;
-use crate::fbx::follow::{ChannelFollower, ChannelKind, ChannelValue, FollowedKeys, KeyStop};
-use crate::fbx::layers::{StackLayers, is_solo, is_spheric, without_spheric_orders};
+use crate::fbx::follow::{
+    ChannelFollower, ChannelKind, ChannelValue, FollowedKeys, KeyStop, Unfollowed,
+};
+use crate::fbx::layers::{LayerFault, StackLayers, is_solo, is_spheric, without_spheric_orders};
 use crate::fbx::times::{ChannelTimes, NodeTimes, Takes, TimeDisorder, was_rounded};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
@@ -82,9 +84,10 @@ const DEPTH: u32 = 1024;
 /// The distance in seconds on either side of a key at which a curve is evaluated, to find jumps.
 const BESIDE: f64 = 1e-10;
 
-/// How often curves are evaluated: the number for every input, and the number for each byte of it. Each layer counts,
-/// because each is evaluated.
-const EVALUATIONS: (i64, i64) = (1 << 23, 256);
+/// How often curves are evaluated: the number for every input, and the number for each byte of it. Each layer that moves
+/// a node counts, because each is evaluated. A key of a node whose ten layers have keys there takes 600 evaluations, and
+/// the layers have a byte and more for each of up to ninety curves.
+const EVALUATIONS: (i64, i64) = (1 << 22, 64);
 
 /// Bytes of memory of a track without its keys, of a key time while it is evaluated, and of a key.
 const TRACK: usize = 600;
@@ -370,14 +373,6 @@ impl NodeKeys {
     }
 }
 
-/// Why a node cannot be followed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum FollowFault {
-    NotFinite { time: f64 },
-    Work,
-    Keys { count: usize },
-}
-
 /// The channels that an evaluation computes: bits of `ufbx`'s `TransformFlags`, which the crate does not publish.
 const EXPLICIT: u32 = 0x4;
 const TRANSLATION: u32 = 0x10;
@@ -413,9 +408,12 @@ impl FbxReader<'_> {
         // Each clip has the names of its tracks.
         let names = self.nodes.names.iter().map(String::len).sum();
         self.budget.take(names, 1).map_err(over)?;
-        let layers = StackLayers::of(scene, &scene.anim_stacks[stack]);
-        let layers = layers.map_err(|error| no_anim(self.name, &error))?;
         let anim_stack = &scene.anim_stacks[stack];
+        let layers = StackLayers::of(scene, anim_stack, self.budget);
+        let layers = layers.map_err(|fault| match fault {
+            LayerFault::Ufbx(error) => no_anim(self.name, &error),
+            LayerFault::Memory(error) => over(error),
+        })?;
         let takes = Takes::of(scene, anim_stack, &layers.audible, self.budget).map_err(over)?;
         if let Some(TimeDisorder {
             property,
@@ -431,10 +429,17 @@ impl FbxReader<'_> {
         }
         let takes = self.on_frames(takes);
         self.warn_of_takes(stack, &takes, warnings);
-        let nodes: Vec<Result<NodeKeys, Diagnostic>> = tracks
-            .par_iter()
-            .map(|&node| self.node(stack, node, &takes, &layers))
-            .collect();
+        // Once for all: the threads take their memory in any order.
+        let max_keys = usize::try_from(self.budget.left() / KEY as u64).unwrap_or(usize::MAX);
+        let follower = StackFollower {
+            reader: self,
+            stack,
+            takes: &takes,
+            layers: &layers,
+            max_keys,
+        };
+        let nodes: Vec<Result<NodeKeys, Diagnostic>> =
+            tracks.par_iter().map(|&node| follower.node(node)).collect();
         let mut clip = Motion {
             name: Some(scene.anim_stacks[stack].element.name.to_string())
                 .filter(|name| !name.is_empty()),
@@ -560,149 +565,6 @@ impl FbxReader<'_> {
         frame.filter(is_near).unwrap_or(time)
     }
 
-    fn node(
-        &self,
-        stack: usize,
-        node: usize,
-        takes: &Takes,
-        layers: &StackLayers,
-    ) -> Result<NodeKeys, Diagnostic> {
-        let none = ChannelTimes::default();
-        let moved = takes.nodes.get(&node);
-        let times = moved.map_or([&none; 3], |moved| {
-            [&moved.translation, &moved.rotation, &moved.scale]
-        });
-        let evaluator = Evaluator::of(self, stack, node, takes, layers);
-        let mut lists = times.map(|times| times.within(takes.span));
-        // Curves that never change need no look behind their first key.
-        for (list, channel) in lists.iter_mut().zip(CHANNELS) {
-            if evaluator.is_still(channel.0) {
-                list.truncate(1);
-            }
-        }
-        let mut keys: [Option<FollowedKeys>; 3] = [None, None, None];
-        let mut is_whole = true;
-        for channel in 0..3 {
-            if keys[channel].is_some() {
-                continue;
-            }
-            // Channels with keys at the same times are evaluated together.
-            let group: Vec<usize> = (channel..3)
-                .filter(|&other| lists[other] == lists[channel])
-                .collect();
-            let jump = group.iter().any(|&channel| times[channel].jump);
-            let found = self.follow(&evaluator, (&lists[channel], jump), &group)?;
-            for (channel, (found, follows)) in group.into_iter().zip(found) {
-                keys[channel] = Some(found);
-                is_whole &= follows;
-            }
-        }
-        let [Some(translation), Some(rotation), Some(scale)] = keys else {
-            unreachable!("each channel is in a group");
-        };
-        let of_node = &self.scene.nodes[node];
-        let rest = match &self.rests {
-            Some(rests) if is_spheric(of_node) => ufbx::evaluate_transform(rests, of_node, 0.0),
-            _ => of_node.local_transform,
-        };
-        Ok(NodeKeys {
-            rest,
-            translation,
-            rotation,
-            scale,
-            is_whole,
-        })
-    }
-
-    /// The keys of channels of a node that have the same key times.
-    fn follow(
-        &self,
-        evaluator: &Evaluator<'_>,
-        (times, jump): (&[f64], bool),
-        group: &[usize],
-    ) -> Result<Vec<(FollowedKeys, bool)>, Diagnostic> {
-        let stack = evaluator.stack;
-        let memory = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
-        let _borrowed = self.budget.borrow(times.len(), STOP).map_err(memory)?;
-        let evaluate = |time: f64, flags: u32| evaluator.at(time, flags);
-        let refuse = || evaluator.refusal(usize::MAX);
-        let all = group
-            .iter()
-            .fold(0, |all, &channel| all | CHANNELS[channel].0);
-        let stops = || {
-            let mut at = Vec::with_capacity(times.len());
-            let mut thirds = Vec::with_capacity(times.len());
-            for (index, &time) in times.iter().enumerate() {
-                let here = evaluate(time, all)?;
-                let [before, after] = match jump {
-                    true => {
-                        let room = |other: Option<&f64>| {
-                            let gap = other.map_or(f64::INFINITY, |other| (other - time).abs());
-                            BESIDE.min(gap / 8.0)
-                        };
-                        let earlier = index.checked_sub(1).and_then(|index| times.get(index));
-                        let (back, on) = (room(earlier), room(times.get(index + 1)));
-                        [
-                            if index == 0 {
-                                here
-                            } else {
-                                evaluate(time - back, all)?
-                            },
-                            match index + 1 < times.len() {
-                                true => evaluate(time + on, all)?,
-                                false => here,
-                            },
-                        ]
-                    }
-                    false => [here; 2],
-                };
-                at.push([before, here, after]);
-                if let Some(&next) = times.get(index + 1) {
-                    let third = |u: f64| evaluate(time + u * (next - time), all);
-                    thirds.push([third(1.0 / 3.0)?, third(2.0 / 3.0)?]);
-                }
-            }
-            Some((at, thirds))
-        };
-        let (at, thirds) = stops().ok_or_else(refuse)?;
-        let mut found = Vec::with_capacity(group.len());
-        for &channel in group {
-            let (flag, kind, part) = CHANNELS[channel];
-            let one = |time: f64| Some(part(&evaluate(time, flag)?));
-            let channel_stops: Vec<KeyStop> = (times.iter().zip(&at))
-                .map(|(&file, all)| {
-                    stop(
-                        file,
-                        self.clip_time(file, evaluator.grid),
-                        kind,
-                        all.each_ref().map(part),
-                    )
-                })
-                .collect();
-            let channel_thirds: Vec<[ChannelValue; 2]> = thirds
-                .iter()
-                .map(|both| both.each_ref().map(part))
-                .collect();
-            let follow = ChannelFollower {
-                kind,
-                value: &one,
-                rate: evaluator.grid,
-                keyframes: self.options.keyframes,
-                max_keys: usize::try_from(self.budget.left() / KEY as u64).unwrap_or(usize::MAX),
-            };
-            let keys = follow.keys(&channel_stops, &channel_thirds);
-            let keys = keys.ok_or_else(|| evaluator.refusal(follow.max_keys))?;
-            let count = match &keys.0 {
-                FollowedKeys::Rest(_) => 1,
-                FollowedKeys::Step(keys) | FollowedKeys::Linear(keys) => keys.len(),
-                FollowedKeys::Cubic(keys) => keys.len(),
-            };
-            self.budget.take(count, KEY).map_err(memory)?;
-            found.push(keys);
-        }
-        Ok(found)
-    }
-
     /// Adds the track of a node to a clip; returns its rest transform.
     fn push(
         &self,
@@ -777,65 +639,204 @@ impl FbxReader<'_> {
     }
 }
 
-/// Evaluates the transforms of a node.
-struct Evaluator<'a> {
+/// Follows the nodes of a stack, each on one of the threads.
+struct StackFollower<'a> {
     reader: &'a FbxReader<'a>,
     stack: usize,
-    node: &'a Node,
+    takes: &'a Takes,
     layers: &'a StackLayers,
-    /// The frames to which key times belong.
-    grid: Option<FrameRate>,
+    /// The largest number of keys of a channel, for which there is memory.
+    max_keys: usize,
+}
+
+impl StackFollower<'_> {
+    /// The keys of a node.
+    fn node(&self, node: usize) -> Result<NodeKeys, Diagnostic> {
+        let (reader, takes) = (self.reader, self.takes);
+        let none = ChannelTimes::default();
+        let moved = takes.nodes.get(&node);
+        let times = moved.map_or([&none; 3], |moved| {
+            [&moved.translation, &moved.rotation, &moved.scale]
+        });
+        let evaluator = Evaluator::of(self, node);
+        let mut lists = times.map(|times| times.within(takes.span));
+        // Curves that never change need no look behind their first key.
+        for (list, channel) in lists.iter_mut().zip(CHANNELS) {
+            if evaluator.is_still(channel.0) {
+                list.truncate(1);
+            }
+        }
+        let mut keys: [Option<FollowedKeys>; 3] = [None, None, None];
+        let mut is_whole = true;
+        for channel in 0..3 {
+            if keys[channel].is_some() {
+                continue;
+            }
+            // Channels with keys at the same times are evaluated together.
+            let group: Vec<usize> = (channel..3)
+                .filter(|&other| lists[other] == lists[channel])
+                .collect();
+            let jump = group.iter().any(|&channel| times[channel].jump);
+            let found = self.follow(&evaluator, (&lists[channel], jump), &group)?;
+            for (channel, (found, follows)) in group.into_iter().zip(found) {
+                keys[channel] = Some(found);
+                is_whole &= follows;
+            }
+        }
+        let [Some(translation), Some(rotation), Some(scale)] = keys else {
+            unreachable!("each channel is in a group");
+        };
+        let of_node = &reader.scene.nodes[node];
+        let rest = match &reader.rests {
+            Some(rests) if is_spheric(of_node) => ufbx::evaluate_transform(rests, of_node, 0.0),
+            _ => of_node.local_transform,
+        };
+        Ok(NodeKeys {
+            rest,
+            translation,
+            rotation,
+            scale,
+            is_whole,
+        })
+    }
+
+    /// The keys of channels of a node that have the same key times.
+    fn follow(
+        &self,
+        evaluator: &Evaluator<'_>,
+        (times, jump): (&[f64], bool),
+        group: &[usize],
+    ) -> Result<Vec<(FollowedKeys, bool)>, Diagnostic> {
+        let reader = self.reader;
+        let memory = |error: OverBudget| reader.refuse(self.stack, Code::Memory, error.to_string());
+        let _borrowed = reader.budget.borrow(times.len(), STOP).map_err(memory)?;
+        let evaluate = |time: f64, flags: u32| evaluator.at(time, flags);
+        let all = group
+            .iter()
+            .fold(0, |all, &channel| all | CHANNELS[channel].0);
+        let stops = || {
+            let mut at = Vec::with_capacity(times.len());
+            let mut thirds = Vec::with_capacity(times.len());
+            for (index, &time) in times.iter().enumerate() {
+                let here = evaluate(time, all)?;
+                let [before, after] = match jump {
+                    true => {
+                        let room = |other: Option<&f64>| {
+                            let gap = other.map_or(f64::INFINITY, |other| (other - time).abs());
+                            BESIDE.min(gap / 8.0)
+                        };
+                        let earlier = index.checked_sub(1).and_then(|index| times.get(index));
+                        let (back, on) = (room(earlier), room(times.get(index + 1)));
+                        [
+                            if index == 0 {
+                                here
+                            } else {
+                                evaluate(time - back, all)?
+                            },
+                            match index + 1 < times.len() {
+                                true => evaluate(time + on, all)?,
+                                false => here,
+                            },
+                        ]
+                    }
+                    false => [here; 2],
+                };
+                at.push([before, here, after]);
+                if let Some(&next) = times.get(index + 1) {
+                    let third = |u: f64| evaluate(time + u * (next - time), all);
+                    thirds.push([third(1.0 / 3.0)?, third(2.0 / 3.0)?]);
+                }
+            }
+            Ok((at, thirds))
+        };
+        let (at, thirds) = stops().map_err(|why| evaluator.refusal(why))?;
+        let mut found = Vec::with_capacity(group.len());
+        for &channel in group {
+            let (flag, kind, part) = CHANNELS[channel];
+            let one = |time: f64| Ok(part(&evaluate(time, flag)?));
+            let channel_stops: Vec<KeyStop> = (times.iter().zip(&at))
+                .map(|(&file, all)| {
+                    stop(
+                        file,
+                        reader.clip_time(file, self.takes.grid),
+                        kind,
+                        all.each_ref().map(part),
+                    )
+                })
+                .collect();
+            let channel_thirds: Vec<[ChannelValue; 2]> = thirds
+                .iter()
+                .map(|both| both.each_ref().map(part))
+                .collect();
+            let follow = ChannelFollower {
+                kind,
+                value: &one,
+                rate: self.takes.grid,
+                keyframes: reader.options.keyframes,
+                max_keys: self.max_keys,
+            };
+            let keys = follow.keys(&channel_stops, &channel_thirds);
+            let keys = keys.map_err(|why| evaluator.refusal(why))?;
+            let count = match &keys.0 {
+                FollowedKeys::Rest(_) => 1,
+                FollowedKeys::Step(keys) | FollowedKeys::Linear(keys) => keys.len(),
+                FollowedKeys::Cubic(keys) => keys.len(),
+            };
+            reader.budget.take(count, KEY).map_err(memory)?;
+            found.push(keys);
+        }
+        Ok(found)
+    }
+}
+
+/// Evaluates the transforms of a node.
+struct Evaluator<'a> {
+    follower: &'a StackFollower<'a>,
+    node: &'a Node,
     direct: Option<DirectEvaluator<'a>>,
-    /// The cost of an evaluation.
+    /// The cost of an evaluation: the layers that are evaluated.
     cost: i64,
     /// Evaluations that the reader has granted and that are not used yet.
     left: Cell<i64>,
-    fault: Cell<Option<FollowFault>>,
 }
 
-/// How many evaluations are granted at once, because all threads share the count.
-const GRANTED: i64 = 1024;
+/// How many evaluations are granted at once, because all threads share the count. Few, so that those which one thread
+/// does not use are not missed by another.
+const GRANTED: i64 = 64;
 
 impl<'a> Evaluator<'a> {
-    fn of(
-        reader: &'a FbxReader<'a>,
-        stack: usize,
-        node: usize,
-        takes: &Takes,
-        layers: &'a StackLayers,
-    ) -> Self {
-        let scene = reader.scene;
+    fn of(follower: &'a StackFollower<'a>, node: usize) -> Self {
+        let (scene, layers) = (follower.reader.scene, follower.layers);
         let first = layers.audible.first().copied().unwrap_or(0);
-        let lowest = &scene.anim_stacks[stack].layers;
-        let value = |index: usize| -> &'a AnimValue { &lowest[first].anim_props[index].anim_value };
-        let mut evaluator = Self {
-            reader,
-            stack,
-            node: &scene.nodes[node],
-            layers,
-            grid: takes.grid,
-            direct: None,
-            cost: takes.layers.max(1) as i64,
-            left: Cell::new(0),
-            fault: Cell::new(None),
+        let layers_of_stack = &scene.anim_stacks[follower.stack].layers;
+        let value = |index: usize| -> &'a AnimValue {
+            &layers_of_stack[first].anim_props[index].anim_value
         };
-        let direct = takes.properties.get(&node);
-        let direct =
-            direct.and_then(|properties| DirectEvaluator::of(evaluator.node, properties, value));
+        let properties = follower.takes.properties.get(&node);
+        let node = &scene.nodes[node];
+        let mut evaluator = Self {
+            follower,
+            node,
+            direct: None,
+            cost: layers.count(node).max(1) as i64,
+            left: Cell::new(0),
+        };
+        let direct = properties.and_then(|properties| DirectEvaluator::of(node, properties, value));
         evaluator.direct = direct.filter(|direct| {
             let exact = |time| evaluator.exact(time, TRANSLATION | ROTATION | SCALE);
-            direct.is(exact, takes.span)
+            direct.is(exact, follower.takes.span)
         });
         evaluator
     }
 
     /// The transform that `ufbx` computes.
     fn exact(&self, time: f64, flags: u32) -> Transform {
-        let stack = &self.reader.scene.anim_stacks[self.stack];
-        let anim = self.layers.anim(stack, self.node);
+        let layers = self.follower.layers;
+        let stack = &self.follower.reader.scene.anim_stacks[self.follower.stack];
+        let anim = layers.anim(stack, self.node);
         let mut found = ufbx::evaluate_transform_flags(anim, self.node, time, EXPLICIT | flags);
         if flags & TRANSLATION != 0
-            && let Some(off) = (self.layers).weight_of_translation(stack, self.node, time)
+            && let Some(off) = layers.weight_of_translation(stack, self.node, time)
         {
             found.translation.x += off.x;
             found.translation.y += off.y;
@@ -844,18 +845,14 @@ impl<'a> Evaluator<'a> {
         found
     }
 
-    /// `None` if the work is too much or a number is not finite; the [refusal](Self::refusal) contains the reason.
-    fn at(&self, time: f64, flags: u32) -> Option<Transform> {
+    /// # Errors
+    /// When the work is too much, or when a number is not finite.
+    fn at(&self, time: f64, flags: u32) -> Result<Transform, Unfollowed> {
         if self.left.get() == 0 {
             let granted = GRANTED * self.cost;
-            if self
-                .reader
-                .evaluations
-                .fetch_sub(granted, Ordering::Relaxed)
-                < 0
-            {
-                self.fault.set(Some(FollowFault::Work));
-                return None;
+            let evaluations = &self.follower.reader.evaluations;
+            if evaluations.fetch_sub(granted, Ordering::Relaxed) < 0 {
+                return Err(Unfollowed::TooMuchWork);
             }
             self.left.set(GRANTED);
         }
@@ -867,10 +864,10 @@ impl<'a> Evaluator<'a> {
         let is_finite = CHANNELS
             .iter()
             .all(|channel| (channel.2)(&found).is_finite());
-        if !is_finite {
-            self.fault.set(Some(FollowFault::NotFinite { time }));
+        match is_finite {
+            true => Ok(found),
+            false => Err(Unfollowed::NotFinite { time }),
         }
-        is_finite.then_some(found)
     }
 
     /// Whether the channels of these flags are constant.
@@ -879,33 +876,31 @@ impl<'a> Evaluator<'a> {
         direct.is_some_and(|direct| direct.is_still(flags))
     }
 
-    /// Why the node cannot be followed: no evaluation failed if there are more keys than `max_keys`.
-    fn refusal(&self, max_keys: usize) -> Diagnostic {
-        let fault = self.fault.get();
-        match fault.unwrap_or(FollowFault::Keys { count: max_keys }) {
-            FollowFault::NotFinite { time } => self.reader.refuse(
-                self.stack,
+    /// The refusal of the stack, because the node cannot be followed.
+    fn refusal(&self, why: Unfollowed) -> Diagnostic {
+        let name = &*self.node.element.name;
+        let (code, message) = match why {
+            Unfollowed::NotFinite { time } => (
                 Code::NotFinite,
-                format!(
-                    "`{}` has no finite transform at {time} s",
-                    &*self.node.element.name
-                ),
+                format!("`{name}` has no finite transform at {time} s"),
             ),
-            FollowFault::Keys { count } => self.reader.refuse(
-                self.stack,
+            Unfollowed::TooManyKeys => (
                 Code::Memory,
                 format!(
-                    "the curves of `{}` need more than {count} keys, for which an input of this length gets no \
-                     memory; is an angle damaged?",
-                    &*self.node.element.name
+                    "the curves of `{name}` need more than {} keys, for which an input of this length gets no memory; \
+                     is an angle damaged?",
+                    self.follower.max_keys
                 ),
             ),
-            FollowFault::Work => self.reader.refuse(
-                self.stack,
+            Unfollowed::TooMuchWork => (
                 Code::FbxWork,
-                "following the curves takes more work than a file of this length gets; is it damaged?",
+                "following the curves takes more work than a file of this length gets; is it damaged?"
+                    .to_owned(),
             ),
-        }
+        };
+        self.follower
+            .reader
+            .refuse(self.follower.stack, code, message)
     }
 }
 
@@ -913,7 +908,8 @@ impl Drop for Evaluator<'_> {
     /// Returns the granted evaluations that were not used.
     fn drop(&mut self) {
         let left = self.left.get() * self.cost;
-        self.reader.evaluations.fetch_add(left, Ordering::Relaxed);
+        let evaluations = &self.follower.reader.evaluations;
+        evaluations.fetch_add(left, Ordering::Relaxed);
     }
 }
 

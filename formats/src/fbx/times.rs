@@ -71,8 +71,6 @@ pub(super) struct Takes {
     pub(super) outside: usize,
     /// Names of properties with curves that are not transforms.
     pub(super) others: Vec<String>,
-    /// Number of layers, each of which is evaluated for each value.
-    pub(super) layers: usize,
     /// The key times of all curves, a list for each, unless it is that of the curve before.
     pub(super) keys: Vec<Vec<f64>>,
     /// The rate of these, as in every format: whatever the file says.
@@ -125,7 +123,6 @@ impl Takes {
         let layers = || audible.iter().map(|&index| &stack.layers[index]);
         let mut takes = Self {
             span: span(stack, layers()),
-            layers: audible.len(),
             ..Self::default()
         };
         let mut others = HashSet::new();
@@ -242,18 +239,11 @@ impl Takes {
             translation.append(rotation, budget)?;
             translation.append(scale, budget)?;
         }
-        let parent = node.parent.as_deref();
-        let inherits = node.is_scale_helper
-            || parent.is_some_and(|parent| {
-                parent.inherit_scale_node.is_some()
-                    || parent.scale_helper.is_some()
-                    || parent.is_scale_compensate_parent
-            });
-        if !inherits {
+        if !inherits_scale(node) {
             return Ok(());
         }
         let mut scales = ChannelTimes::default();
-        let mut next = parent;
+        let mut next = node.parent.as_deref();
         while let Some(above) = next {
             let helper = above.scale_helper.as_deref().into_iter();
             for carrier in helper.chain([above]) {
@@ -270,6 +260,16 @@ impl Takes {
         }
         Ok(())
     }
+}
+
+/// Whether the scales of other nodes determine the transform of a node.
+pub(super) fn inherits_scale(node: &Node) -> bool {
+    node.is_scale_helper
+        || node.parent.as_deref().is_some_and(|parent| {
+            parent.inherit_scale_node.is_some()
+                || parent.scale_helper.is_some()
+                || parent.is_scale_compensate_parent
+        })
 }
 
 /// The first and the last time of a stack, or of its keys if the stack does not contain them. Programs write ends that

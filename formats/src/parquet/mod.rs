@@ -46,8 +46,8 @@ pub static FORMAT: Format = Format {
     write: Some(WriteResults {
         order: ComponentOrder::Xyzw,
         layout: None,
-        // Rotations that stand still are compressed to next to nothing.
-        rotation_bytes: |_| 0.0,
+        // Of rotations that stand still, at times of a rate, 0.9 bytes were the fewest.
+        rotation_bytes: |_| 0.25,
         rotations: |out, result| write_rotations(result, |table| ParquetSink::new(out, table)),
         poses: |poses, out| write_poses(poses, |table| ParquetSink::new(out, table)),
     }),

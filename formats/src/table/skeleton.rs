@@ -1,5 +1,7 @@
 //! The parents of joints beside the rows of a table: JSON in the metadata of Parquet and Arrow.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +64,11 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
     if parents.len() != count || offsets.len() != count || motion.set.track_count() != count {
         return;
     }
-    let by_name = |name: &String| (0..count).find(|&track| motion.set.track_name(track) == *name);
+    // Of equal names, the first track has it.
+    let names = (0..count).rev();
+    let names = names.map(|track| (motion.set.track_name(track), track));
+    let names: HashMap<String, usize> = names.collect();
+    let by_name = |name: &String| names.get(name).copied();
     // Rows of a table may bring its tracks in another order.
     let Some(indices) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
         return;

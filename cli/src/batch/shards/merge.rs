@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use tumble_formats::beneath::parent_beneath;
+use tumble_formats::folder::Folder;
 use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
 use crate::batch::entry::{
@@ -14,6 +15,7 @@ use crate::batch::entry::{
 use crate::batch::manifest;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record::{self, MARK, RefusedInput};
+use crate::batch::target;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
@@ -102,7 +104,8 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
         return Err(Failure::new(ALL_INPUTS, message));
     };
     // Two processes that merge at once would remove each other's files.
-    let _lock = manifest::lock(folder)?;
+    let opened = target::opened(folder)?;
+    let _lock = manifest::lock(&opened)?;
     let progress = ShardProgress::of(folder, &recorded);
     if !progress.is_done() {
         let message = format!("{shown}: {}; make them with --resume", progress.summary());
@@ -133,7 +136,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     inputs.extend(without_results.map(|entry| (entry.key(), entry)));
     let lines = one_each(lines)?;
     if !lines.is_empty() || !inputs.is_empty() {
-        write(folder, &path, &lines, &inputs)?;
+        write(&opened, &path, &lines, &inputs)?;
     }
     let parents: BTreeSet<PathBuf> = (lines.iter())
         .filter_map(|line| parent_beneath(folder, Path::new(&line.output)).ok())
@@ -142,7 +145,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
         remove_marked(parent, MARK);
         remove_abandoned(parent);
     }
-    RecordedPlan::remove(folder)?;
+    RecordedPlan::remove(&opened)?;
     Ok(MergeSummary {
         results: lines.len(),
         shards: recorded.shards,
@@ -235,13 +238,15 @@ fn one_each(mut lines: Vec<LinePosition>) -> Result<Vec<LinePosition>, Failure> 
 /// Writes the lines. Few files are in memory at once: the index of a million results takes 130 MB, their
 /// lines 500 MB.
 fn write(
-    folder: &Path,
+    opened: &Folder,
     path: &Path,
     lines: &[LinePosition],
     inputs: &InputEntries,
 ) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);
-    let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
+    let folder = opened.path();
+    let output = Output::create_in(opened, Path::new(NAME), true, "");
+    let mut output = output.map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
     let mut before = match lines.iter().any(|line| line.file == 0) {
         true => entry::open(folder)?.map(BufReader::new),

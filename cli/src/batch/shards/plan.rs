@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{open_beneath, parent_beneath};
+use tumble_formats::folder::Folder;
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
@@ -166,7 +167,7 @@ impl ShardPlan {
         resume: bool,
         overwrite: bool,
     ) -> Result<(), Failure> {
-        target::create_folder(folder)?;
+        let opened = target::open_folder(folder)?;
         let found = RecordedPlan::read(folder)?;
         if found.as_ref() == Some(&self.recorded) {
             return Ok(());
@@ -196,7 +197,7 @@ impl ShardPlan {
             }
             replaced.note();
         }
-        self.recorded.write(folder)
+        self.recorded.write(&opened)
     }
 
     /// The failure for a file with the name of a result that no manifest lists, or that exists without
@@ -261,20 +262,24 @@ impl RecordedPlan {
     }
 
     /// Writes the record completely; it may replace the same one of another process.
-    fn write(&self, folder: &Path) -> Result<(), Failure> {
-        let path = Self::path(folder);
-        target::create_folder(&folder.join(FOLDER))?;
+    fn write(&self, folder: &Folder) -> Result<(), Failure> {
+        let name = Self::name();
+        let failed = |error: io::Error| {
+            let path = folder.path().join(&name);
+            Failure::writing(&path.display().to_string(), &error)
+        };
+        folder.create_parent_of(&name).map_err(failed)?;
         let text = serde_json::to_string(self).expect("strings and numbers") + "\n";
-        let output = Output::create(&path, true, &[]);
+        let output = Output::create_in(folder, &name, true, "");
         let mut output = output.map_err(|error| Failure::output(&error))?;
-        let written = output.write_all(text.as_bytes());
-        written.map_err(|error| Failure::writing(&path.display().to_string(), &error))?;
+        output.write_all(text.as_bytes()).map_err(failed)?;
         output.commit().map_err(|error| Failure::output(&error))
     }
 
     /// Removes the record and the files of merged shards. The record goes first: without it what an
     /// interruption leaves is ignored. Files that no shard has written stay.
-    pub(crate) fn remove(folder: &Path) -> Result<(), Failure> {
+    pub(crate) fn remove(opened: &Folder) -> Result<(), Failure> {
+        let folder = opened.path();
         let failed = |error: io::Error| {
             let folder = folder.join(FOLDER);
             Failure::writing(&folder.display().to_string(), &error)
@@ -286,15 +291,15 @@ impl RecordedPlan {
         if Self::read(folder)?.is_none() {
             return Ok(());
         }
-        ignore_missing(std::fs::remove_file(Self::path(folder)))?;
+        ignore_missing(opened.remove_file(&Self::name()))?;
         for shard in record::numbers(folder) {
             let bytes = record::bytes(folder, shard).unwrap_or_default();
             if record::header(&bytes).is_some() {
-                ignore_missing(std::fs::remove_file(record::path(folder, shard)))?;
+                ignore_missing(opened.remove_file(&record::name(shard)))?;
             }
         }
         remove_abandoned(&folder.join(FOLDER));
-        match std::fs::remove_dir(folder.join(FOLDER)) {
+        match opened.remove_folder(Path::new(FOLDER)) {
             Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
             removed => ignore_missing(removed),
         }

@@ -61,7 +61,7 @@ impl RefusedInput {
 }
 
 /// The file of a shard, below the directory of results.
-fn name(shard: usize) -> PathBuf {
+pub(crate) fn name(shard: usize) -> PathBuf {
     Path::new(FOLDER).join(format!("{shard:05}.jsonl"))
 }
 

@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use tumble_formats::folder::Folder;
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_marked};
 
@@ -24,7 +25,7 @@ const SYNCED_AT_ONCE: usize = 16;
 
 /// A shard that is being evaluated.
 pub(crate) struct Shard<'a> {
-    pub(crate) folder: &'a Path,
+    pub(crate) folder: &'a Folder,
     pub(crate) header: ShardHeader,
     /// Whether messages about results are left out.
     pub(crate) quiet: bool,
@@ -37,10 +38,16 @@ pub(crate) struct Shard<'a> {
 
 impl<'a> Shard<'a> {
     /// A shard with results of these names.
-    pub(crate) fn new(folder: &'a Path, header: ShardHeader, names: &[&str], resume: bool) -> Self {
+    pub(crate) fn new(
+        folder: &'a Folder,
+        header: ShardHeader,
+        names: &[&str],
+        resume: bool,
+    ) -> Self {
+        let path = folder.path();
         let previous = match resume {
-            true => record::previous(folder, header.shard, names),
-            false => PreviousEntries::new(folder, BTreeMap::new(), BTreeSet::new()),
+            true => record::previous(path, header.shard, names),
+            false => PreviousEntries::new(path, BTreeMap::new(), BTreeSet::new()),
         };
         Self {
             folder,
@@ -56,7 +63,7 @@ impl<'a> Shard<'a> {
 
     /// Whether its file is complete and of the same plan.
     pub(crate) fn is_done(&self) -> bool {
-        let bytes = record::bytes(self.folder, self.header.shard);
+        let bytes = record::bytes(self.folder.path(), self.header.shard);
         let header = bytes.ok().and_then(|bytes| record::whole(&bytes));
         header.is_some_and(|(header, _)| header.plan == self.header.plan)
     }
@@ -111,9 +118,9 @@ impl<'a> Shard<'a> {
     /// Renames the results, and writes the shard's file.
     pub(crate) fn finish(&mut self) -> Result<(), Failure> {
         self.commit()?;
-        let path = record::path(self.folder, self.header.shard);
+        let path = record::path(self.folder.path(), self.header.shard);
         let text = self.text();
-        match record::bytes(self.folder, self.header.shard) {
+        match record::bytes(self.folder.path(), self.header.shard) {
             Ok(before) if before == text.as_bytes() => return Ok(()),
             Ok(before) if record::header(&before).is_none() => {
                 let path = path.display();
@@ -123,7 +130,8 @@ impl<'a> Shard<'a> {
             }
             Ok(_) | Err(_) => {}
         }
-        let output = Output::create(&path, true, &[]);
+        let name = record::name(self.header.shard);
+        let output = Output::create_in(self.folder, &name, true, "");
         let mut output = output.map_err(|error| Failure::output(&error))?;
         let written = output.write_all(text.as_bytes());
         written.map_err(|error| Failure::writing(&path.display().to_string(), &error))?;
@@ -189,7 +197,7 @@ impl ResultRecorder for &mut Shard<'_> {
     }
 
     fn list(&self) -> PathBuf {
-        record::path(self.folder, self.header.shard)
+        record::path(self.folder.path(), self.header.shard)
     }
 
     fn tell(&self, text: &str) {

@@ -13,6 +13,7 @@ use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob
 use crate::batch::shards::plan::{ShardPlan, ShardRequest};
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
+use crate::batch::target;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
 use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
@@ -30,6 +31,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     let plan = request.plan(arguments, gathered, &sizes, folder, bytes)?;
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
+    let folder = target::opened(folder)?;
     let (mut failed, mut inputs) = (0, 0);
     let mut reports = Vec::new();
     for number in shards {
@@ -44,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
         };
         let names = plan.names[range.clone()].iter().flatten();
         let names: Vec<&str> = names.map(|name| &**name).collect();
-        let mut shard = Shard::new(folder, header, &names, resume);
+        let mut shard = Shard::new(&folder, header, &names, resume);
         if shard.is_done() && !resume && !arguments.results.overwrites() {
             return Err(Failure::usage(format!(
                 "shard {number} is done; --resume skips what is done, --overwrite makes it again"

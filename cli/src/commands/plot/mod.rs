@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use tumble::{TrackSet, method};
+use tumble_formats::folder::Folder;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
@@ -162,7 +163,7 @@ type Bodies = (travel::TravelSource, Vec<Maker>, Result<(), Failure>);
 /// The output of pictures.
 enum PlotOutput {
     One(PathBuf),
-    Folder(PathBuf),
+    Folder(Folder),
 }
 
 /// Says where curves are less smooth than their methods promise.
@@ -191,12 +192,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut writer = FigureWriter {
         device: arguments.device.open()?,
         format: arguments.format(),
+        out,
         overwrite: arguments.overwrite,
         inputs: inputs.clone(),
         drawn: 0,
     };
-    if let (true, PlotOutput::Folder(folder)) = (arguments.report, &out) {
-        return report::write(arguments, &mut writer, &samples, folder);
+    if arguments.report {
+        return report::write(arguments, &mut writer, &samples);
     }
     let outcome = for_each(&inputs, |path| {
         let name = names::input(path);
@@ -204,12 +206,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         if let Some((source, makers, rest)) = arguments.bodies(path)? {
             let title = (&*name, names::file(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
-            let file = match &out {
-                PlotOutput::One(file) => file.clone(),
-                PlotOutput::Folder(folder) => {
-                    folder.join(format!("{stem}-path.{}", writer.format.extension()))
-                }
-            };
+            let file = format!("{stem}-path.{}", writer.format.extension());
             return writer.draw(&figure, &file).and(rest);
         }
         let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
@@ -218,14 +215,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         note_curves(&name, &clip, &choices);
         let source = PlotSource::new(names::title(path, &clip), &clip, &choices, &samples)?;
         let subjects = arguments.subjects(&clip.set, tracks, &name)?;
-        let pictures = match &out {
-            PlotOutput::One(file) => {
-                vec![(file.clone(), together(&subjects, choices.len(), &name)?)]
+        let pictures = match &writer.out {
+            PlotOutput::One(_) => {
+                vec![(String::new(), together(&subjects, choices.len(), &name)?)]
             }
-            PlotOutput::Folder(folder) => {
+            PlotOutput::Folder(_) => {
                 let file = |(label, subject): (String, PlotSubject)| {
                     let name = format!("{stem}-{label}.{}", writer.format.extension());
-                    (folder.join(name), subject)
+                    (name, subject)
                 };
                 subjects.each().into_iter().map(file).collect()
             }
@@ -352,8 +349,7 @@ impl Arguments {
                     "{shown}: end the picture in .svg or .png, or give a directory"
                 )));
             }
-            target::create_folder(out)?;
-            return Ok(PlotOutput::Folder(out.clone()));
+            return Ok(PlotOutput::Folder(target::open_folder(out)?));
         }
         if self.report {
             return Err(Failure::usage(format!(
@@ -434,19 +430,30 @@ fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
 pub(crate) struct FigureWriter {
     device: OpenedDevice,
     format: PictureFormat,
+    out: PlotOutput,
     overwrite: bool,
     inputs: Vec<PathBuf>,
     drawn: usize,
 }
 
 impl FigureWriter {
-    fn draw(&mut self, figure: &Figure, file: &Path) -> Result<(), Failure> {
+    /// Where the picture, or page, of that name goes; a single picture has the name that was given.
+    fn destination(&self, name: &str) -> Result<Destination, Failure> {
+        match &self.out {
+            PlotOutput::One(file) => Destination::new(file, self.overwrite, &self.inputs),
+            PlotOutput::Folder(folder) => {
+                Destination::below(folder, Path::new(name), self.overwrite, &self.inputs)
+            }
+        }
+    }
+
+    fn draw(&mut self, figure: &Figure, name: &str) -> Result<(), Failure> {
         let drawn = match self.format {
             PictureFormat::Svg => draw::svg(figure).map(String::into_bytes),
             PictureFormat::Png => draw::png(figure),
         };
-        let bytes = drawn.map_err(|error| Failure::writing(&file.display().to_string(), &error))?;
-        let destination = Destination::new(file, self.overwrite, &self.inputs)?;
+        let destination = self.destination(name)?;
+        let bytes = drawn.map_err(|error| Failure::writing(&destination.to_string(), &error))?;
         destination.write(None, |out| out.write_all(&bytes))?;
         self.drawn += 1;
         Ok(())

@@ -3,13 +3,12 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::Vec3;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::interpolation::CurveChoice;
-use crate::batch::target::Destination;
 use crate::commands::info::Steps;
 use crate::commands::plot::source::curves::{NAMES, PlotSubject};
 use crate::commands::plot::source::{PlotSamples, PlotSource};
@@ -39,10 +38,9 @@ pub(crate) fn write(
     arguments: &Arguments,
     writer: &mut FigureWriter,
     samples: &PlotSamples,
-    folder: &Path,
 ) -> Result<(), Failure> {
     let inputs = writer.inputs.clone();
-    let page = Destination::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
+    let page = writer.destination("index.html")?;
     page.check_writable()?;
     let each = figures_of_one(arguments.methods().len());
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
@@ -63,7 +61,6 @@ pub(crate) fn write(
                 (path, clip, boxes),
                 &choices,
                 samples,
-                folder,
                 &mut progress,
             )?,
         };
@@ -94,7 +91,6 @@ fn figures(
     (path, clip, boxes): (&PathBuf, &Motion, Vec<usize>),
     choices: &[CurveChoice],
     samples: &PlotSamples,
-    folder: &Path,
     progress: &mut Progress,
 ) -> Result<Vec<ReportFigure>, Failure> {
     let name = names::title(path, clip);
@@ -108,7 +104,7 @@ fn figures(
                 names::stem(path),
                 writer.format.extension()
             );
-            writer.draw(&figure, &folder.join(&file))?;
+            writer.draw(&figure, &file)?;
             shown.push(ReportFigure { file, caption });
             progress.advance(1);
             Ok::<(), Failure>(())

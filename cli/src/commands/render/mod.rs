@@ -376,11 +376,11 @@ impl Arguments {
             );
         }
         if kind == RenderOutput::Folder {
-            target::create_folder(&self.out)?;
+            let folder = target::open_folder(&self.out)?;
             let digits = (times.len() - 1).to_string().len().max(5);
             let destination = |frame: usize| {
-                let file = self.out.join(format!("{frame:0digits$}.png"));
-                Destination::new(&file, self.overwrite, inputs)
+                let name = format!("{frame:0digits$}.png");
+                Destination::below(&folder, Path::new(&name), self.overwrite, inputs)
             };
             // All that can be refused is, before there are any.
             (0..times.len()).try_for_each(|frame| destination(frame).map(drop))?;

@@ -67,13 +67,13 @@ impl RouteResults {
         let destinations = if participants.is_single {
             vec![new(out)?]
         } else {
-            target::create_folder(out)?;
-            let path = |name: &String| out.join(format!("{name}.csv"));
-            participants
-                .names
-                .iter()
-                .map(|name| new(&path(name)))
-                .collect::<Result<_, _>>()?
+            let folder = target::open_folder(out)?;
+            let below = |name: &String| {
+                let name = format!("{name}.csv");
+                Destination::below(&folder, Path::new(&name), arguments.overwrite, &inputs)
+            };
+            let names = participants.names.iter();
+            names.map(below).collect::<Result<_, _>>()?
         };
         let plot = match &arguments.plot {
             None => None,
