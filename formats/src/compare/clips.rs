@@ -38,6 +38,16 @@ pub struct CommonTimes {
     pub warning: Option<String>,
 }
 
+/// The tracks of two clips that belong together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MatchedTracks {
+    /// The index of each pair's track in the first clip and in the second.
+    pub pairs: Vec<[usize; 2]>,
+    /// Names of the tracks that only the first clip has, and of those that only the second clip has.
+    pub missing: [Vec<String>; 2],
+}
+
 /// The differences of two clips.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -251,7 +261,7 @@ impl ClipPair<'_> {
         in_world: bool,
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
-        let (pairs, missing) = self.tracks()?;
+        let MatchedTracks { pairs, missing } = self.tracks()?;
         if !in_world {
             self.check_parents(motions)?;
             self.check_spaces()?;
@@ -368,13 +378,17 @@ impl ClipPair<'_> {
 
     /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
     /// different whole seconds.
-    fn shift(&self) -> f64 {
+    #[must_use]
+    pub fn shift(&self) -> f64 {
         let [first, second] = self.clips;
         (first.time_offset - second.time_offset) as f64
     }
 
     /// Refuses rotations relative to the parents beside rotations relative to the world.
-    fn check_spaces(&self) -> Result<(), CompareError> {
+    ///
+    /// # Errors
+    /// Which clip has the ones and which the others.
+    pub fn check_spaces(&self) -> Result<(), CompareError> {
         let [first, second] = self.clips.map(|clip| clip.is_world);
         let has_parents = |clip: &&Motion| clip.skeleton.iter().any(|joint| joint.parent.is_some());
         if first == second || !self.clips.iter().any(has_parents) {
@@ -441,12 +455,11 @@ impl ClipPair<'_> {
         Ok((found.pairs, found.missing))
     }
 
-    /// Pairs of tracks of the same name, and the names of the tracks that only one clip has.
-    #[expect(
-        clippy::type_complexity,
-        reason = "pairs, and a list of names for each side"
-    )]
-    fn tracks(&self) -> Result<(Vec<[usize; 2]>, [Vec<String>; 2]), CompareError> {
+    /// The tracks that both clips have, by their names, and those that only one has.
+    ///
+    /// # Errors
+    /// When the names do not tell the tracks apart, or when the clips have no track in common.
+    pub fn tracks(&self) -> Result<MatchedTracks, CompareError> {
         let joints = self.clips.map(Motion::joints);
         let (pairs, missing) = self.pairs(&joints)?;
         if pairs.is_empty() {
@@ -460,12 +473,12 @@ impl ClipPair<'_> {
                 }),
             });
         }
-        let names = [0, 1].map(|side| {
+        let missing = [0, 1].map(|side| {
             let lone = missing[side].iter();
             lone.map(|&track| joints[side].names()[track].clone())
                 .collect()
         });
-        Ok((pairs, names))
+        Ok(MatchedTracks { pairs, missing })
     }
 }
 
