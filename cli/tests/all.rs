@@ -38,6 +38,7 @@ mod travel;
 mod validation;
 mod view;
 mod view_controls;
+mod view_ghosts;
 mod view_live;
 mod view_skeletons;
 // End of the list.

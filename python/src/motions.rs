@@ -161,7 +161,7 @@ impl SharedSkeleton {
             return false;
         };
         let is_same = Arc::ptr_eq(file, source)
-            || file.path == source.path && !file.is_adjusted && !source.is_adjusted;
+            || file.path == source.path && file.adjustment.is_none() && source.adjustment.is_none();
         is_same && !clip.motion.skeleton.is_empty()
     }
 
@@ -225,8 +225,8 @@ pub(crate) fn order_assumption(clips: &[Clip]) -> Option<String> {
     if file(first).is_some() && others.iter().all(|clip| file(clip) == file(first)) {
         return None;
     }
-    let mut clips = clips.iter().enumerate().filter(|_| !others.is_empty());
-    clips.find_map(|(index, clip)| clip.motion.order_assumption(&shown(index, clip)))
+    let mut listed = ListedClip::all(clips).filter(|_| !others.is_empty());
+    listed.find_map(|it| it.clip.motion.order_assumption(&it.to_string()))
 }
 
 pub(crate) fn of_crowd(error: CrowdError) -> PyErr {

@@ -5,6 +5,7 @@ import {
   BoxGeometry, Color, Group, InstancedMesh, Matrix4, MeshBasicMaterial, MeshLambertMaterial, Quaternion, Vector3,
 } from "three";
 import { position } from "./data.js";
+import { look } from "./look.js";
 
 // Of the length of a body: how broad and high it is, how thick and long lines and axes are.
 const BREADTH = 0.6;
@@ -25,7 +26,7 @@ export class Bodies {
     this.colours = colours;
     this.length = length;
     this.result = result;
-    const material = () => new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    const material = () => new MeshLambertMaterial(look(ghost));
     const box = new BoxGeometry(BREADTH * length, HEIGHT * length, length);
     const roof = new BoxGeometry(BREADTH * length, HEIGHT * length * 0.08, length);
     roof.translate(0, HEIGHT * length * 0.54, 0);
@@ -71,9 +72,9 @@ export class Bodies {
         axes.push(...ends.map((end) => [place, end]));
       });
     }
-    const look = (colour) => new MeshBasicMaterial({ color: colour, transparent: ghost, opacity: ghost ? 0.35 : 1 });
-    this.curve = bars(pieces, LINE * this.length, look(CURVE));
-    this.axes = bars(axes, AXIS * this.length, look(0xffffff));
+    const material = (color) => new MeshBasicMaterial({ color, ...look(ghost) });
+    this.curve = bars(pieces, LINE * this.length, material(ghost ? this.colours[0] : CURVE));
+    this.axes = bars(axes, AXIS * this.length, material(0xffffff));
     const colour = new Color();
     axes.forEach((_, i) => this.axes.setColorAt(i, colour.set(AXES[i % 3])));
     return [this.curve, this.axes];

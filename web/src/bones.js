@@ -5,6 +5,7 @@ import {
   Quaternion, Vector3,
 } from "three";
 import { position } from "./data.js";
+import { look } from "./look.js";
 import { Skin } from "./skin.js";
 
 // How far a bone is broad, of its length; and where, from the joint to the parent.
@@ -48,7 +49,6 @@ export class Bones {
   constructor(input, result, colours, ghost) {
     this.input = input;
     this.colours = colours;
-    this.ghost = ghost;
     this.order = parentsFirst(input.parents);
     this.turned = input.parents.map(() => new Quaternion());
     this.places = input.parents.map(() => new Vector3());
@@ -62,7 +62,7 @@ export class Bones {
     if (!(this.length > 0)) this.length = 1;
 
     const edge = this.length * CUBE;
-    const material = new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    const material = new MeshLambertMaterial(look(ghost));
     const joints = input.parents.map((_, joint) => joint);
     const kinds = [
       [octahedron(), joints.filter((joint) => input.parents[joint] >= 0)],
@@ -76,7 +76,7 @@ export class Bones {
       return mesh;
     });
     this.object = new Group().add(...this.meshes);
-    this.skin = input.skin ? new Skin(input.skin, ghost) : null;
+    this.skin = input.skin ? new Skin(input.skin, ghost ? colours[0] : null) : null;
     if (this.skin) this.object.add(this.skin.mesh);
     this.paint(-1);
   }

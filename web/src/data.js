@@ -63,6 +63,8 @@ export class Set {
     this.written = stored.results.map((result) => result.method);
     this.methods = this.written;
     this.results = new Map();
+    // Clips of other inputs that are shown with it.
+    this.ghosts = [];
     // What its keys are evaluated by, where the page can; frames a second, where not those that were written.
     this.live = null;
     this.rate = null;
@@ -71,7 +73,8 @@ export class Set {
   /** Lets the engine evaluate the keys. */
   async enliven(engine, options) {
     if (!engine || !this.stored.clip) return;
-    const { bytes, methods, origin } = this.stored.clip;
+    const { bytes, methods } = this.stored.clip;
+    const { origin } = this.stored;
     this.live = new Live(engine.unpack(await inflated(bytes)), { options, origin, isPlaced: this.isSkeleton });
     this.methods = [...this.written, ...methods.filter((name) => !this.written.includes(name))];
   }
@@ -155,6 +158,13 @@ export class Set {
     return low;
   }
 
+  /** The sample nearest to a time. */
+  nearest(time) {
+    const { times, samples } = this;
+    const sample = this.sampleAt(time);
+    return sample + 1 < samples && times[sample + 1] - time < time - times[sample] ? sample + 1 : sample;
+  }
+
   /** Key times of a box, and where its keys begin in `keys`. */
   keysOf(box) {
     const { sharedKeys, keyCounts } = this.stored;
@@ -182,10 +192,15 @@ export function position({ positions }, joints, sample, joint) {
   return low.map((least, axis) => least + packed[at + axis] * scale[axis]);
 }
 
-/** The same in words, to about a thousandth of a percent of the clip's extent. */
+/** The decimals of lengths that are exact to about a thousandth of a percent of the clip's extent. */
+export function decimals({ positions }) {
+  const extent = Math.max(...positions.size) || 1;
+  return Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
+}
+
+/** Where a joint is, in words. */
 export function placeInWords(result, joints, sample, joint) {
-  const extent = Math.max(...result.positions.size) || 1;
-  const digits = Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
+  const digits = decimals(result);
   // No -0.00: what is rounded to zero loses its sign.
   const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
   return position(result, joints, sample, joint).map(words).join("  ");

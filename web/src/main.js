@@ -1,6 +1,7 @@
 // What is shown, and what people do to it.
 
-import { Set as Input, mesh, placeInWords, rotation, skin } from "./data.js";
+import { Set as Input, decimals, mesh, placeInWords, rotation, skin } from "./data.js";
+import { Ghost } from "./ghosts.js";
 import { engine } from "./live.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./scene.js";
@@ -9,6 +10,16 @@ import { colours, switchTheme } from "./theme.js";
 const element = (id) => document.getElementById(id);
 const stored = JSON.parse(element("data").textContent);
 const inputs = stored.sets.map((set) => new Input(set));
+for (const input of inputs) {
+  for (const { set, ...found } of input.stored.ghosts) {
+    const ghost = new Ghost(inputs[set], found);
+    input.ghosts.push(ghost);
+    inputs[set].ghosts.push(ghost.reversed(input));
+  }
+}
+/** How many of the clips that are shown with one come before it. */
+const rank = (input) => input.ghosts.filter((ghost) => inputs.indexOf(ghost.input) < inputs.indexOf(input)).length;
+const COLOURS = stored.boxColours;
 // A longer chain is a tangle: its boxes are shown apart until somebody asks for the chain.
 const CHAIN = 64;
 const isTangle = (input) => !input.isSkeleton && input.boxes > CHAIN;
@@ -26,6 +37,8 @@ const state = {
   // Pictures between frames are evaluated, too.
   between: false,
   hasSkin: true,
+  // Clips that are not drawn. More at once than there are colours would be a crowd: the others wait to be chosen.
+  hidden: new Set(inputs.filter((input) => rank(input) >= COLOURS.length)),
   time: 0,
   sample: 0,
   playing: false,
@@ -33,6 +46,8 @@ const state = {
   speed: 1,
 };
 let results = [];
+// The ghosts that are drawn.
+let ghosts = [];
 let stage = null;
 const plots = new Plots({ components: element("components"), speeds: element("speeds") }, (time) => seek(time));
 
@@ -68,22 +83,45 @@ async function redraw(refit) {
   const { input, method, other } = state;
   await input.unpack();
   const names = other && other !== method ? [method, other] : [method];
-  results = await Promise.all(names.map((name) => input.result(name)));
+  const found = await Promise.all(names.map((name) => input.result(name)));
+  const drawn = input.ghosts.filter((ghost) => !state.hidden.has(ghost.input));
+  await Promise.all(drawn.map((ghost) => ghost.load(method)));
+  // Together: a picture may be drawn between any two of these.
+  const before = ghosts;
+  [results, ghosts] = [found, drawn];
   if (state.box < 0) state.box = input.isSkeleton ? input.busiest(results[0]) : 0;
   state.box = Math.min(state.box, input.boxes - 1);
   if (stage) {
-    const ghost = state.pairing === "ghost";
-    const pair = results.length > 1 ? { ghost, colours: ghost ? [colourOf(other)] : stored.boxColours } : null;
-    stage.fill(input, results, stored.boxColours, pair);
-    if (refit) {
-      stage.measure(results, input.samples, state.apart);
-      stage.frame(side());
-    }
+    stage.fill(figures());
+    if (refit || ghosts.some((ghost) => !before.includes(ghost))) stage.measure();
+    if (refit) stage.frame(side());
     stage.paint(picked());
   }
   tell();
   drawPlots();
   show(Math.min(state.sample, input.samples - 1));
+}
+
+/** The clip by its methods, and the ghosts: as scene.js draws them. */
+function figures() {
+  const { input, apart } = state;
+  const colours = ghosts.length > 0 ? [colourOfClip(input)] : COLOURS;
+  const own = results.map((result, i) => {
+    const isGhost = i > 0 && !side();
+    const shown = { input, result, isGhost, colours: isGhost ? [colourOf(result.method)] : colours };
+    return { ...shown, apart, side: side() ? 2 * i - 1 : 0, offset: [0, 0, 0], partner: (joint) => joint };
+  });
+  const others = ghosts.map((ghost) => ({
+    input: ghost.input,
+    result: ghost.result,
+    isGhost: true,
+    colours: [colourOfClip(ghost.input)],
+    apart: apart || isTangle(ghost.input),
+    side: side() ? -1 : 0,
+    offset: ghost.offset(input),
+    partner: (joint) => ghost.partner(joint),
+  }));
+  return [...own, ...others];
 }
 
 function complain(message) {
@@ -96,6 +134,7 @@ function complain(message) {
 const picked = () => (state.picked ? state.box : -1);
 const side = () => results.length > 1 && state.pairing === "side";
 const colourOf = (name) => stored.methods.find((method) => method.name === name).colour;
+const colourOfClip = (input) => COLOURS[rank(input) % COLOURS.length];
 
 /** Menus, names and legend as the state is. */
 function tell() {
@@ -134,9 +173,26 @@ function tell() {
     return entry;
   });
   element("legend").replaceChildren(...legend);
+  tellClips();
   markKeys();
   const square = input.isSkeleton && stage?.floor?.visible && stage.square;
   element("floor").textContent = square ? `squares of ${Number(square.toPrecision(1))}` : "";
+}
+
+/** Which clips are drawn: the chosen one and those that can be its ghosts. */
+function tellClips() {
+  const { input } = state;
+  element("clips").hidden = input.ghosts.length === 0;
+  inputs.forEach((other, i) => {
+    const field = element("clips").children[i];
+    const ghost = input.ghosts.find((ghost) => ghost.input === other);
+    field.hidden = !ghost && other !== input;
+    field.classList.toggle("ghost", Boolean(ghost));
+    field.querySelector("input").checked = !state.hidden.has(other);
+    const method = ghost && ghosts.includes(ghost) && ghost.method !== state.method ? ` (${ghost.method})` : "";
+    field.querySelector(".clip-name").textContent = other.name + method;
+    field.querySelector(".note").textContent = ghost?.note ?? "";
+  });
 }
 
 /** The methods that this input is shown by: those that were written, then those that the page evaluates. */
@@ -170,15 +226,8 @@ function markKeys() {
   const { times } = input.keysOf(state.box);
   const [first, last] = [input.times[0], input.times[input.samples - 1]];
   const within = Array.from(times).filter((time) => time >= first && time <= last);
-  const marks = within.length > MOST_MARKS ? [] : within.map((time) => new Option("", String(nearest(time))));
+  const marks = within.length > MOST_MARKS ? [] : within.map((time) => new Option("", String(input.nearest(time))));
   element("key-marks").replaceChildren(...marks);
-}
-
-/** The sample nearest to a time. */
-function nearest(time) {
-  const { times, samples } = state.input;
-  const sample = state.input.sampleAt(time);
-  return sample + 1 < samples && times[sample + 1] - time < time - times[sample] ? sample + 1 : sample;
 }
 
 function drawPlots() {
@@ -194,12 +243,17 @@ function show(sample, time = state.input.times[sample]) {
   const isBetween = time !== input.times[sample];
   const shown = isBetween ? results.map(({ method }) => input.live.pose(method, [time])) : results;
   const at = isBetween ? 0 : sample;
+  const moments = ghosts.map((ghost) => ghost.at(time));
   if (stage) {
-    // Matrices where scales are part of them.
-    const isScaled = input.skin && input.stored.hasScales && input.live;
-    const matrices = isScaled && results.map(({ method }) => input.live.matrices(method, time));
-    stage.place(shown, at, { apart: state.apart, side: side(), matrices, hasSkin: state.hasSkin });
+    const isHidden = state.hidden.has(input);
+    const own = shown.map((result) => ({ result, sample: at, isHidden, matrices: matrices(input, result.method, time) }));
+    const others = moments.map((moment, i) => {
+      const ghost = ghosts[i];
+      return moment && { ...moment, matrices: matrices(ghost.input, ghost.method, time + ghost.shift) };
+    });
+    stage.place([...own, ...others], { hasSkin: state.hasSkin });
   }
+  tellDistances(moments, { result: shown[0], sample: at });
   plots.now(time);
   element("time").value = String(sample);
   element("time").setAttribute("aria-valuetext", `${time.toFixed(3)} seconds`);
@@ -216,6 +270,24 @@ function show(sample, time = state.input.times[sample]) {
   element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(place, input.boxes, at, state.box)}` : "");
 }
 
+/** Matrices of joints where scales are part of what follows these. */
+function matrices(input, method, time) {
+  return input.skin && input.stored.hasScales && input.live ? input.live.matrices(method, time) : undefined;
+}
+
+/** How far each ghost is from the clip now. */
+function tellDistances(moments, own) {
+  const { input } = state;
+  const turned = (i) => stage && (stage.groups[i].turned ?? []);
+  const digits = results[0].positions ? decimals(results[0]) : 0;
+  inputs.forEach((other, i) => {
+    const place = ghosts.findIndex((ghost) => ghost.input === other);
+    const moment = moments[place] && { ...moments[place], turned: turned(results.length + place) };
+    const words = place < 0 ? "" : ghosts[place].words(input, { ...own, turned: turned(0) }, moment, digits);
+    element("clips").children[i].querySelector("output").textContent = words;
+  });
+}
+
 /** Shows a time, or the frame that is shown at it. */
 function showTime(time, sample) {
   if (state.between && state.input.live) show(state.input.sampleAt(time), time);
@@ -227,7 +299,7 @@ const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4)
 /** Goes to a time, or to the sample nearest to it. */
 function seek(time) {
   const { times, samples } = state.input;
-  const sample = nearest(time);
+  const sample = state.input.nearest(time);
   state.time = times[sample];
   showTime(Math.min(Math.max(time, times[0]), times[samples - 1]), sample);
 }
@@ -285,7 +357,7 @@ function setRate(rate) {
     element("rate").value = before ?? "";
     return;
   }
-  state.sample = nearest(time);
+  state.sample = input.nearest(time);
   load();
 }
 
@@ -300,6 +372,19 @@ function setSkin(on) {
   state.hasSkin = on;
   tell();
   show(state.sample, state.time);
+}
+
+function setHidden(input, isHidden) {
+  if (isHidden) state.hidden.add(input);
+  else state.hidden.delete(input);
+  load();
+}
+
+/** All ghosts, or none. */
+function toggleGhosts() {
+  const others = state.input.ghosts.map((ghost) => ghost.input);
+  const isHidden = others.some((other) => !state.hidden.has(other));
+  for (const other of others) setHidden(other, isHidden);
 }
 
 function setMethod(name) {
@@ -353,11 +438,18 @@ function loop(on) {
 }
 
 function setInput(input) {
+  // A ghost becomes the clip at the same moment, with the same joint.
+  const ghost = state.input.ghosts.find((ghost) => ghost.input === input);
+  const time = ghost ? state.time + ghost.shift : 0;
+  if (ghost && state.picked) state.box = ghost.partner(state.box);
+  if (state.box < 0) state.picked = false;
+  state.hidden.delete(input);
   Object.assign(state, { input, sample: 0, time: 0, apart: isTangle(input) });
   if (!state.picked) state.box = -1;
   if (!input.methods.includes(state.method)) state.method = input.methods[0];
   if (!input.methods.includes(state.other)) state.other = "";
   load(true);
+  if (ghost) loading = loading.then(() => seek(time));
 }
 
 function theme() {
@@ -388,6 +480,7 @@ const KEYS = [
   ["- +", ["-", "+", "="], "slower, faster", (key) => faster(key === "-" ? -1 : 1)],
   ["e", "e", "between frames, too, or frames alone", () => setBetween(!state.between)],
   ["k", "k", "what the joints carry", () => setSkin(!state.hasSkin)],
+  ["h", "h", "the clips of other inputs as ghosts, or not", toggleGhosts],
   ["l", "l", "loop", () => loop(!state.loop)],
   ["r", "r", "the whole view again", () => stage?.frame(side())],
   ["t", "t", "light or dark", theme],
@@ -455,10 +548,21 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
 }
 
+/** The field of one clip: whether it is drawn, its name, and how far it is from the chosen one. */
+function clipField(input) {
+  const field = document.createElement("div");
+  field.innerHTML =
+    '<label class="check"><input type="checkbox"><span class="clip-name"></span></label> <output aria-live="off"></output> <span class="note"></span>';
+  field.style.setProperty("--mark", colourOfClip(input));
+  field.querySelector("input").addEventListener("change", (event) => setHidden(input, !event.target.checked));
+  return field;
+}
+
 function menus() {
   fill(element("set"), inputs.map((input, i) => [String(i), input.name]));
   element("set-field").style.display = inputs.length > 1 ? "" : "none";
   element("set-label").textContent = stored.menu;
+  element("clips").replaceChildren(...inputs.map(clipField));
   fill(element("speed"), SPEEDS.map((speed) => [String(speed), `${speed}×`]));
   element("keys").replaceChildren(
     ...KEYS.flatMap(([label, , text]) => {
@@ -502,7 +606,7 @@ async function start() {
     const between = now - before;
     before = now;
     // A page that was hidden goes on where it was.
-    if (state.playing) advance(Math.min(between, 250) / 1000);
+    if (state.playing && state.input.times) advance(Math.min(between, 250) / 1000);
     stage?.draw(between);
     requestAnimationFrame(frame);
   };
@@ -519,6 +623,7 @@ globalThis.tumble = {
   vertex: (vertex, group = 0) => stage.groups[group].skin.vertex(vertex).toArray(),
   vertices: (group = 0) => stage.groups[group].skin?.mesh.geometry.attributes.position.count ?? 0,
   results: () => results,
+  ghosts: () => ghosts.map((ghost) => ghost.input.name),
   frames: () => stage.drawn,
   pixelRatio: () => stage.ratio,
   inView: () => stage.inView(),

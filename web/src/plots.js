@@ -28,8 +28,7 @@ function keyDots(set, box, columns) {
   const { times, first } = set.keysOf(box);
   times.forEach((time, key) => {
     if (time < set.times[0] || time > set.times[set.samples - 1]) return;
-    let sample = set.sampleAt(time);
-    if (sample + 1 < set.samples && set.times[sample + 1] - time < time - set.times[sample]) sample += 1;
+    const sample = set.nearest(time);
     const values = PLACES.map((place) => set.keys[(first + key) * 4 + place] / 32767);
     const product = values.reduce((sum, value, i) => sum + value * columns[i][sample], 0);
     values.forEach((value, i) => (dots[i][sample] = product < 0 ? -value : value));

@@ -8,6 +8,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Bodies } from "./bodies.js";
 import { Bones } from "./bones.js";
+import { look } from "./look.js";
 
 // Frames slower than this are drawn with fewer pixels.
 const SLOW = 30;
@@ -27,13 +28,12 @@ class Boxes {
     const breadth = length * 0.28;
     const geometry = new BoxGeometry(breadth, length * 0.96, breadth);
     geometry.translate(0, -length / 2, 0); // it hangs from the origin
-    const material = new MeshLambertMaterial({ transparent: ghost, opacity: ghost ? 0.35 : 1 });
+    const material = new MeshLambertMaterial(look(ghost));
     this.mesh = new InstancedMesh(geometry, material, count);
     this.mesh.frustumCulled = false;
     this.object = this.mesh;
     this.meshes = [this.mesh];
     this.length = length;
-    this.ghost = ghost;
     this.colours = colours;
     this.paint(-1);
   }
@@ -164,42 +164,55 @@ export class Stage {
     this.stale = true;
   }
 
-  /** New boxes, bones or bodies: of one result, or of two. */
-  fill(input, results, colours, others) {
+  /**
+   * New boxes, bones or bodies, a group for each figure: its clip and its result, its colours, whether it is a ghost and
+   * whether its boxes stand apart, on which side it stands (-1, 0, 1), how far its origin is from that of the first
+   * (`offset`), and which of its joints is the same as one of the first (`partner`).
+   */
+  fill(figures) {
     for (const group of this.groups ?? []) {
       this.scene.remove(group.object);
       group.dispose();
     }
-    const group = (result, colours, ghost) => {
-      if (input.bodies) return new Bodies(input, result, colours, ghost);
-      if (input.isSkeleton) return new Bones(input, result, colours, ghost);
-      return new Boxes(input.boxes, input.length, colours, ghost);
-    };
-    this.groups = [group(results[0], colours, false)];
-    if (others) this.groups.push(group(results[1], others.colours, others.ghost));
+    this.figures = figures;
+    this.groups = figures.map(({ input, result, colours, isGhost, offset }) => {
+      const group = input.bodies
+        ? new Bodies(input, result, colours, isGhost)
+        : input.isSkeleton
+          ? new Bones(input, result, colours, isGhost)
+          : new Boxes(input.boxes, input.length, colours, isGhost);
+      group.object.position.fromArray(offset);
+      return group;
+    });
     this.scene.add(...this.groups.map((group) => group.object));
-    this.hasSquares = input.isSkeleton;
+    this.hasSquares = figures[0].input.isSkeleton;
     this.stale = true;
   }
 
   paint(chosen) {
-    for (const group of this.groups) group.paint(chosen);
+    this.groups.forEach((group, i) => group.paint(this.figures[i].partner(chosen)));
     this.stale = true;
   }
 
-  place(results, sample, { apart, side, matrices, hasSkin }) {
-    const gap = side ? this.span : 0;
+  /** Each figure at a sample of a result, `moments[i]`; nothing of one that has no moment, or is hidden. */
+  place(moments, { hasSkin }) {
     this.groups.forEach((group, i) => {
-      const shift = results.length > 1 ? (i - 0.5) * gap : 0;
-      group.place(results[i], sample, { apart, shift, matrices: matrices?.[i], hasSkin });
+      const [moment, { apart, side }] = [moments[i], this.figures[i]];
+      group.object.visible = Boolean(moment) && !moment.isHidden;
+      if (!moment) return;
+      const shift = side === 0 ? 0 : (side * this.span) / 2;
+      group.place(moment.result, moment.sample, { apart, shift, matrices: moment.matrices, hasSkin });
     });
     this.stale = true;
   }
 
   /** How much room all of it takes. */
-  measure(results, samples, apart) {
+  measure() {
+    this.points = this.groups.flatMap((group, i) => {
+      const { input, result, apart } = this.figures[i];
+      return group.points(result, input.samples, apart).map((point) => point.add(group.object.position));
+    });
     const [group] = this.groups;
-    this.points = results.flatMap((result) => group.points(result, samples, apart));
     this.extent = new Box3().setFromPoints(this.points);
     for (const mesh of this.ground) {
       const { min, max } = new Box3().setFromObject(mesh);
@@ -310,7 +323,9 @@ export class Stage {
     const point = new Vector2(((x - area.left) / area.width) * 2 - 1, 1 - ((y - area.top) / area.height) * 2);
     const ray = new Raycaster();
     ray.setFromCamera(point, this.camera);
-    const meshes = this.groups.flatMap((group) => group.meshes).filter((mesh) => mesh.visible);
+    const [{ input }] = this.figures;
+    const own = this.groups.filter((group, i) => this.figures[i].input === input && group.object.visible);
+    const meshes = own.flatMap((group) => group.meshes).filter((mesh) => mesh.visible);
     for (const mesh of meshes) mesh.boundingSphere = null;
     const [hit] = ray.intersectObjects(meshes);
     if (!hit) return -1;
@@ -320,7 +335,7 @@ export class Stage {
   /** How many boxes, bones, curves and axes stand in the scene. */
   inView() {
     const count = (object) => (object.visible ? (object.count ?? 0) : 0);
-    return this.groups.map((group) => group.object.children.map(count));
+    return this.groups.map(({ object }) => (object.visible ? object.children.map(count) : []));
   }
 
   /** Draws if anything has changed; where that takes long, with fewer pixels from then on. */

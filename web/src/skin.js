@@ -12,15 +12,16 @@ const COLOUR = 0x9aa3ad;
 const MEASURED = 300;
 
 export class Skin {
-  constructor({ places, triangles, bonesOf, weights, joints, toJoints }, ghost) {
+  /** `ghostColour`: where it is one. */
+  constructor({ places, triangles, bonesOf, weights, joints, toJoints }, ghostColour) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(places, 3));
     geometry.setAttribute("skinIndex", new BufferAttribute(bonesOf, 4));
     geometry.setAttribute("skinWeight", new BufferAttribute(weights, 4, true));
     geometry.setIndex(new BufferAttribute(triangles, 1));
     geometry.computeVertexNormals();
-    const opacity = ghost ? OPACITY / 2 : OPACITY;
-    const look = { color: COLOUR, transparent: true, opacity, depthWrite: false, side: DoubleSide };
+    const opacity = ghostColour ? OPACITY / 2 : OPACITY;
+    const look = { color: ghostColour ?? COLOUR, transparent: true, opacity, depthWrite: false, side: DoubleSide };
     this.joints = joints;
     this.bones = joints.map(() => {
       const bone = new Bone();

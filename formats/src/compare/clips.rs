@@ -38,6 +38,16 @@ pub struct CommonTimes {
     pub warning: Option<String>,
 }
 
+/// The tracks of two clips that belong together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MatchedTracks {
+    /// The index of each pair's track in the first clip and in the second.
+    pub pairs: Vec<[usize; 2]>,
+    /// Names of the tracks that only the first clip has, and of those that only the second clip has.
+    pub missing: [Vec<String>; 2],
+}
+
 /// The differences of two clips.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -254,7 +264,7 @@ impl ClipPair<'_> {
         let found = self.matched_joints()?;
         self.check_any_pair(&found)?;
         if in_world {
-            check_known_parents(inputs, motions, &found.matched.pairs)?;
+            self.check_known_parents(&found.matched.pairs)?;
         } else {
             let [first, second] = &found.joints;
             first.check_parents(second, &found.matched, inputs)?;
@@ -374,13 +384,17 @@ impl ClipPair<'_> {
 
     /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
     /// different whole seconds.
-    fn shift(&self) -> f64 {
+    #[must_use]
+    pub fn shift(&self) -> f64 {
         let [first, second] = self.clips;
         (first.time_offset - second.time_offset) as f64
     }
 
     /// Refuses rotations relative to the parents beside rotations relative to the world.
-    fn check_spaces(&self) -> Result<(), CompareError> {
+    ///
+    /// # Errors
+    /// Which clip has the ones and which the others.
+    pub fn check_spaces(&self) -> Result<(), CompareError> {
         let [first, second] = self.clips.map(|clip| clip.is_world);
         let has_parents = |clip: &&Motion| clip.skeleton.iter().any(|joint| joint.parent.is_some());
         if first == second || !self.clips.iter().any(has_parents) {
@@ -454,6 +468,27 @@ impl ClipPair<'_> {
             }
         };
         Ok(MatchedJoints { joints, matched })
+    }
+
+    /// Refuses, in the world, pairs of tracks of which one has a parent and the other is of a clip without a skeleton.
+    ///
+    /// # Errors
+    /// Names the first such pair.
+    pub fn check_known_parents(&self, pairs: &[[usize; 2]]) -> Result<(), CompareError> {
+        check_known_parents(self.inputs, self.clips, pairs)
+    }
+
+    /// The tracks that both clips have, by their names, and those that only one has.
+    ///
+    /// # Errors
+    /// When the names do not tell the tracks apart, or when the clips have no track in common.
+    pub fn tracks(&self) -> Result<MatchedTracks, CompareError> {
+        let found = self.matched_joints()?;
+        self.check_any_pair(&found)?;
+        Ok(MatchedTracks {
+            missing: found.missing(),
+            pairs: found.matched.pairs,
+        })
     }
 
     /// Refuses clips without a common track.

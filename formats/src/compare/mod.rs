@@ -11,7 +11,8 @@ use crate::world::HierarchyError;
 
 pub use crate::compare::arrays::ArrayDifference;
 pub use crate::compare::clips::{
-    ChannelDifference, ClipDifference, ClipPair, CommonTimes, JointDifference, TimedSpread,
+    ChannelDifference, ClipDifference, ClipPair, CommonTimes, JointDifference, MatchedTracks,
+    TimedSpread,
 };
 pub use crate::compare::paths::{
     AlignmentSummary, PathDifference, PathErrors, PathMeasure, PathStatistics,

@@ -126,20 +126,13 @@ fn refused(error: CompareError) -> Failure {
     }
 }
 
-/// For each animation of a file, the index of the one of the same name in another file that has as many; of the same
-/// index if each file has one, or their names are equal in the same order.
+/// For each animation of a file, the index of its [partner] in another file that has as many.
 fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Failure> {
     let all = clips.map(|clips| -> Vec<Option<&str>> {
         clips.iter().map(|clip| clip.name.as_deref()).collect()
     });
-    if all[0].len() == 1 || all[0] == all[1] {
-        return Ok((0..all[0].len()).collect());
-    }
-    let partner = |(index, name): (usize, &Option<&str>)| {
-        let count = |side: usize| all[side].iter().filter(|other| *other == name).count();
-        let same = all[1].iter().position(|other| other == name);
-        let found = same.filter(|_| name.is_some() && count(0) == 1 && count(1) == 1);
-        found.ok_or_else(|| {
+    let found_or_refused = |index: usize| {
+        partner([&all[0], &all[1]], index).ok_or_else(|| {
             let message = format!(
                 "{} {} is not exactly one animation of {}; choose one of each (--animation)",
                 names::input(paths[0]),
@@ -149,10 +142,22 @@ fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Fail
             Failure::new(ALL_INPUTS, message)
         })
     };
-    let partners: Vec<usize> = (all[0].iter().enumerate())
-        .map(partner)
-        .collect::<Result<_, _>>()?;
-    Ok(partners)
+    (0..all[0].len()).map(found_or_refused).collect()
+}
+
+/// The index, among the animations of another file, of the one that belongs to animation `index` of a file, by the
+/// names of all: the one of the same name, if it is unique on both sides; that of the same index if each file has one,
+/// or if the names are equal in the same order.
+pub(crate) fn partner(all: [&[Option<&str>]; 2], index: usize) -> Option<usize> {
+    if all.iter().all(|names| names.len() == 1) || all[0] == all[1] {
+        return Some(index);
+    }
+    let name = all[0].get(index).copied().flatten()?;
+    let is_same = |other: &Option<&str>| *other == Some(name);
+    let is_unique =
+        |names: &[Option<&str>]| names.iter().copied().filter(|it| is_same(it)).count() == 1;
+    let same = all[1].iter().position(is_same);
+    same.filter(|_| all.iter().all(|names| is_unique(names)))
 }
 
 /// The heading of the options for trajectories in help.

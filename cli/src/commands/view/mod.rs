@@ -1,5 +1,6 @@
 //! `tumble view`: a page that shows boxes turning, skeletons moving and bodies on paths, in any browser.
 
+mod ghosts;
 pub(crate) mod pack;
 pub(crate) mod page;
 pub(crate) mod result;
@@ -26,6 +27,7 @@ use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
 use crate::batch::target::Destination;
 use crate::commands::travel::{Scenery, TravelSource, is_path_file};
+use crate::commands::view::ghosts::{FoundGhosts, find_ghosts};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
@@ -45,11 +47,16 @@ and at the keys. Other methods, rates and times are evaluated in the page, by th
 the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and all animations of a
 file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their
 paths, with frames as small axes.
+Several inputs are shown at once, at the same moment: the first one solid, the others as translucent
+ghosts, each in a colour of its own. A list names them, hides each, and says which joint is furthest
+from that of the solid one; a menu chooses which is solid. Joints, and animations of files with
+several, are matched by equal names.
 
 Examples:
   tumble view data/pendulum.dat -o pendulum.html
   tumble view data/pendulum.dat --open
-  tumble view a.dat b.dat -m slerp,c2 --fps 120 -o both.html
+  tumble view take.bvh cleaned.npz -o both.html     the second as a ghost of the first
+  tumble view a.dat b.dat -m slerp,c2 --no-ghosts -o menu.html
   tumble view road.csv --frame minimal,frenet --path-speed constant --open
   tumble view walk.glb --mesh hill.obj,rocks.obj -o walk.html")]
 pub(crate) struct Arguments {
@@ -89,6 +96,9 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    /// Show one input at a time, chosen in a menu, instead of the others as ghosts beside it
+    #[arg(long)]
+    no_ghosts: bool,
     /// Leave the engine and the full keys out of the page: it is smaller, and shows only the requested
     /// methods and frames
     #[arg(long)]
@@ -142,6 +152,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     arguments.check_effects(&shown)?;
+    tell_apart(&mut shown);
+    let found = find_ghosts(&shown);
+    match arguments.no_ghosts {
+        true => arguments.check_ghosts(&found, inputs.len())?,
+        false => found.give(&mut shown),
+    }
     let methods = arguments.methods(&shown)?;
     let mut device = arguments.device.open()?;
     let menu = if inputs.len() > 1 {
@@ -190,6 +206,17 @@ impl Arguments {
             Scenery::refuse(line)?;
         }
         Ok(())
+    }
+
+    /// Refuses `--no-ghosts` where there are none.
+    fn check_ghosts(&self, found: &FoundGhosts, inputs: usize) -> Result<(), Failure> {
+        let on = match inputs {
+            _ if !found.is_empty() => return Ok(()),
+            1 => "one input",
+            _ => "inputs without an animation and a time in common",
+        };
+        let option = [("no_ghosts", "--no-ghosts")];
+        self.command_line.refuse(&option, on, "leave it out")
     }
 
     /// The clip with the selected tracks and their ancestors: joints, or the boxes of a chain before them.
@@ -346,6 +373,20 @@ impl Arguments {
             self.interpolation,
         );
         Ok(page.html())
+    }
+}
+
+/// Gives clips of inputs of the same name in different folders titles with the folders.
+fn tell_apart(shown: &mut [ShownClip]) {
+    let titles = shown
+        .iter()
+        .map(|one| (one.file.clone(), one.title.clone()));
+    let titles: Vec<(PathBuf, String)> = titles.collect();
+    for one in shown {
+        let is_same = |(file, title): &(PathBuf, String)| *file != one.file && *title == one.title;
+        if titles.iter().any(is_same) {
+            one.title.clone_from(&one.name);
+        }
     }
 }
 

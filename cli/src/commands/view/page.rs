@@ -10,7 +10,8 @@ use tumble_formats::packed;
 use tumble_routes::mesh::Mesh;
 
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
-use crate::commands::travel::{Scenery, scene_origin};
+use crate::commands::travel::Scenery;
+use crate::commands::view::ghosts::Ghost;
 use crate::commands::view::pack::{bytes, differences, doubles, shorts, text, words};
 use crate::commands::view::result::{StoredResult, short};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
@@ -105,8 +106,6 @@ struct StoredClip {
     bytes: String,
     /// By which methods.
     methods: Vec<&'static str>,
-    /// Where positions count from.
-    origin: [f64; 3],
 }
 
 impl StoredClip {
@@ -124,7 +123,6 @@ impl StoredClip {
                 .into_iter()
                 .map(ResultChoice::name)
                 .collect(),
-            origin: scene_origin(&shown.clip).to_array(),
         })
     }
 }
@@ -171,6 +169,10 @@ pub(crate) struct StoredSet {
     /// Whether results are named after frames, not after methods.
     has_frames: bool,
     times: String,
+    /// Where positions count from.
+    origin: [f64; 3],
+    /// Clips of later inputs that are shown with it.
+    ghosts: Vec<Ghost>,
     /// Whether all boxes have the same key times, which are stored once then.
     shared_keys: bool,
     key_counts: Vec<usize>,
@@ -238,6 +240,8 @@ impl StoredSet {
             names: (0..joints).map(|track| set.track_name(track)).collect(),
             is_world: shown.clip.is_world,
             times: doubles(&shown.times),
+            origin: shown.origin().to_array(),
+            ghosts: shown.ghosts.clone(),
             shared_keys,
             key_counts: if shared_keys {
                 Vec::new()

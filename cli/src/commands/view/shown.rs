@@ -1,8 +1,8 @@
 //! One clip, or the paths, of the page: which methods it is shown by, when it is sampled, and its results.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use tumble::paths::PathFrame;
 use tumble::{Axes, Channel, Error, Layout, Quantity, SampleTimes, Timeline, TrackError, TrackSet};
 use tumble_formats::carried_mesh::CarriedMesh;
@@ -13,7 +13,8 @@ use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::{CurveChoice, InterpolationArguments, MethodArgument};
 use crate::arguments::path::frame_summary;
 use crate::batch::room;
-use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of};
+use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of, scene_origin};
+use crate::commands::view::ghosts::Ghost;
 use crate::commands::view::result::StoredResult;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -64,6 +65,8 @@ impl ResultChoice {
 
 /// One clip, or the paths, of an input.
 pub(crate) struct ShownClip {
+    /// The input.
+    pub(crate) file: PathBuf,
     /// Its name in messages.
     pub(crate) name: String,
     /// Its title on the page.
@@ -76,6 +79,8 @@ pub(crate) struct ShownClip {
     pub(crate) mesh: Option<CarriedMesh>,
     /// Seconds, increasing.
     pub(crate) times: Vec<f64>,
+    /// Clips of later inputs that are shown with it.
+    pub(crate) ghosts: Vec<Ghost>,
 }
 
 impl ShownClip {
@@ -93,6 +98,7 @@ impl ShownClip {
             title = format!("{title}: {clip_name}");
         }
         Self {
+            file: path.to_owned(),
             name,
             title,
             clip,
@@ -100,6 +106,7 @@ impl ShownClip {
             box_length: box_length.unwrap_or(1.0),
             mesh: None,
             times: Vec::new(),
+            ghosts: Vec::new(),
         }
     }
 
@@ -113,6 +120,16 @@ impl ShownClip {
             path: Some(source),
             ..Self::new(path, clip, None, false)
         }
+    }
+
+    /// The clip as it was read, with its clock and its origins.
+    pub(crate) fn motion(&self) -> &Motion {
+        self.path.as_ref().map_or(&self.clip, TravelSource::clip)
+    }
+
+    /// The origin that positions are relative to.
+    pub(crate) fn origin(&self) -> DVec3 {
+        scene_origin(self.motion())
     }
 
     /// Whether bodies on paths are drawn, instead of bones or a chain.
