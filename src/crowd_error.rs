@@ -261,12 +261,6 @@ impl From<SetError> for CrowdError {
 
 impl From<JointMatchError> for CrowdError {
     fn from(error: JointMatchError) -> Self {
-        match error {
-            JointMatchError::Count {
-                joints: [joints, tracks],
-                ..
-            } => Self::Tracks { tracks, joints },
-            error => Self::OtherJoints(Box::new(error)),
-        }
+        Self::OtherJoints(Box::new(error))
     }
 }

@@ -429,8 +429,8 @@ fn the_unit_of_time_changes_no_bits() {
         .map(|step| {
             let mut rotation = random.rotation();
             let mut next = || {
-                let turn = random.between(0.0, step);
-                rotation *= DQuat::from_axis_angle(random.direction(), turn);
+                let angle = random.between(0.0, step);
+                rotation *= DQuat::from_axis_angle(random.direction(), angle);
                 rotation.normalize().as_quat()
             };
             times.iter().map(|_| next()).collect()

@@ -181,9 +181,12 @@ impl CrowdLibrary {
         let (tracks, joints) = (set.track_count(), self.joint_count());
         let named = Joints::of(set);
         let order = match &self.joints {
-            Some(known) => known.order_of(&named, ["the library", "the clip"])?,
+            // If both have names, the joint that is missing is named instead of the numbers.
+            Some(known) if tracks == joints || (known.is_named() && named.is_named()) => {
+                known.order_of(&named, ["the library", "the clip"])?
+            }
             None if tracks == joints => (0..joints).collect(),
-            None => return Err(CrowdError::Tracks { tracks, joints }),
+            _ => return Err(CrowdError::Tracks { tracks, joints }),
         };
         let is_shuffled = !set.is_in_order(&order);
         let selected = is_shuffled.then(|| set.select(order)).transpose();

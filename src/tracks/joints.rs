@@ -276,10 +276,10 @@ impl Joints {
             (bvh_name, default_name),
         ]
         .into_iter()
-        .find_map(|(own, others)| {
-            let numbers = numbers_of(&other.names, others)?;
-            numbers_of(&self.names, own)?;
-            Some(numbers.into_iter().map(own).collect())
+        .find_map(|(to, from)| {
+            let numbers = numbers_of(&other.names, from)?;
+            numbers_of(&self.names, to)?;
+            Some(numbers.into_iter().map(to).collect())
         });
         renamed.map_or(Cow::Borrowed(&other.names), Cow::Owned)
     }

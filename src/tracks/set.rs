@@ -319,8 +319,12 @@ impl TrackSet {
             set.velocities.set(new_index, track.velocities);
             set.tangents.set(new_index, track.tangents);
             set.tcb.set(new_index, track.tcb);
-            for (to, from) in set.vectors.iter_mut().zip(&self.vectors) {
-                to.push(from.get(index).cloned().flatten());
+            for channel in 0..set.vectors.len() {
+                let vectors = self.vectors[channel].get(index).cloned().flatten();
+                if let Some(vectors) = &vectors {
+                    set.widen_span(&vectors.times);
+                }
+                set.vectors[channel].push(vectors);
             }
         }
         Ok(set)

@@ -80,6 +80,26 @@ fn a_set_knows_which_keys_the_one_before_turns() {
     assert!(set.arcs_are_short());
 }
 
+/// A clip whose translations begin before its rotations began later when its tracks were put in another order.
+#[test]
+fn selected_tracks_keep_the_times_of_their_vectors() {
+    let mut set = TrackSet::new();
+    for _ in 0..2 {
+        set.push("", &[0.5, 1.0], &[Quat::IDENTITY; 2]).unwrap();
+    }
+    let (times, points) = ([0.0, 2.0], [[1.0, 0.0, 0.0]; 2]);
+    set.set_translations(1, &times, &points, &[]).unwrap();
+    set.set_scales(0, &[0.25, 1.5], &points, &[]).unwrap();
+    for (tracks, span) in [
+        (&[0, 1][..], (0.0, 2.0)),
+        (&[1][..], (0.0, 2.0)),
+        (&[0][..], (0.25, 1.5)),
+    ] {
+        let selected = set.select(tracks.iter().copied()).unwrap();
+        assert_eq!(selected.time_span(), Some(span), "{tracks:?}");
+    }
+}
+
 #[test]
 fn times_are_refused_wherever_they_do_not_increase() {
     let good: Vec<f64> = (0..9).map(f64::from).collect();
