@@ -15,21 +15,28 @@ const LONG: [(&str, Option<&str>); 10] = [
     ("tumble bench", None),
     (
         "tumble render data/pendulum.dat -o pendulum.gif",
-        Some(" --end 0.2"),
+        Some(" --end 0.1"),
     ),
     (
         "tumble render data/pendulum.dat -m slerp,",
-        Some(" --end 0.2"),
+        Some(" --end 0.1"),
     ),
     (
         "tumble render data/pendulum.dat --fps 60",
         Some(" --end 0.1"),
     ),
-    ("tumble render walk.bvh", Some(" --end 0.2")),
-    ("tumble render road.csv", Some(" --end 0.2")),
-    ("tumble render walk.glb", Some(" --end 0.2")),
+    ("tumble render walk.bvh", Some(" --end 0.1")),
+    ("tumble render road.csv", Some(" --end 0.1")),
+    ("tumble render walker.glb", Some(" --end 0.1")),
     ("tumble verify data/pendulum.dat", Some(" --end 1")),
     ("tumble generate --boxes 4096", None),
+];
+
+/// What is done before an example whose inputs are results of another command, or whose results are inputs of others.
+const BEFORE: [(&str, &str); 3] = [
+    ("tumble check", "tumble eval walks -o results"),
+    ("tumble merge", "tumble eval walks -o results --shard 1/1"),
+    ("tumble generate --hill", "rm rocks.obj"),
 ];
 
 /// A body of five joints that walks, as BVH.
@@ -103,6 +110,7 @@ fn write_inputs(folder: &Path) {
     generate("generate --boxes 2 --seconds 2 -o a.dat");
     for name in [
         "b.dat",
+        "chain.dat",
         "walk.dat",
         "clips/a.dat",
         "walks/a.dat",
@@ -112,6 +120,7 @@ fn write_inputs(folder: &Path) {
     }
     for name in [
         "walk.bvh",
+        "take.bvh",
         "retargeted.bvh",
         "clips/b.bvh",
         "takes/one.bvh",
@@ -120,7 +129,13 @@ fn write_inputs(folder: &Path) {
         write(name, walk().as_bytes());
     }
     fs::create_dir(folder.join("amass")).unwrap();
-    for name in ["walk.glb", "dance.glb", "walk.npz", "amass/walk.npz"] {
+    for name in [
+        "walk.glb",
+        "dance.glb",
+        "walk.npz",
+        "cleaned.npz",
+        "amass/walk.npz",
+    ] {
         generate(&format!("convert walk.bvh -o {name}"));
     }
     generate("reduce walk.bvh --tolerance 0.1deg -o reduced.glb");
@@ -128,17 +143,22 @@ fn write_inputs(folder: &Path) {
         generate(&format!("eval a.dat -o {name}"));
     }
     let road = b"t,x,y,z\n0,0,0,0\n1,1,0,1\n2,2,0,0\n3,1,0,-1\n4,0,0,0\n";
-    for name in ["road.csv", "orbit.csv", "paths/one.csv", "paths/two.csv"] {
+    for name in [
+        "road.csv",
+        "lap.csv",
+        "orbit.csv",
+        "paths/one.csv",
+        "paths/two.csv",
+    ] {
         write(name, road);
     }
-    write("lap.csv", b"t,x,y,z\n0,0,0,0\n1,1,0,1\n2,2,0,0\n3,1,0,-1\n");
     let points = [
         [0.0, 0.0, 0.0],
         [1.0, 0.0, 1.0],
         [2.0, 0.0, 0.0],
         [3.0, 0.0, 1.0],
     ];
-    write("points.npy", &npy("4, 3", points.into_iter().flatten()));
+    write("points.npy", &npy("1, 4, 3", points.into_iter().flatten()));
     let poses: String = (0..50)
         .map(|i| {
             let t = f64::from(i) / 10.0;
@@ -148,6 +168,7 @@ fn write_inputs(folder: &Path) {
     write("truth.tum", poses.as_bytes());
     write("estimate.tum", poses.as_bytes());
     generate("generate --hill -o hill.obj --rocks rocks.obj");
+    generate("follow road.csv -o walker.glb");
     write("pairs.txt", b"0,0,0 9,5,0\n1,1,0 8,5,0\n");
     plaza_glb(folder);
     let people = "name,radius,speed,x,y,z,to_x,to_y,to_z,track\none,0.5,1,5,1,10,15,1,10,\n\
@@ -160,7 +181,7 @@ fn write_inputs(folder: &Path) {
     );
 }
 
-/// Runs a line of a shell, in which programs that it names are in `folder/bin`.
+/// Runs lines of a shell, which finds programs in `folder/bin`, where it begins.
 fn shell(folder: &Path, line: &str) -> Run {
     let path = format!(
         "{}/bin:{}",
@@ -170,7 +191,7 @@ fn shell(folder: &Path, line: &str) -> Run {
     let mut command = Command::new("bash");
     command
         .args(["-e", "-o", "pipefail", "-c", line])
-        .current_dir(folder.join("here"));
+        .current_dir(folder.join("bin"));
     command
         .env("PATH", path)
         .env("HOME", folder.join("home"))
@@ -214,52 +235,26 @@ fn every_example_of_the_help_runs() {
         .collect();
     commands.retain(|command| *command != "help");
     assert!(commands.len() > 15, "{commands:?}");
-    let mut count = 0;
+    // In place of the browser, and of what may not be installed.
+    for (name, text) in [
+        ("tumble", format!("exec '{program}' \"$@\"")),
+        ("xdg-open", String::new()),
+        ("jq", "cat".to_owned()),
+        ("python3", "cat".to_owned()),
+    ] {
+        let path = folder.join("bin").join(name);
+        fs::create_dir_all(folder.join("bin")).unwrap();
+        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    for name in [
+        ".config/fish/completions",
+        ".local/share/bash-completion/completions",
+    ] {
+        fs::create_dir_all(folder.join("home").join(name)).unwrap();
+    }
+    let (mut count, mut failed) = (0, Vec::new());
     for command in std::iter::once("").chain(commands) {
-        // Each help's examples are run in order in a folder of their own, since they name the same results.
-        let folder = folder.join(command);
-        for name in [
-            "here",
-            "bin",
-            "home/.config/fish/completions",
-            "home/.local/share/bash-completion/completions",
-        ] {
-            fs::create_dir_all(folder.join(name)).unwrap();
-        }
-        // In place of the browser, and of what may not be installed.
-        for (name, text) in [
-            ("tumble", format!("exec '{program}' \"$@\"")),
-            ("xdg-open", String::new()),
-            ("jq", "cat".to_owned()),
-            ("python3", "cat".to_owned()),
-        ] {
-            let path = folder.join("bin").join(name);
-            fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-            fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-        }
-        let copied = Command::new("cp")
-            .arg("-r")
-            .arg(inputs.join("."))
-            .arg(folder.join("here"))
-            .status();
-        assert!(copied.unwrap().success());
-        match command {
-            "check" | "merge" => {
-                let line = "tumble eval walks -o results";
-                let shard = if command == "merge" {
-                    " --shard 1/1"
-                } else {
-                    ""
-                };
-                assert_eq!(shell(&folder, &format!("{line}{shard}")).code, 0);
-            }
-            // The results of the first lines.
-            "" => assert_eq!(
-                shell(&folder, "tumble eval walks -o results --shard 1/1").code,
-                0
-            ),
-            _ => {}
-        }
         let mut line_of_help = vec![command, "--help"];
         line_of_help.retain(|word| !word.is_empty());
         let help = String::from_utf8(succeed(&inputs, &line_of_help).out).unwrap();
@@ -270,14 +265,22 @@ fn every_example_of_the_help_runs() {
                 Some((_, Some(shorter))) => line += shorter,
                 None => {}
             }
-            let _ = (
-                fs::remove_file(folder.join("here/way.csv")),
-                fs::remove_file(folder.join("here/out.npy")),
+            // Inputs of some are results of others.
+            let out = example.split(" -o ").nth(1);
+            let out = out.and_then(|rest| rest.split_whitespace().next());
+            let before = BEFORE.iter().find(|(start, _)| example.starts_with(start));
+            let before = before.map_or("", |(_, before)| before);
+            let fresh = format!(
+                "rm -rf ../here; cp -r ../../inputs ../here; cd ../here; rm -rf {}",
+                out.unwrap_or_default()
             );
-            let run = shell(&folder, &line);
-            assert_eq!(run.code, 0, "{command}: {example}\n{}", run.words);
+            let run = shell(&folder, &format!("{fresh}\n{before}\n{line}"));
+            if run.code != 0 {
+                failed.push(format!("{command}: {example}\n{}", run.words));
+            }
             count += 1;
         }
     }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
     assert!(count > 70, "{count}");
 }

@@ -228,7 +228,7 @@ pub enum FollowError {
     },
     /// The last point of a closed path differs from the first.
     #[error(
-        "track {track}: the last point of the loop is {gap:e} from the first, more than a millionth of its size; repeat the first point at the end"
+        "track {track}: the last point of the loop is {gap} from the first, more than a millionth of its size; repeat the first point at the end"
     )]
     OpenLoop {
         /// The track's index in the set.

@@ -58,7 +58,7 @@ Examples:
   tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …
   tumble render walk.bvh --size 400x600 --view 60,10 -o walk.gif
   tumble render road.csv --frame frenet,minimal -o both.gif
-  tumble render walk.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
+  tumble render walker.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     command_line: CommandLine,

@@ -58,7 +58,7 @@ Examples:
   tumble view take.bvh cleaned.npz -o both.html     the second as a ghost of the first
   tumble view a.dat b.dat -m slerp,c2 --no-ghosts -o menu.html
   tumble view road.csv --frame minimal,frenet --path-speed constant --open
-  tumble view walk.glb --mesh hill.obj,rocks.obj -o walk.html")]
+  tumble view walker.glb --mesh hill.obj,rocks.obj -o walker.html")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     command_line: CommandLine,
