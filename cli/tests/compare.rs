@@ -812,8 +812,8 @@ fn joints_are_listed_worst_first() {
     // Joints without a difference are not among those that are not listed.
     walk(folder, "both.bvh", 7.0);
     let bent = std::fs::read_to_string(folder.join("both.bvh")).unwrap();
-    let turned = bent.replace(" 5 0 ", " 6 0 ");
-    std::fs::write(folder.join("both.bvh"), turned).unwrap();
+    let changed = bent.replace(" 5 0 ", " 6 0 ");
+    std::fs::write(folder.join("both.bvh"), changed).unwrap();
     let line = ["compare", "walk.bvh", "both.bvh", "--top", "1"];
     let text = String::from_utf8(succeed(folder, &line).out).unwrap();
     assert!(text.contains("and 1 more joint (--top 2)"), "{text}");

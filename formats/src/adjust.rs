@@ -9,9 +9,10 @@ use tumble::{Channel, JointMatchError, Joints, TrackError};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Adjustment, Loaded, Space};
+use crate::limits::Limits;
 use crate::motion::{Body, Joint, Motion, Transform, carry_key_data};
 use crate::source::Source;
-use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 
 /// The axis that points up after a conversion.

@@ -7,7 +7,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::text::lines::Limits;
+use crate::limits::Limits;
 
 /// Memory budget of every input, whatever its length, in bytes.
 pub const BASE: u64 = 64 << 20;

@@ -366,8 +366,8 @@ mod tests {
         folder
             .rename(OsStr::new("new"), OsStr::new("first"), false)
             .unwrap();
-        let taken = folder.rename(OsStr::new("first"), OsStr::new("old"), false);
-        assert_eq!(taken.unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        let refused = folder.rename(OsStr::new("first"), OsStr::new("old"), false);
+        assert_eq!(refused.unwrap_err().kind(), io::ErrorKind::AlreadyExists);
         folder
             .rename(OsStr::new("first"), OsStr::new("old"), true)
             .unwrap();

@@ -21,11 +21,11 @@ pub use crate::format::write_clips::left_behind;
 pub(crate) use crate::format::write_clips::{check_times, no_offsets};
 pub use crate::gltf::quantized::Quantization;
 use crate::keys::Duplicates;
+use crate::limits::Limits;
 use crate::motion::{Motion, SampledClip};
 use crate::poses::Poses;
 use crate::quaternion::ComponentOrder;
 use crate::signs::Signs;
-use crate::text::lines::Limits;
 use crate::times::FrameTimes;
 
 /// A file format.

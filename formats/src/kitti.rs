@@ -15,10 +15,11 @@ use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
 };
+use crate::limits::Limits;
 use crate::motion::SampledClip;
 use crate::rotation_matrix::of_matrix;
 use crate::source::Source;
-use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use crate::times::FrameTimes;
 use crate::tum::{Trajectory, TrajectoryPoses, decimal_count};

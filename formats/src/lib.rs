@@ -45,6 +45,7 @@ pub mod guarded;
 pub mod keyed;
 pub mod keys;
 pub mod kitti;
+mod limits;
 pub mod map;
 #[cfg(feature = "mcap")]
 pub mod mcap;
@@ -86,10 +87,10 @@ pub mod world;
 pub use crate::diagnostic::{Code, Diagnostic, Location, Severity};
 pub use crate::feature::Feature;
 pub use crate::format::{Format, Loaded, ReadOptions};
+pub use crate::limits::Limits;
 use crate::path::PathFormat;
 pub use crate::source::file_kind;
 use crate::surface::SurfaceFormat;
-pub use crate::text::lines::Limits;
 
 /// All formats. To add one, write a module with a `FORMAT`, and add a line here. Help, the choice of a format by a
 /// file's name, searches of directories, completions, messages, documentation and tests use this table. Every format

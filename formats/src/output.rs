@@ -97,20 +97,20 @@ pub struct Output {
 enum OutputSink {
     File {
         temporary: BufWriter<Temporary>,
-        place: OutputPlace,
+        location: OutputLocation,
     },
     Standard(BufWriter<io::Stdout>),
 }
 
 /// The name that an output gets.
-struct OutputPlace {
+struct OutputLocation {
     folder: Folder,
     /// Below the folder.
     name: PathBuf,
     overwrite: bool,
 }
 
-impl OutputPlace {
+impl OutputLocation {
     /// The directory of the file; opened again, because many files may wait for their names.
     fn parent(&self, path: &Path) -> Result<Folder, OutputError> {
         let moved = |folder: &Path| OutputError::Moved {
@@ -314,12 +314,12 @@ impl Output {
             source,
         })?;
         let name = PathBuf::from(path.file_name().unwrap_or_default());
-        let place = OutputPlace {
+        let location = OutputLocation {
             folder,
             name,
             overwrite,
         };
-        Self::begin(path.to_owned(), place, "")
+        Self::begin(path.to_owned(), location, "")
     }
 
     /// As [`Output::create`], of a file below an open directory, and with a mark in the name of the temporary file, by
@@ -333,25 +333,28 @@ impl Output {
         overwrite: bool,
         mark: &str,
     ) -> Result<Self, OutputError> {
-        let place = OutputPlace {
+        let location = OutputLocation {
             folder: folder.clone(),
             name: name.to_owned(),
             overwrite,
         };
         let path = folder.path().join(name);
-        place.parent(&path)?;
+        location.parent(&path)?;
         check_target(&path, overwrite, &[])?;
-        Self::begin(path, place, mark)
+        Self::begin(path, location, mark)
     }
 
-    fn begin(path: PathBuf, place: OutputPlace, mark: &str) -> Result<Self, OutputError> {
-        let parent = place.parent(&path)?;
+    fn begin(path: PathBuf, location: OutputLocation, mark: &str) -> Result<Self, OutputError> {
+        let parent = location.parent(&path)?;
         let temporary = Temporary::new(&parent, mark).map_err(|source| OutputError::Write {
             path: path.clone(),
             source,
         })?;
         let temporary = BufWriter::with_capacity(BUFFER, temporary);
-        let writer = OutputSink::File { temporary, place };
+        let writer = OutputSink::File {
+            temporary,
+            location,
+        };
         Ok(Self { path, writer })
     }
 
@@ -363,14 +366,17 @@ impl Output {
     pub fn settle(self) -> Result<Self, OutputError> {
         let Self { path, writer } = self;
         let writer = match writer {
-            OutputSink::File { temporary, place } => {
+            OutputSink::File {
+                temporary,
+                location,
+            } => {
                 let file = temporary.into_inner().map_err(|e| OutputError::Write {
                     path: path.clone(),
                     source: e.into_error(),
                 })?;
                 OutputSink::File {
                     temporary: BufWriter::with_capacity(0, file),
-                    place,
+                    location,
                 }
             }
             standard @ OutputSink::Standard(_) => standard,
@@ -398,10 +404,13 @@ impl Output {
         };
         match writer {
             OutputSink::Standard(mut writer) => writer.flush().map(|()| None).map_err(named),
-            OutputSink::File { temporary, place } => {
+            OutputSink::File {
+                temporary,
+                location,
+            } => {
                 let temporary = temporary.into_inner().map_err(|e| named(e.into_error()))?;
-                let parent = place.parent(&path)?;
-                match temporary.persist(&parent, place.file_name(), place.overwrite) {
+                let parent = location.parent(&path)?;
+                match temporary.persist(&parent, location.file_name(), location.overwrite) {
                     Ok(file) => Ok(Some(file)),
                     Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                         Err(OutputError::Exists { path: path.clone() })
@@ -769,7 +778,7 @@ mod tests {
             let named = Output {
                 writer: OutputSink::File {
                     temporary: BufWriter::new(named_in(&folder, "").unwrap()),
-                    place: OutputPlace {
+                    location: OutputLocation {
                         folder: folder.clone(),
                         name: name.to_owned(),
                         overwrite,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::format::Format;
 use crate::gltf;
-use crate::text::lines::Limits;
+use crate::limits::Limits;
 
 /// The files that reading `path` also reads, as paths relative to its folder, in order and each once. Whether they
 /// exist is not checked. There are none for standard input, for what is not a regular file, and for a file that is

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::limits::Limits;
 use crate::source::Source;
-use crate::text::lines::{Limits, Lines, tokens};
+use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 
 /// The times of frames with the digits of their file.

@@ -119,7 +119,7 @@ pub(crate) struct EndFrameArguments {
 
 impl EndFrameArguments {
     /// Whether the command line says it.
-    pub(crate) fn is_given(&self) -> bool {
+    pub(crate) fn is_chosen(&self) -> bool {
         self.end_frame.is_some()
     }
 

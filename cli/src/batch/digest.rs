@@ -258,8 +258,8 @@ mod tests {
             file: 8,
             ..Limits::default()
         };
-        let beyond = InputFile::within(&path, limits);
-        assert_eq!(beyond.bytes(), Some(text.len() as u64));
+        let limited = InputFile::within(&path, limits);
+        assert_eq!(limited.bytes(), Some(text.len() as u64));
         // One file alone is hashed as `sha256sum` does.
         std::fs::write(&path, "abc").unwrap();
         assert_eq!(hash(), of_bytes([&b"abc"[..]]));

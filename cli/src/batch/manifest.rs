@@ -232,7 +232,7 @@ impl Manifest {
             let whole = entry.whole().0;
             match self.planned.contains(whole) {
                 true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
-                false => entry.presence() == InputPresence::Removed,
+                false => InputPresence::of_entry(entry) == InputPresence::Removed,
             }
         };
         let results = self.results().into_values();
@@ -244,7 +244,8 @@ impl Manifest {
     fn note_unknown(&self) {
         let results = self.results().into_values();
         let unknown = results.filter(|entry| {
-            !self.planned.contains(entry.whole().0) && entry.presence() == InputPresence::Unknown
+            !self.planned.contains(entry.whole().0)
+                && InputPresence::of_entry(entry) == InputPresence::Unknown
         });
         let unknown: Vec<&ManifestEntry> = unknown.collect();
         if let Some(first) = unknown.first() {
@@ -352,6 +353,16 @@ pub(crate) enum InputPresence {
 }
 
 impl InputPresence {
+    /// Of the input of a result.
+    pub(crate) fn of_entry(entry: &ManifestEntry) -> Self {
+        Self::of(&entry.input, Some(entry.whole().0))
+    }
+
+    /// Of an input without a result.
+    fn of_input(entry: &InputEntry) -> Self {
+        Self::of(&entry.input, entry.result.as_deref())
+    }
+
     /// Of the input with this path, whose result has this name. An input is gone if the directory that the command line
     /// named is there and has other files: the input's path without the part that the name of its result repeats. Of a
     /// path below the current directory, such as `walks/a.bvh` in a list of inputs, it is the first folder. Of a name
@@ -396,20 +407,6 @@ impl InputPresence {
     }
 }
 
-impl ManifestEntry {
-    /// Whether its input exists.
-    pub(crate) fn presence(&self) -> InputPresence {
-        InputPresence::of(&self.input, Some(self.whole().0))
-    }
-}
-
-impl InputEntry {
-    /// Whether the input exists.
-    fn presence(&self) -> InputPresence {
-        InputPresence::of(&self.input, self.result.as_deref())
-    }
-}
-
 impl ResultRecorder for Manifest {
     fn previous(&self) -> PreviousEntries {
         PreviousEntries {
@@ -423,17 +420,18 @@ impl ResultRecorder for Manifest {
         // An input that is gone has not failed any more.
         let mut forgotten = Vec::new();
         let prune = self.prune;
-        self.inputs.retain(|_, entry| match entry.presence() {
-            _ if entry.state == InputState::Skipped => false,
-            InputPresence::Present => true,
-            InputPresence::Removed => false,
-            InputPresence::Unknown => {
-                if prune {
-                    forgotten.push(entry.input.clone());
+        self.inputs
+            .retain(|_, entry| match InputPresence::of_input(entry) {
+                _ if entry.state == InputState::Skipped => false,
+                InputPresence::Present => true,
+                InputPresence::Removed => false,
+                InputPresence::Unknown => {
+                    if prune {
+                        forgotten.push(entry.input.clone());
+                    }
+                    !prune
                 }
-                !prune
-            }
-        });
+            });
         if let Some(first) = forgotten.first() {
             let inputs = words::count(forgotten.len(), "input");
             let are = if forgotten.len() == 1 { "is" } else { "are" };

@@ -221,7 +221,8 @@ impl<'a> InputHashes<'a> {
             .filter(|input| !Path::new(input).exists())
             .collect();
         let orphans = entries.iter().filter(|entry| {
-            missing.contains(&*entry.input) && entry.presence() == InputPresence::Removed
+            missing.contains(&*entry.input)
+                && InputPresence::of_entry(entry) == InputPresence::Removed
         });
         let orphans: Vec<&ManifestEntry> = orphans.copied().collect();
         let removed: BTreeSet<&str> = orphans.iter().map(|entry| &*entry.input).collect();

@@ -134,15 +134,19 @@ fn another_directory_in_the_place_of_that_of_the_results_is_not_written_into() {
         }
         let before = tree(&foreign);
         let line = with(words, &["in", "--pipes", "-o", "out"]);
-        let [place, moved] = [swapped, "out-moved"].map(|name| folder.join(name));
+        let [results, moved] = [swapped, "out-moved"].map(|name| folder.join(name));
         let swap = std::thread::spawn({
-            let (late, place, moved, foreign) =
-                (late.clone(), place.clone(), moved.clone(), foreign.clone());
+            let (late, results, moved, foreign) = (
+                late.clone(),
+                results.clone(),
+                moved.clone(),
+                foreign.clone(),
+            );
             move || {
                 // Opening it waits for its reader: by then the directory of results is open.
                 let mut writer = fs::File::options().write(true).open(late).unwrap();
-                fs::rename(&place, &moved).unwrap();
-                symlink(&foreign, &place).unwrap();
+                fs::rename(&results, &moved).unwrap();
+                symlink(&foreign, &results).unwrap();
                 writer.write_all(&keys).unwrap();
             }
         });
@@ -157,8 +161,8 @@ fn another_directory_in_the_place_of_that_of_the_results_is_not_written_into() {
             continue;
         }
         // Put back, it is continued.
-        fs::remove_file(&place).unwrap();
-        fs::rename(&moved, &place).unwrap();
+        fs::remove_file(&results).unwrap();
+        fs::rename(&moved, &results).unwrap();
         fs::remove_file(&late).unwrap();
         fs::copy(folder.join("b.dat"), &late).unwrap();
         let again = line.iter().filter(|&&word| word != "--overwrite");

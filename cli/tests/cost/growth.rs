@@ -19,7 +19,7 @@ use crate::log::{LogBuilder, Message, transform};
 use crate::{one_at_a_time, peak_of};
 
 /// How many parts the files of a case have.
-const SIZES: [usize; 3] = [250, 500, 1000];
+const SIZES: [usize; 3] = [128, 256, 512];
 
 /// By how much the second doubling may cost more than the first: twice as much, sorting, and lists that grow.
 const FACTOR_OF_TWICE: f64 = 2.6;
@@ -383,10 +383,10 @@ fn twice_as_much_takes_twice_as_much_to_read() {
     }
     let counted = instructions(folder.path());
     let mut wrong = Vec::new();
-    let mut judge = |case: &Case, what: &str, costs: [f64; 3], slack: f64| {
+    let mut judge = |case: &Case, kind: &str, costs: [f64; 3], slack: f64| {
         let [once, again] = [costs[1] - costs[0], costs[2] - costs[1]];
         let line = format!(
-            "{}, {}: {what} {costs:.0?}, {:.2} times",
+            "{}, {}: {kind} {costs:.0?}, {:.2} times",
             case.format.name,
             case.kind,
             again / once

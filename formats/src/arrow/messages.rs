@@ -9,7 +9,7 @@ use arrow_ipc::{
 
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::text::lines::Limits;
+use crate::limits::Limits;
 
 /// The first and the last bytes of a file.
 pub(crate) const MAGIC: &[u8] = b"ARROW1";

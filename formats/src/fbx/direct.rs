@@ -349,7 +349,7 @@ mod tests {
     use crate::budget::Budget;
     use crate::fbx::load;
     use crate::fbx::times::Takes;
-    use crate::text::lines::Limits;
+    use crate::limits::Limits;
 
     /// Of all nodes that curves move, most are evaluated here, and at every time as `ufbx` does.
     #[test]

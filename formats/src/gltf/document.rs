@@ -23,9 +23,9 @@ use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, Channel};
 use crate::gltf::skins;
 use crate::gltf::uri;
+use crate::limits::Limits;
 use crate::motion::{Motion, SampledClip};
 use crate::rate::Precision;
-use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// A file that was read.

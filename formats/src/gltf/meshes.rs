@@ -12,8 +12,8 @@ use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Scene};
 use crate::gltf::{FORMAT, check_version};
+use crate::limits::Limits;
 use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
-use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// The triangles of a file.

@@ -51,8 +51,8 @@ use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::{GltfReader, MESHOPT};
 use crate::gltf::schema::{Asset, Buffer};
+use crate::limits::Limits;
 use crate::source::Source;
-use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// The glTF format: scenes with animations of nodes.

@@ -13,8 +13,8 @@ use crate::gltf::container::Container;
 use crate::gltf::json::Json;
 use crate::gltf::schema::{Accessor, Buffer, BufferView, MeshoptView};
 use crate::gltf::uri;
+use crate::limits::Limits;
 use crate::source::Source;
-use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// The extensions that compress a buffer view.

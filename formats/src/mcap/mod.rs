@@ -19,12 +19,12 @@ use crate::budget::{Borrowed, Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
+use crate::limits::Limits;
 use crate::mcap::bodies::{Body, BodyKind, TimedPose, into_loaded};
 use crate::mcap::cdr::Cdr;
 use crate::mcap::records::{MAGIC, Record, Records};
 use crate::path::{PathFormat, PathPoints};
 use crate::source::Source;
-use crate::text::lines::Limits;
 use crate::warnings::{Warnings, listed};
 
 /// The MCAP format: poses in a log.

@@ -15,9 +15,9 @@ use zip::{CompressionMethod, ZipArchive};
 
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::limits::Limits;
 use crate::npz::array::Array;
 use crate::npz::header::{ArrayHeader, Element, LONGEST_START};
-use crate::text::lines::Limits;
 
 /// An open archive in memory.
 pub(crate) struct Archive {

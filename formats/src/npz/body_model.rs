@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::limits::Limits;
 use crate::motion::{Motion, Shape};
 use crate::npz::archive::Archive;
 use crate::npz::plan::read_numbers;
 use crate::source::Source;
-use crate::text::lines::Limits;
 
 /// The arrays of a motion that contain the shape of the body.
 pub(crate) const SHAPE: [&str; 2] = ["betas", "gender"];

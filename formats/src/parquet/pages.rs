@@ -8,8 +8,8 @@ use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
 use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::limits::Limits;
 use crate::parquet::thrift::{Compact, INTEGER, STRUCT};
-use crate::text::lines::Limits;
 
 /// The largest number of numbers for each byte of a file. Equal numbers compress best: a page of 2^20 of them may
 /// have 100 bytes, but the times beside them differ and need a byte each.

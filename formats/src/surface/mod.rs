@@ -11,8 +11,8 @@ use glam::DVec3;
 
 use crate::SURFACES;
 use crate::diagnostic::Diagnostic;
+use crate::limits::Limits;
 use crate::source::Source;
-use crate::text::lines::Limits;
 
 /// A file format of surfaces.
 pub struct SurfaceFormat {

@@ -5,7 +5,7 @@ use std::io::{BufRead, Read};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::foreign;
-use crate::source::MAX_BYTES;
+use crate::limits::Limits;
 
 /// The lines of one input, with their numbers; warnings about them are collected in `warnings`.
 pub(crate) struct Lines<R> {
@@ -29,29 +29,6 @@ pub(crate) struct Lines<R> {
 
 /// The bytes that a number takes at least: keys are f32.
 const NUMBER: usize = 4;
-
-/// The largest sizes of an input that is read; a larger input is refused.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// Length of one line in bytes.
-    pub line: u64,
-    /// Length of the whole input in bytes.
-    pub file: u64,
-    /// Memory in bytes that reading may take in addition to the input [default: [`FACTOR`](crate::budget::FACTOR)
-    /// times the length of the input, plus [`BASE`](crate::budget::BASE)].
-    pub memory: Option<u64>,
-}
-
-impl Default for Limits {
-    /// 64 MiB for a line, 16 GiB for an input, and the default memory.
-    fn default() -> Self {
-        Self {
-            line: 1 << 26,
-            file: MAX_BYTES,
-            memory: None,
-        }
-    }
-}
 
 /// The byte-order mark of UTF-8.
 const MARK: &[u8] = b"\xef\xbb\xbf";

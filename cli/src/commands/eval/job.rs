@@ -340,7 +340,7 @@ impl EvaluationJob<'_> {
     /// Counts the times in gaps, and tells of ends between two frames.
     fn note_frames(&mut self, frames: &[ClipFrames], target: &ResultTarget) {
         self.in_gaps = frames.iter().map(|of_clip| of_clip.in_gaps).sum();
-        if self.arguments.end_frame.is_given() {
+        if self.arguments.end_frame.is_chosen() {
             return;
         }
         self.left_out = frames.iter().find_map(|of_clip| of_clip.left_out);

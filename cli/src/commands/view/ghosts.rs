@@ -1,27 +1,10 @@
 //! Which clips of several inputs are shown at once, at the same moment, and what of them can be compared.
 
-use serde::Serialize;
 use tumble_formats::compare::{ClipPair, CommonTimes, CompareError, MatchedTracks};
 
 use crate::commands::compare::partner;
-use crate::commands::view::shown::ShownClip;
+use crate::commands::view::shown::{Ghost, ShownClip};
 use crate::messages::{names, words};
-
-/// A clip that is shown with another one, as the page's scripts read it.
-#[derive(Debug, Clone, Serialize)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct Ghost {
-    /// Its index among the page's clips.
-    set: usize,
-    /// The seconds to add to a time of the clip for the same time of the ghost.
-    shift: f64,
-    /// The indices of the joints of clip and ghost that are compared.
-    pairs: Vec<[usize; 2]>,
-    /// Whether their rotations are compared in the world, instead of relative to the parents.
-    in_world: bool,
-    /// What is not compared, or otherwise than is expected, and why.
-    note: String,
-}
 
 /// The ghosts of all clips of a page.
 pub(crate) struct FoundGhosts {
@@ -88,7 +71,7 @@ impl FoundGhosts {
             match pair.common_times() {
                 Ok(common) => {
                     let are_placed = both.into_iter().all(ShownClip::has_positions);
-                    let (ghost, notes) = Ghost::of(second + same, pair, &common, are_placed);
+                    let (ghost, notes) = ghost_of(second + same, pair, &common, are_placed);
                     self.ghosts.push((first + index, ghost));
                     // Of the others the page says it when one of them is chosen.
                     if first == 0 {
@@ -110,62 +93,60 @@ impl FoundGhosts {
     }
 }
 
-impl Ghost {
-    /// The second clip of a pair as a ghost of the first; and lines about it. `are_placed`: both have positions.
-    fn of(
-        set: usize,
-        pair: ClipPair<'_>,
-        common: &CommonTimes,
-        are_placed: bool,
-    ) -> (Self, Vec<String>) {
-        let [first, second] = pair.inputs;
-        let both = format!("{first} and {second}");
-        let mut lines = Vec::new();
-        if common.warning.is_some() {
-            let clock = pair.clips[0].time_offset as f64;
-            let [start, end] = [common.start, common.end].map(|time| time + clock);
-            lines.push(format!(
-                "{both}: they have the times from {start} to {end} s in common; at others one is shown alone"
-            ));
-        }
-        let mut ghost = Self {
-            set,
-            shift: pair.shift(),
-            pairs: Vec::new(),
-            in_world: false,
-            note: String::new(),
-        };
-        let relative = pair
-            .check_parents(pair.clips)
-            .and_then(|()| pair.check_spaces());
-        let found = pair.tracks().and_then(|found| {
-            if relative.is_err() {
-                pair.check_known_parents(&found.pairs)?;
-            }
-            Ok(found)
-        });
-        ghost.note = match (found, relative) {
-            (Err(error), _) => format!("not compared: {}", reason(&error)),
-            (Ok(_), Err(error)) if !are_placed => format!("not compared: {}", reason(&error)),
-            (Ok(MatchedTracks { pairs, missing, .. }), relative) => {
-                ghost.pairs = pairs;
-                ghost.in_world = relative.is_err();
-                let in_world = relative
-                    .err()
-                    .map(|error| format!("compared in the world, because {}", reason(&error)));
-                let lone = missing.iter().zip(pair.inputs);
-                let lone = lone.filter(|(names, _)| !names.is_empty());
-                let lone = lone.map(|(names, input)| only(names, input));
-                let assumed = pair.assumptions().into_iter();
-                let all: Vec<String> = assumed.chain(in_world).chain(lone).collect();
-                all.join("; ")
-            }
-        };
-        if !ghost.note.is_empty() {
-            lines.push(format!("{both}: {}", ghost.note));
-        }
-        (ghost, lines)
+/// The second clip of a pair as a ghost of the first; and lines about it. `are_placed`: both have positions.
+fn ghost_of(
+    set: usize,
+    pair: ClipPair<'_>,
+    common: &CommonTimes,
+    are_placed: bool,
+) -> (Ghost, Vec<String>) {
+    let [first, second] = pair.inputs;
+    let both = format!("{first} and {second}");
+    let mut lines = Vec::new();
+    if common.warning.is_some() {
+        let clock = pair.clips[0].time_offset as f64;
+        let [start, end] = [common.start, common.end].map(|time| time + clock);
+        lines.push(format!(
+            "{both}: they have the times from {start} to {end} s in common; at others one is shown alone"
+        ));
     }
+    let mut ghost = Ghost {
+        set,
+        shift: pair.shift(),
+        pairs: Vec::new(),
+        in_world: false,
+        note: String::new(),
+    };
+    let relative = pair
+        .check_parents(pair.clips)
+        .and_then(|()| pair.check_spaces());
+    let found = pair.tracks().and_then(|found| {
+        if relative.is_err() {
+            pair.check_known_parents(&found.pairs)?;
+        }
+        Ok(found)
+    });
+    ghost.note = match (found, relative) {
+        (Err(error), _) => format!("not compared: {}", reason(&error)),
+        (Ok(_), Err(error)) if !are_placed => format!("not compared: {}", reason(&error)),
+        (Ok(MatchedTracks { pairs, missing, .. }), relative) => {
+            ghost.pairs = pairs;
+            ghost.in_world = relative.is_err();
+            let in_world = relative
+                .err()
+                .map(|error| format!("compared in the world, because {}", reason(&error)));
+            let lone = missing.iter().zip(pair.inputs);
+            let lone = lone.filter(|(names, _)| !names.is_empty());
+            let lone = lone.map(|(names, input)| only(names, input));
+            let assumed = pair.assumptions().into_iter();
+            let all: Vec<String> = assumed.chain(in_world).chain(lone).collect();
+            all.join("; ")
+        }
+    };
+    if !ghost.note.is_empty() {
+        lines.push(format!("{both}: {}", ghost.note));
+    }
+    (ghost, lines)
 }
 
 /// `a.bvh alone has Tail, Ear`.

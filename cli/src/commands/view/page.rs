@@ -11,10 +11,9 @@ use tumble_routes::mesh::Mesh;
 
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
 use crate::commands::travel::Scenery;
-use crate::commands::view::ghosts::Ghost;
 use crate::commands::view::pack::{bytes, differences, doubles, shorts, text, words};
 use crate::commands::view::result::{StoredResult, short};
-use crate::commands::view::shown::{ResultChoice, ShownClip};
+use crate::commands::view::shown::{Ghost, ResultChoice, ShownClip};
 use crate::messages::colours::{BOXES, Colour};
 
 /// Built from `web/src` by `npm run build` in `web/`; it is stored here so that the package is complete.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Quat, Vec3};
+use serde::Serialize;
 use tumble::paths::PathFrame;
 use tumble::{Axes, Channel, Error, Layout, Quantity, SampleTimes, Timeline, TrackError, TrackSet};
 use tumble_formats::carried_mesh::CarriedMesh;
@@ -14,7 +15,6 @@ use crate::arguments::interpolation::{CurveChoice, InterpolationArguments, Metho
 use crate::arguments::path::frame_summary;
 use crate::batch::room;
 use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of, scene_origin};
-use crate::commands::view::ghosts::Ghost;
 use crate::commands::view::result::StoredResult;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -81,6 +81,22 @@ pub(crate) struct ShownClip {
     pub(crate) times: Vec<f64>,
     /// Clips of later inputs that are shown with it.
     pub(crate) ghosts: Vec<Ghost>,
+}
+
+/// A clip that is shown with another one, as the page's scripts read it.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Ghost {
+    /// Its index among the page's clips.
+    pub(super) set: usize,
+    /// The seconds to add to a time of the clip for the same time of the ghost.
+    pub(super) shift: f64,
+    /// The indices of the joints of clip and ghost that are compared.
+    pub(super) pairs: Vec<[usize; 2]>,
+    /// Whether their rotations are compared in the world, instead of relative to the parents.
+    pub(super) in_world: bool,
+    /// What is not compared, or otherwise than is expected, and why.
+    pub(super) note: String,
 }
 
 impl ShownClip {
