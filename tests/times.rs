@@ -462,9 +462,9 @@ fn the_unit_of_time_changes_no_bits() {
         let mut all = Vec::new();
         for frames in &frames {
             let rotations = engine.evaluate(&set, interpolation, frames).unwrap();
-            all.extend(rotations.as_quats().iter().map(|q| q.to_array()));
+            all.extend(rotations.as_quats().iter().map(Quat::to_array));
             let rotations = clip.evaluate(frames).unwrap();
-            all.extend(rotations.as_quats().iter().map(|q| q.to_array()));
+            all.extend(rotations.as_quats().iter().map(Quat::to_array));
         }
         all
     };

@@ -164,7 +164,7 @@ impl StackLayers {
         budget.take(layers_of.len(), size_of::<Vec<u32>>())?;
         for &index in &self.audible {
             let layer = &stack.layers[index];
-            for property in layer.anim_props.iter() {
+            for property in &layer.anim_props {
                 let id = layer.element.typed_id;
                 if property.element.type_ == ElementType::Node
                     && let Some(layers) = layers_of.get_mut(property.element.typed_id as usize)

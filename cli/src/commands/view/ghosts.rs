@@ -117,24 +117,24 @@ fn ghost_of(
         in_world: false,
         note: String::new(),
     };
-    let relative = pair
-        .check_parents(pair.clips)
-        .and_then(|()| pair.check_spaces());
-    let found = pair.tracks().and_then(|found| {
-        if relative.is_err() {
-            pair.check_known_parents(&found.pairs)?;
-        }
-        Ok(found)
-    });
-    ghost.note = match (found, relative) {
-        (Err(error), _) => format!("not compared: {}", reason(&error)),
-        (Ok(_), Err(error)) if !are_placed => format!("not compared: {}", reason(&error)),
-        (Ok(MatchedTracks { pairs, missing, .. }), relative) => {
+    let relative = match pair.check_parents(pair.clips) {
+        Ok(()) => pair.check_spaces(),
+        error => error,
+    };
+    let other_parents = relative.err().map(|error| reason(&error));
+    let mut found = pair.tracks().map_err(|error| reason(&error));
+    if let (Ok(tracks), true) = (&found, other_parents.is_some())
+        && let Err(error) = pair.check_known_parents(&tracks.pairs)
+    {
+        found = Err(reason(&error));
+    }
+    ghost.note = match (found, other_parents) {
+        (Err(why), _) => format!("not compared: {why}"),
+        (Ok(_), Some(why)) if !are_placed => format!("not compared: {why}"),
+        (Ok(MatchedTracks { pairs, missing, .. }), other_parents) => {
             ghost.pairs = pairs;
-            ghost.in_world = relative.is_err();
-            let in_world = relative
-                .err()
-                .map(|error| format!("compared in the world, because {}", reason(&error)));
+            ghost.in_world = other_parents.is_some();
+            let in_world = other_parents.map(|why| format!("compared in the world, because {why}"));
             let lone = missing.iter().zip(pair.inputs);
             let lone = lone.filter(|(names, _)| !names.is_empty());
             let lone = lone.map(|(names, input)| only(names, input));
