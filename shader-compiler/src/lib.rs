@@ -1,13 +1,14 @@
 //! The compiler of the shaders: WGSL to SPIR-V. Each kernel of the table is joined from its files,
 //! parsed, validated, emitted, and passed through the exactness pass, so that a broken or inexact
-//! shader is an error. Rust gets the constants and structs that the shaders declare, so that
-//! neither is written twice.
+//! shader is an error. Rust gets the constants and structs that the shaders declare, and their arithmetic, so that
+//! none is written twice.
 //!
 //! What it makes is checked in, in `shaders/compiled/`: who builds the engine needs no naga, and gets
 //! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
 
 #[allow(unreachable_pub)] // tests and fuzzing include it
 mod exactness;
+mod functions;
 // The engine's build script has it, too, and uses another part of it.
 #[allow(dead_code)]
 #[path = "../../build/hashes.rs"]
@@ -24,8 +25,9 @@ use std::path::Path;
 
 use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
+use functions::Functions;
 use rust::{Compiled, Declared};
 use table::{Kernel, WIDE_STORE};
 
@@ -60,6 +62,7 @@ type Files = Vec<(&'static str, Vec<u8>)>;
 fn compile() -> Files {
     let mut declared = Declared::default();
     let (mut compiled, mut code) = (Vec::new(), Vec::new());
+    let mut parsed = Vec::new();
     for kernel in table::kernels() {
         let (storage, texels) = modules(&kernel);
         declared.collect(&storage.name, &storage.parsed);
@@ -77,9 +80,18 @@ fn compile() -> Files {
             texel_words: texels.as_ref().map(emit),
             name: kernel.name,
         });
+        parsed.push(storage);
+    }
+    let mut functions = Functions::new(declared.in_buffers());
+    for module in &parsed {
+        functions.collect(&module.name, &module.source, &module.parsed, &module.info);
     }
     let rust = declared.rust() + &rust::kernels(&compiled);
     let mut files = vec![
+        (
+            "shaders/compiled/functions.rs",
+            functions.rust().into_bytes(),
+        ),
         ("shaders/compiled/kernels.rs", rust.into_bytes()),
         ("shaders/compiled/kernels.spv", code),
     ];
@@ -128,6 +140,7 @@ struct Module {
     name: String,
     source: String,
     parsed: naga::Module,
+    info: ModuleInfo,
 }
 
 /// A kernel, and its variant that reads texel buffers if it has one.
@@ -170,24 +183,23 @@ impl Module {
         let parsed = Frontend::new_with_options(options)
             .parse(&source)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
+        let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
+        let info = Validator::new(ValidationFlags::all(), capabilities)
+            .validate(&parsed)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
         Self {
             name,
             source,
             parsed,
+            info,
         }
     }
 
     /// Its SPIR-V, which rounds as it is written.
     fn spirv(&self) -> Vec<u32> {
         let Self {
-            name,
-            source,
-            parsed,
+            name, parsed, info, ..
         } = self;
-        let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
-        let info = Validator::new(ValidationFlags::all(), capabilities)
-            .validate(parsed)
-            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
         let options = spv::Options {
             lang_version: (1, 3), // what Vulkan 1.1 takes
             // Loops here end: their bounds are data that the host wrote.
@@ -197,7 +209,7 @@ impl Module {
             zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
             ..spv::Options::default()
         };
-        let words = spv::write_vec(parsed, &info, &options, None)
+        let words = spv::write_vec(parsed, info, &options, None)
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
             exactness::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -1,7 +1,7 @@
 //! What Rust gets of the shaders: their constants, the structs that buffers hold, and the
 //! kernels by name.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use naga::{
@@ -81,6 +81,12 @@ impl Declared {
                 }
             }
         }
+    }
+
+    /// The names of the structs that Rust has declarations of.
+    pub(crate) fn in_buffers(&self) -> BTreeSet<String> {
+        let structs = self.structs.iter().filter(|(_, item)| item.rust.is_some());
+        structs.map(|(name, _)| name.clone()).collect()
     }
 
     /// Constants and structs as Rust.
@@ -300,7 +306,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
 }
 
 /// `arc_frames_f32` as `ArcFramesF32`.
-fn variant(name: &str) -> String {
+pub(crate) fn variant(name: &str) -> String {
     let words = name.split('_').map(|word| {
         let (first, rest) = word.split_at(1);
         first.to_uppercase() + rest

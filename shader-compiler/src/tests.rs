@@ -1,7 +1,8 @@
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use super::{Declared, Module, ROOT, compile, hashes, stale};
+use super::{Declared, Functions, Module, ROOT, compile, hashes, stale};
 
 #[test]
 fn what_is_checked_in_is_what_the_shaders_compile_to() {
@@ -77,4 +78,93 @@ fn a_struct_of_two_layouts_is_an_error() {
         let source = format!("struct Item {{ first: {member} }}");
         declared.collect("kernel", &parse(&source).parsed);
     }
+}
+
+/// What a function is written as, in a kernel that has only it.
+fn function(name: &str, source: &str) -> String {
+    let mut functions = Functions::new(BTreeSet::new());
+    add(&mut functions, source);
+    functions.text(name).to_owned()
+}
+
+fn add(functions: &mut Functions, source: &str) {
+    let Module {
+        name, parsed, info, ..
+    } = &parse(source);
+    functions.collect(name, source, parsed, info);
+}
+
+#[test]
+fn functions_are_written_for_as_many_numbers_as_their_operations_allow() {
+    for (name, source, expected) in [
+        (
+            "cubic",
+            "fn cubic(a: vec4f, s: f32) -> vec4f { let z = s * s; return a - (a * z - a); }",
+            "fn cubic<N: Number>(a: N, s: N, ) -> N {\nlet z = s * s;\na - (a * z - a)\n}",
+        ),
+        (
+            "normalised",
+            "fn normalised(q: vec3f) -> vec3f { return q * (q.x + 2.0); }",
+            "fn normalised<N: Number>(q: [N; 3], ) -> [N; 3] {\nlet number_1 = q[0] + N::all(2.0);\n\
+             [q[0] * number_1, q[1] * number_1, q[2] * number_1]\n}",
+        ),
+        (
+            "wrapped",
+            "fn wrapped(a: f32) -> f32 { return select(a, -a, a < 2.0); }",
+            "fn wrapped(a: f32, ) -> f32 {\nif a < 2.0 { -a } else { a }\n}",
+        ),
+        (
+            "to_half",
+            "fn to_half(a: vec4f) -> vec4u { return bitcast<vec4u>(a) + vec4u(3u); }",
+            "fn to_half(a: f32, ) -> u32 {\na.to_bits().wrapping_add(3)\n}",
+        ),
+        (
+            "flushed",
+            "const LIMIT: u32 = 9;
+             fn flushed(x: f32) -> f32 { return select(x, 0.0, (bitcast<u32>(x) & 0x7fffffffu) < LIMIT); }",
+            "fn flushed<N: Number>(x: N, ) -> N {\nx.zero_below(f32::from_bits(LIMIT))\n}",
+        ),
+    ] {
+        let text = function(name, source);
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
+/// What is computed before the cut is not computed behind it.
+#[test]
+fn functions_with_a_cut_are_written_in_two_parts() {
+    let source = "fn polynomial(c: array<vec4f, 11>, s: f32) -> vec4f {
+        let z = s * s;
+        let low = c[1] * s + c[0];
+        let zz = z * z;
+        return c[2] * z + (c[3] * zz + low);
+    }";
+    let text = function("polynomial", source);
+    for expected in [
+        "fn polynomial_begin<N: Number>(s: N, ) -> PolynomialBegun<N> {\nlet z = s * s;\nlet zz = z * z;\n",
+        "fn polynomial_end<N: Number>(c: [N; 11], begun: PolynomialBegun<N>, ) -> N {\n\
+         let PolynomialBegun { s, z, zz } = begun;\nlet low = c[1] * s + c[0];\n\
+         c[2] * z + (c[3] * zz + low)\n",
+        "polynomial_end(c, polynomial_begin(s, ))\n",
+    ] {
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "kernel: another function wrapped than elsewhere")]
+fn two_functions_of_one_name_are_an_error() {
+    let mut functions = Functions::new(BTreeSet::new());
+    for sum in ["a + 1.0", "a + 2.0"] {
+        add(
+            &mut functions,
+            &format!("fn wrapped(a: f32) -> f32 {{ return {sum}; }}"),
+        );
+    }
+}
+
+#[test]
+#[should_panic(expected = "wrapped in Rust")]
+fn a_function_that_cannot_be_written_is_an_error() {
+    let _ = function("wrapped", "fn wrapped(a: f32) -> f32 { return sqrt(a); }");
 }

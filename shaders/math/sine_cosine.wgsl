@@ -43,9 +43,11 @@ fn sine_cosm1_quarter(x: f32, z: f32) -> vec2f {
     let zz = z * z;
     let sine_low = QUARTER_SINE_5 * z + QUARTER_SINE_3;
     let sine_tail = QUARTER_SINE_7 * zz + sine_low;
-    let sine = sine_tail * (z * x) + x;
+    let zx = z * x;
+    let sine = sine_tail * zx + x;
     let cosine_low = QUARTER_COSINE_4 * z + QUARTER_COSINE_2;
     let cosine_high = QUARTER_COSINE_8 * z + QUARTER_COSINE_6;
-    let cosm1 = (cosine_high * zz + cosine_low) * z;
+    let cosine_tail = cosine_high * zz + cosine_low;
+    let cosm1 = cosine_tail * z;
     return vec2f(sine, cosm1);
 }

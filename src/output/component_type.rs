@@ -77,8 +77,8 @@ mod tests {
                 (high, half + 1),
             ] {
                 let stored = to_half(value);
-                assert_eq!(stored, expected, "{value}");
-                assert_eq!(to_half(-value), expected | 0x8000);
+                assert_eq!(stored, u32::from(expected), "{value}");
+                assert_eq!(to_half(-value), u32::from(expected | 0x8000));
             }
         }
     }
@@ -87,12 +87,12 @@ mod tests {
     fn whole_numbers_are_the_nearest() {
         for n in -32767..=32767i32 {
             let value = n as f32 / 32767.0;
-            assert_eq!(to_snorm(value), n as i16 as u16);
+            assert_eq!(to_snorm(value), u32::from(n as i16 as u16));
             let off = (f64::from(n) + 0.49) / 32767.0;
-            assert_eq!(to_snorm(off as f32), n as i16 as u16);
+            assert_eq!(to_snorm(off as f32), u32::from(n as i16 as u16));
         }
         // A component may pass 1 by rounding.
         assert_eq!(to_snorm(1.000_000_4), 32767);
-        assert_eq!(to_snorm(-1.000_000_4), -32767i16 as u16);
+        assert_eq!(to_snorm(-1.000_000_4), u32::from(-32767i16 as u16));
     }
 }

@@ -2,34 +2,8 @@
 
 use crate::shader::*;
 use crate::simd::lanes::Number;
-
-#[inline(always)]
-pub(crate) fn flushed<N: Number>(x: N) -> N {
-    x.zero_below(f32::from_bits(FLUSHED_BITS))
-}
-
-#[inline(always)]
-pub(super) fn magnitude(x: f32) -> f32 {
-    f32::from_bits(x.to_bits() & 0x7fff_ffff)
-}
-
-#[inline(always)]
-pub(super) fn reciprocal<N: Number>(x: N) -> N {
-    let seed = x.guess(RECIPROCAL_SEED, 0);
-    let first = seed * (N::all(2.0) - x * seed);
-    let second = first * (N::all(2.0) - x * first);
-    let third = second * (N::all(2.0) - x * second);
-    third * (N::all(2.0) - x * third)
-}
-
-#[inline(always)]
-pub(crate) fn reciprocal_root<N: Number>(x: N) -> N {
-    let seed = x.guess(ROOT_SEED, 1);
-    let half = N::all(0.5) * x;
-    let first = seed * (N::all(1.5) - half * seed * seed);
-    let second = first * (N::all(1.5) - half * first * first);
-    second * (N::all(1.5) - half * second * second)
-}
+pub(crate) use crate::twin::functions::{flushed, reciprocal_root};
+use crate::twin::functions::{magnitude, reciprocal};
 
 #[inline(always)]
 pub(crate) fn root<N: Number>(x: N) -> N {

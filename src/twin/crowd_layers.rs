@@ -6,14 +6,10 @@ use glam::Vec4;
 use crate::math::canonical::canonical;
 use crate::shader::{
     ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPosition, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
+    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, TICKS, WEIGHT_UNIT,
 };
-use crate::simd::lanes::Number;
 use crate::twin::Evaluate as _;
-use crate::twin::quaternion::over;
-
-/// The function of the shader with this name is the same as `pose` of `shaders/poses/add.wgsl`.
-pub(crate) use crate::twin::pose_add::pose as rotation_added;
+pub(crate) use crate::twin::functions::{cubic, laid_over};
 
 /// The buffers that the kernels over layers read. Entries and positions are those of a window of instances.
 #[derive(Clone, Copy)]
@@ -30,42 +26,6 @@ pub(crate) struct Layers<'a> {
     /// The cell of the first mask, and that of the first reference pose.
     pub(crate) masks: u32,
     pub(crate) references: u32,
-}
-
-#[inline(always)]
-pub(crate) fn cubic<N: Number>([c0, c1, c2, c3]: [N; 4], s: N) -> N {
-    let z = s * s;
-    c0 + ((c3 * s + c2) * z + c1 * s)
-}
-
-#[inline(always)]
-pub(crate) fn laid_over(
-    kind: u32,
-    is_additive: bool,
-    below: [f32; 4],
-    layer: [f32; 4],
-    reference: [f32; 4],
-    weight: f32,
-) -> [f32; 4] {
-    if kind == ROTATION {
-        return match is_additive {
-            true => rotation_added(below, layer, reference, weight),
-            false => over(below, layer, weight).map(canonical),
-        };
-    }
-    let each = |f: fn(f32, f32, f32, f32) -> f32| {
-        std::array::from_fn(|c| canonical(f(below[c], layer[c], reference[c], weight)))
-    };
-    if !is_additive {
-        return each(|below, layer, _, weight| match weight == 1.0 {
-            true => layer,
-            false => below + (layer - below) * weight,
-        });
-    }
-    if kind == TRANSLATION {
-        return each(|below, layer, reference, weight| below + (layer - reference) * weight);
-    }
-    each(|below, layer, inverse, weight| below + below * ((layer * inverse - 1.0) * weight))
 }
 
 /// The value of a channel at a position of its time base.
@@ -94,12 +54,10 @@ pub(crate) fn sampled(
         let first = channel.first + span * count * 4;
         let coefficient = |power: u32| Vec4::from_array(cell(first + power * count));
         cubic(
-            [
-                coefficient(0),
-                coefficient(1),
-                coefficient(2),
-                coefficient(3),
-            ],
+            coefficient(0),
+            coefficient(1),
+            coefficient(2),
+            coefficient(3),
             Vec4::splat(s),
         )
     } else {

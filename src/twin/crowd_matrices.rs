@@ -4,10 +4,8 @@
 
 use glam::Vec4;
 
-use crate::shader::{HALF_INFINITE, HALF_OVERFLOW};
 use crate::simd::lanes::Number as _;
-use crate::twin::f16::to_half;
-use crate::twin::matrix;
+use crate::twin::{functions, matrix};
 
 /// The three rows of an affine matrix for column vectors.
 pub(crate) type Rows = [[f32; 4]; 3];
@@ -23,7 +21,11 @@ pub(crate) fn transform_row(rotated: [f32; 3], scale: [f32; 4], moved: f32) -> [
 /// The transform T R S.
 #[inline(always)]
 pub(crate) fn transform(rotation: [f32; 4], moved: [f32; 4], scale: [f32; 4]) -> Rows {
-    let [first, second, third] = matrix::matrix_rows(rotation, 0);
+    let matrix::MatrixRows {
+        first,
+        second,
+        third,
+    } = matrix::matrix_rows(rotation, 0);
     [
         transform_row(first, scale, moved[0]),
         transform_row(second, scale, moved[1]),
@@ -56,9 +58,5 @@ pub(crate) fn affine_product(a: &Rows, b: &Rows) -> Rows {
 /// The half nearest to a value of any magnitude, ties to even.
 #[inline(always)]
 pub(crate) fn to_any_half(value: f32) -> u16 {
-    let bits = value.to_bits();
-    match bits & 0x7fff_ffff >= HALF_OVERFLOW {
-        true => ((bits >> 16) & 0x8000 | HALF_INFINITE) as u16,
-        false => to_half(value),
-    }
+    functions::to_any_half(value) as u16
 }

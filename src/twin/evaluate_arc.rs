@@ -2,10 +2,12 @@
 
 use glam::Vec4;
 
-use crate::math::quaternion::dot;
 use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number};
-use crate::twin::sine_cosine::{QuarterHalves, quarter_halves, sine_cosm1_quarter};
+pub(crate) use crate::twin::functions::norm_squared;
+use crate::twin::sine_cosine::{
+    SineCosm1QuarterBegun, sine_cosm1_quarter, sine_cosm1_quarter_begin, sine_cosm1_quarter_end,
+};
 use crate::twin::{Evaluate, Parameters};
 
 impl Evaluate for ArcSegment {
@@ -35,9 +37,9 @@ impl Evaluate for ArcSegment {
         parameters: &mut impl Parameters<L>,
     ) -> Begun<L> {
         let (parameter, z) = parameter_and_square(square, parameters);
-        let halves = quarter_halves(parameter, z);
+        let halves = sine_cosm1_quarter_begin(parameter, z);
         let mut begun = Begun {
-            sine_cosine: halves.sine_cosm1(),
+            sine_cosine: sine_cosm1_quarter_end(halves),
             halves,
             parameter,
             z,
@@ -61,7 +63,7 @@ impl Evaluate for ArcSegment {
         let (sine, cosine_minus_one) = if IS_PIPELINED {
             begun.sine_cosine
         } else {
-            quarter_halves(begun.parameter, begun.z).sine_cosm1()
+            sine_cosm1_quarter(begun.parameter, begun.z)
         };
         let (s, f) = (sine.fourfold(), cosine_minus_one.fourfold());
         // Written out: closures are not always inlined.
@@ -104,7 +106,7 @@ pub(crate) struct Begun<L> {
     /// Sine and cosine minus one, for the next iteration.
     sine_cosine: (L, L),
     /// The half-finished sine and cosine of the iteration after it.
-    halves: QuarterHalves<L>,
+    halves: SineCosm1QuarterBegun<L>,
     /// The parameter and the angle's square of the third iteration.
     parameter: L,
     z: L,
@@ -116,8 +118,8 @@ impl<L: Lanes> Begun<L> {
     fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
         let (parameter, z) = parameter_and_square(square, parameters);
         Self {
-            sine_cosine: self.halves.sine_cosm1(),
-            halves: quarter_halves(self.parameter, self.z),
+            sine_cosine: sine_cosm1_quarter_end(self.halves),
+            halves: sine_cosm1_quarter_begin(self.parameter, self.z),
             parameter,
             z,
         }
@@ -151,9 +153,4 @@ pub(crate) fn on_arc<N: Number>(
 #[inline(always)]
 fn arc_component<N: Number>(middle: N, tangent: N, sine: N, cosine_minus_one: N) -> N {
     middle + (middle * cosine_minus_one + tangent * sine)
-}
-
-#[inline(always)]
-pub(crate) fn norm_squared<N: Number>(q: [N; 4]) -> N {
-    dot(q, q)
 }

@@ -13,6 +13,14 @@ pub(crate) mod euler;
 pub(crate) mod evaluate_arc;
 pub(crate) mod evaluate_polynomial;
 pub(crate) mod f16;
+// Coefficients are written with all their digits, and in the shader's order.
+#[allow(
+    clippy::approx_constant,
+    clippy::doc_markdown,
+    clippy::excessive_precision
+)]
+#[path = "../../shaders/compiled/functions.rs"]
+pub(crate) mod functions;
 pub(crate) mod matrix;
 pub(crate) mod pose_add;
 pub(crate) mod pose_blend;

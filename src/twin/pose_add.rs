@@ -1,11 +1,3 @@
-//! Twin of `shaders/poses/add.wgsl`: the same names, the same order.
+//! The layer that `shaders/poses/add.wgsl` adds; the function of `shaders/crowd/layers.wgsl` is the same.
 
-use crate::math::canonical::canonical;
-use crate::math::quaternion::{product, step};
-use crate::twin::quaternion::{normalised, slerp};
-
-#[inline(always)]
-pub(crate) fn pose(base: [f32; 4], layer: [f32; 4], reference: [f32; 4], weight: f32) -> [f32; 4] {
-    let rotation = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
-    normalised(product(base, rotation)).map(canonical)
-}
+pub(crate) use crate::twin::functions::rotation_added as pose;

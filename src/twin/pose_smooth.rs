@@ -1,37 +1,7 @@
 //! Twin of `shaders/poses/smooth.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
-use crate::math::quaternion::{dot, product};
-use crate::shader::LONGEST_ANGLE_SQUARE;
-use crate::twin::arc_tangent::flushed;
-use crate::twin::sine_cosine::sine_cosm1;
-
-#[inline(always)]
-pub(crate) fn rotated_by(q: [f32; 4], v: [f32; 4]) -> [f32; 4] {
-    let half = v.map(flushed);
-    let square = half[0] * half[0] + half[1] * half[1] + half[2] * half[2];
-    let long = square > LONGEST_ANGLE_SQUARE;
-    let z = if long { 0.0 } else { square };
-    let sine_cosine = sine_cosm1(1.0f32, z);
-    let more = product(
-        q,
-        [
-            half[0] * sine_cosine.0,
-            half[1] * sine_cosine.0,
-            half[2] * sine_cosine.0,
-            sine_cosine.1,
-        ],
-    );
-    let sum: [f32; 4] = std::array::from_fn(|c| q[c] + more[c]);
-    let scale = 1.5 - 0.5 * dot(sum, sum);
-    if long {
-        [0.0; 4]
-    } else if square == 0.0 {
-        q
-    } else {
-        sum.map(|c| c * scale)
-    }
-}
+pub(crate) use crate::twin::functions::rotated_by;
 
 /// The value moved by the sum of its steps.
 #[inline(always)]

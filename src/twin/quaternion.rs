@@ -1,26 +1,12 @@
-//! Twin of `shaders/math/quaternion.wgsl`: the same names, the same order. The twins of its `product`
-//! and `dot4` are [`product`](crate::math::quaternion::product) and [`dot`].
+//! Quaternion algebra, of `shaders/math/quaternion.wgsl`. Its `product` and `dot4` are
+//! [`product`](crate::math::quaternion::product) and [`dot`], which f64 shares. [`slerp`] is written by hand, the same
+//! names in the same order: vectors of rotations need parts of it.
 
-use crate::math::quaternion::{cross3, dot, sum};
+use crate::math::quaternion::dot;
 use crate::simd::lanes::Number;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
+pub(crate) use crate::twin::functions::{normalised, over, rotated};
 use crate::twin::sine_cosine::sine_cosine;
-
-#[inline(always)]
-pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
-    let axis = [q[0], q[1], q[2]];
-    let across = cross3(axis, v);
-    let twice = sum(across, across);
-    let again = cross3(axis, twice);
-    std::array::from_fn(|c| v[c] + twice[c] * q[3] + again[c])
-}
-
-#[inline(always)]
-pub(crate) fn normalised<N: Number>(q: [N; 4]) -> [N; 4] {
-    let scale = reciprocal_root(dot(q, q));
-    // Written out: closures are not always inlined.
-    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
-}
 
 /// The sum of two rotations, and the difference from the first to the nearer sign of the second.
 #[inline(always)]
@@ -79,10 +65,4 @@ pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
         (reciprocal_root(whole), inverse),
         sine_and_cosine,
     )
-}
-
-#[inline(always)]
-pub(crate) fn over(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
-    let inner = if t == 1.0 { b } else { slerp(a, b, t) };
-    if t == 0.0 { a } else { inner }
 }

@@ -6,13 +6,14 @@ use crate::shader::{
     RUNS_BACKWARDS, SCALE, START_BIAS, TRANSLATION,
 };
 use crate::twin::crowd_entries::{change, gather, scatter};
-use crate::twin::crowd_layers::{Layers, cubic, laid_over, rotation_added, sampled};
+use crate::twin::crowd_layers::{Layers, cubic, laid_over, sampled};
 use crate::twin::crowd_matrices::{
     Rows, affine_product, row_product, to_any_half, transform, transform_row,
 };
 use crate::twin::crowd_times::{
     base_positions, in_parts, position_at, span_at, tick_of, wide_remainder,
 };
+use crate::twin::functions::rotation_added;
 
 use super::cells::Cells;
 use super::trial::{Twin, TwinTrial, UNTOUCHED, twin, with_globals};
@@ -477,7 +478,7 @@ pub(super) fn layers() -> Vec<Twin> {
             "cubic",
             move |random| (four(random), random.parameter()),
             |(c, s)| -> [f32; 4] {
-                std::array::from_fn(|i| cubic(c.map(|component| component[i]), s))
+                std::array::from_fn(|i| cubic(c[0][i], c[1][i], c[2][i], c[3][i], s))
             },
         ),
         twin(

@@ -6,20 +6,20 @@ use crate::shader::{ArcSegment, PolynomialSegment, TangentWeights};
 use crate::simd::lanes::canonical;
 use crate::twin::Evaluate as _;
 use crate::twin::arc_between::arc_between;
-use crate::twin::arc_tangent::{
-    arc_tangent, flushed, magnitude, reciprocal, reciprocal_root, root,
-};
+use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 use crate::twin::axis_angle::axis_angle;
-use crate::twin::euler::{euler, wrapped};
+use crate::twin::euler::euler;
 use crate::twin::evaluate_arc::norm_squared;
 use crate::twin::evaluate_polynomial::polynomial;
 use crate::twin::f16::to_half;
-use crate::twin::matrix::matrix_rows;
+use crate::twin::functions::{
+    canonical_product, magnitude, reciprocal, small_exp, small_log, wrapped,
+};
+use crate::twin::matrix::{MatrixRows, matrix_rows};
 use crate::twin::quaternion::{normalised, over, rotated, slerp};
 use crate::twin::sine_cosine::{sine_cosine, sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{
-    FromIdentity, canonical_product, composed, inverse_rotated, small_angle_cubic, small_exp,
-    small_log, step_vector,
+    FromIdentity, composed, inverse_rotated, small_angle_cubic, step_vector,
 };
 use crate::twin::snorm16::to_snorm;
 
@@ -215,15 +215,15 @@ pub(super) fn from_keys() -> Vec<Twin> {
             CUBICS,
             "small_angle_cubic",
             |random| {
-                let keys = match random.once_in(8) {
+                let keys: [[f32; 4]; 4] = match random.once_in(8) {
                     true => std::array::from_fn(|_| random.vector()),
                     false => random.four_keys(),
                 };
                 (keys, random.weights(), random.weights())
             },
-            |(keys, first, last)| {
-                let curve = small_angle_cubic(keys, first, last);
-                (curve.powers, curve.is_valid)
+            |([before, start, end, after], first, last)| {
+                let curve = small_angle_cubic(before, start, end, after, first, last);
+                (curve.powers, curve.holds)
             },
         ),
     ]
@@ -239,7 +239,7 @@ pub(super) fn conversions() -> Vec<Twin> {
                     .vector::<4>()
                     .map(|c| if c.abs() < 2.0 { c } else { 1.0 })
             },
-            |q| q.map(|c| u32::from(to_half(c))),
+            |q| q.map(to_half),
         ),
         twin(
             "arc_frames_snorm16",
@@ -249,7 +249,7 @@ pub(super) fn conversions() -> Vec<Twin> {
                     .vector::<4>()
                     .map(|c| if c.abs() < 2.0 { c } else { 1.0 })
             },
-            |q| q.map(|c| u32::from(to_snorm(c))),
+            |q| q.map(to_snorm),
         ),
         twin(
             "arc_frames_axis_angle",
@@ -276,7 +276,14 @@ pub(super) fn conversions() -> Vec<Twin> {
             "arc_frames_matrix3x3",
             "matrix_rows",
             |random| (random.rotation(), random.below(2)),
-            |(q, detail)| matrix_rows(q, detail),
+            |(q, detail)| {
+                let MatrixRows {
+                    first,
+                    second,
+                    third,
+                } = matrix_rows(q, detail);
+                [first, second, third]
+            },
         ),
         twin(
             "arc_frames_f32_texels",

@@ -65,7 +65,7 @@ impl SmallAngleLanes {
             for (powers, power) in found.powers.iter_mut().zip(curve.powers) {
                 powers[lane] = power;
             }
-            found.is_valid[lane] = curve.is_valid;
+            found.is_valid[lane] = curve.holds;
         }
     }
 
@@ -89,10 +89,10 @@ struct SmallAnglePass<'a> {
 impl SmallAnglePass<'_> {
     /// The curve of lane `j + 1`, between the keys before and after it.
     #[inline(always)]
-    fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic {
+    fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic<f32> {
         let Intervals { from, to, .. } = self.intervals;
         let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
-        small_angle_cubic([before, from[j + 1], to[j + 1], after], first, last)
+        small_angle_cubic(before, from[j + 1], to[j + 1], after, first, last)
     }
 
     /// The keys before and after lane `j + 1`; a missing neighbour is replaced by the key itself.
@@ -128,7 +128,7 @@ impl InLanes for SmallAnglePass<'_> {
                     powers[power][c][j + 1] = curve.powers[power][c];
                 }
             }
-            is_valid[j + 1] = curve.is_valid;
+            is_valid[j + 1] = curve.holds;
         }
         self.lanes.is_valid = is_valid;
         for power in 0..7 {
