@@ -1,7 +1,7 @@
 //! The shaders' arithmetic as Rust: one more back end of naga's representation, for functions that compute values from
 //! values. Rust's operations are the shader's, one by one and in its order, so both round alike. Names of `let` stay.
 //!
-//! A function is written in the first of these ways that its operations allow:
+//! A function is written in the first of these forms that its operations allow:
 //! * for any `N: Number`, a number or a vector with the numbers of several samples, else for f32;
 //! * where it treats all components of its vectors alike, for one of them: a caller passes it each component, or all
 //!   of them side by side in one vector. Otherwise vectors are arrays, and those of two components are pairs.
@@ -95,11 +95,16 @@ enum Vectors {
     Apart,
 }
 
-type Way = (Numbers, Vectors);
+/// What a function is written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shape {
+    numbers: Numbers,
+    vectors: Vectors,
+}
 
 /// Every function that is written, by its name, and the structs that they share.
 pub(crate) struct Functions {
-    functions: BTreeMap<String, (Way, String)>,
+    functions: BTreeMap<String, (Shape, String)>,
     structs: BTreeMap<String, String>,
     /// The structs that lie in buffers: Rust has declarations of them.
     shared: BTreeSet<String>,
@@ -108,8 +113,11 @@ pub(crate) struct Functions {
 impl Functions {
     pub(crate) fn new(shared: BTreeSet<String>) -> Self {
         let by_hand = BY_HAND.map(|(name, numbers, _)| {
-            let way = (numbers, Vectors::Apart);
-            (name.to_owned(), (way, String::new()))
+            let shape = Shape {
+                numbers,
+                vectors: Vectors::Apart,
+            };
+            (name.to_owned(), (shape, String::new()))
         });
         Self {
             functions: BTreeMap::from(by_hand),
@@ -134,29 +142,28 @@ impl Functions {
             let Some((_, cut)) = FUNCTIONS.iter().find(|(listed, _)| *listed == name) else {
                 continue;
             };
-            let ways = [
-                (Numbers::Any, Vectors::Alike),
-                (Numbers::Any, Vectors::Apart),
-                (Numbers::One, Vectors::Alike),
-                (Numbers::One, Vectors::Apart),
-            ];
+            let mut shapes = [Numbers::Any, Numbers::One]
+                .into_iter()
+                .flat_map(|numbers| {
+                    [Vectors::Alike, Vectors::Apart].map(|vectors| Shape { numbers, vectors })
+                });
             let mut refused = Vec::new();
-            let written = ways.into_iter().find_map(|way| {
+            let written = shapes.find_map(|shape| {
                 let types = Types {
                     module,
-                    way,
+                    shape,
                     shared: &self.shared,
                 };
                 let writer = Writer::new(types, &info[handle], function, &self.functions);
                 match writer.function(name, cut) {
-                    Ok(text) => Some((way, text)),
+                    Ok(text) => Some((shape, text)),
                     Err(reason) => {
                         refused.push(reason);
                         None
                     }
                 }
             });
-            let (way, text) =
+            let (shape, text) =
                 written.unwrap_or_else(|| panic!("{kernel}: {name} in Rust: {refused:?}"));
             let text = docs(source, name) + &text;
             let other = self.functions.get(name);
@@ -164,16 +171,19 @@ impl Functions {
                 other.is_none_or(|(_, other)| *other == text),
                 "{kernel}: another function {name} than elsewhere:\n{text}"
             );
-            self.functions.insert(name.to_owned(), (way, text));
+            self.functions.insert(name.to_owned(), (shape, text));
         }
         for (_, ty) in module.types.iter() {
             if let (Some(name), TypeInner::Struct { members, .. }) = (&ty.name, &ty.inner)
                 && !self.shared.contains(name)
             {
-                let way = (Numbers::Any, Vectors::Apart);
+                let shape = Shape {
+                    numbers: Numbers::Any,
+                    vectors: Vectors::Apart,
+                };
                 let types = Types {
                     module,
-                    way,
+                    shape,
                     shared: &self.shared,
                 };
                 let fields: Result<String> = members.iter().try_fold(String::new(), |text, m| {
@@ -272,23 +282,23 @@ fn uses(text: &str, word: &str) -> bool {
     })
 }
 
-/// The names of types in one way of writing.
+/// The names of types of one shape.
 #[derive(Clone, Copy)]
 struct Types<'a> {
     module: &'a Module,
-    way: Way,
+    shape: Shape,
     shared: &'a BTreeSet<String>,
 }
 
 impl Types<'_> {
     /// Whether a struct is a tuple: Rust's declaration has numbers of f32.
     fn is_tuple(&self, name: &str) -> bool {
-        self.way.0 == Numbers::Any && self.shared.contains(name)
+        self.shape.numbers == Numbers::Any && self.shared.contains(name)
     }
 
     fn name(&self, ty: Handle<Type>) -> Result<String> {
-        let Self { module, way, .. } = *self;
-        let (numbers, vectors) = way;
+        let Self { module, shape, .. } = *self;
+        let Shape { numbers, vectors } = shape;
         let scalar = |kind: ScalarKind, width: u8| match (kind, width, numbers) {
             (ScalarKind::Float, 4, Numbers::Any) => Ok("N"),
             (ScalarKind::Float, 4, Numbers::One) => Ok("f32"),
@@ -394,15 +404,15 @@ impl std::fmt::Display for Line {
     }
 }
 
-/// Writes one function in one way.
+/// Writes one function of one shape.
 struct Writer<'a> {
     types: Types<'a>,
     module: &'a Module,
     info: &'a FunctionInfo,
     function: &'a Function,
-    way: Way,
+    shape: Shape,
     /// The functions that are written already: all that this one calls.
-    known: &'a BTreeMap<String, (Way, String)>,
+    known: &'a BTreeMap<String, (Shape, String)>,
     /// Expressions whose values have a name.
     named: HashMap<Handle<Expression>, String>,
     /// The arguments of calls, by their results.
@@ -419,14 +429,14 @@ impl<'a> Writer<'a> {
         types: Types<'a>,
         info: &'a FunctionInfo,
         function: &'a Function,
-        known: &'a BTreeMap<String, (Way, String)>,
+        known: &'a BTreeMap<String, (Shape, String)>,
     ) -> Self {
         Self {
             types,
             module: types.module,
             info,
             function,
-            way: types.way,
+            shape: types.shape,
             known,
             named: HashMap::new(),
             calls: HashMap::new(),
@@ -442,7 +452,7 @@ impl<'a> Writer<'a> {
 
     /// The number of components of a value that is taken apart, if it is.
     fn components(&self, handle: Handle<Expression>) -> Option<u8> {
-        match (self.way.1, self.inner(handle)) {
+        match (self.shape.vectors, self.inner(handle)) {
             (Vectors::Apart, TypeInner::Vector { size, .. }) => Some(*size as u8),
             _ => None,
         }
@@ -464,7 +474,7 @@ impl<'a> Writer<'a> {
 
     /// The whole function, in two parts if it has a cut.
     fn function(mut self, name: &str, cut: &[&str]) -> Result<String> {
-        if self.way.1 == Vectors::Alike && !self.has_vectors() {
+        if self.shape.vectors == Vectors::Alike && !self.has_vectors() {
             return Err("no vectors".to_owned());
         }
         let parameters: Result<Vec<(String, String)>> = self
@@ -512,7 +522,7 @@ impl<'a> Writer<'a> {
             .iter()
             .map(|(name, ty)| format!("{name}: {ty}, "))
             .collect();
-        let generics = match self.way.0 {
+        let generics = match self.shape.numbers {
             Numbers::Any => "<N: Number>",
             Numbers::One => "",
         };
@@ -554,22 +564,22 @@ impl<'a> Writer<'a> {
             return Err(format!("no `let {missing}`"));
         }
         let used = |lines: &[&Line], name: &str| lines.iter().any(|line| uses(line.text(), name));
-        let (taken, left): (Vec<_>, Vec<_>) = parameters
+        let (early, left): (Vec<_>, Vec<_>) = parameters
             .iter()
             .copied()
             .partition(|(name, _)| used(&first, name));
-        let number = match self.way.0 {
+        let number = match self.shape.numbers {
             Numbers::Any => "N",
             Numbers::One => "f32",
         };
-        if let Some((name, ty)) = taken.iter().find(|(_, ty)| ty != number) {
+        if let Some((name, ty)) = early.iter().find(|(_, ty)| ty != number) {
             return Err(format!("a {ty}, {name}, before a cut"));
         }
         let lets = first.iter().filter_map(|line| match line {
             Line::Let(name, _) => Some(name),
             Line::Other(_) => None,
         });
-        let kept: Vec<&str> = taken
+        let kept: Vec<&str> = early
             .iter()
             .map(|(name, _)| name)
             .chain(lets)
@@ -591,7 +601,7 @@ impl<'a> Writer<'a> {
         let taking = format!("{begun}<{number}>");
         let body = join(first) + &format!("{begun} {{ {list} }}\n");
         let _ = writeln!(text, "/// The part of [`{name}`] before its cut.");
-        text += &self.declaration(&format!("{name}_begin"), &taken, &taking, &body);
+        text += &self.declaration(&format!("{name}_begin"), &early, &taking, &body);
         let last = ("begun".to_owned(), taking);
         let rest: Vec<_> = left.iter().copied().chain([&last]).collect();
         let body = format!("let {begun} {{ {list} }} = begun;\n") + &join(second);
@@ -603,7 +613,7 @@ impl<'a> Writer<'a> {
         let body = format!(
             "{name}_end({}{name}_begin({}))\n",
             names(&left),
-            names(&taken)
+            names(&early)
         );
         Ok(self.declaration(name, parameters, result, &body) + &text)
     }
@@ -626,8 +636,9 @@ impl<'a> Writer<'a> {
                     self.emitted(*result)?;
                 }
                 Statement::Store { pointer, value } => {
-                    let (place, value) = (self.place(*pointer)?, self.whole(*value)?);
-                    self.lines.push(Line::Other(format!("{place} = {value};")));
+                    let (variable, value) = (self.variable(*pointer)?, self.whole(*value)?);
+                    self.lines
+                        .push(Line::Other(format!("{variable} = {value};")));
                 }
                 Statement::If {
                     condition,
@@ -722,7 +733,7 @@ impl<'a> Writer<'a> {
         };
         match self.function.named_expressions.get(&handle) {
             // Bits have a name only as parts of an operation that is known as a whole.
-            Some(_) if self.way.0 == Numbers::Any && !self.is_float(handle) => Ok(()),
+            Some(_) if self.shape.numbers == Numbers::Any && !self.is_float(handle) => Ok(()),
             Some(name) => {
                 let value = self.whole(handle)?;
                 self.lines.push(Line::Let(name.clone(), value));
@@ -811,7 +822,7 @@ impl<'a> Writer<'a> {
             | Expression::Load { .. }
             | Expression::AccessIndex { .. }
             | Expression::Access { .. } => true,
-            Expression::CallResult(function) => self.way_of(function)?.1 == Vectors::Apart,
+            Expression::CallResult(function) => self.shape_of(function)?.vectors == Vectors::Apart,
             Expression::Select { condition, .. } => self.components(condition).is_none(),
             _ => false,
         })
@@ -829,7 +840,7 @@ impl<'a> Writer<'a> {
             Expression::Constant(constant) => {
                 let constant = &self.module.constants[constant];
                 let name = constant.name.clone().unwrap_or_default();
-                match (&self.module.types[constant.ty].inner, self.way.0) {
+                match (&self.module.types[constant.ty].inner, self.shape.numbers) {
                     (TypeInner::Vector { .. }, _) => self.global(constant.init, i),
                     (_, Numbers::One) => Ok(atom(name)),
                     (TypeInner::Scalar(scalar), _) if scalar.kind == ScalarKind::Float => {
@@ -854,7 +865,7 @@ impl<'a> Writer<'a> {
                 None => Err("components in another order".to_owned()),
             },
             Expression::AccessIndex { base, index } => match self.inner(base) {
-                TypeInner::Vector { .. } if self.way.1 == Vectors::Apart => {
+                TypeInner::Vector { .. } if self.shape.vectors == Vectors::Apart => {
                     self.value(base, Some(index as u8))
                 }
                 TypeInner::Struct { members, .. } => {
@@ -872,7 +883,7 @@ impl<'a> Writer<'a> {
                 }
                 other => Err(format!("an element of {other:?}")),
             },
-            Expression::Access { base, index } if self.way.1 == Vectors::Apart => {
+            Expression::Access { base, index } if self.shape.vectors == Vectors::Apart => {
                 let base = self.value(base, None)?.within(ATOM);
                 let index = self.value(index, None)?.within(UNARY);
                 Ok(atom(format!("{base}[{index} as usize]")))
@@ -881,7 +892,7 @@ impl<'a> Writer<'a> {
                 Expression::LocalVariable(variable) if self.conditions.contains_key(&variable) => {
                     Ok(self.conditions[&variable].clone())
                 }
-                _ => Ok(atom(self.place(pointer)?)),
+                _ => Ok(atom(self.variable(pointer)?)),
             },
             Expression::CallResult(function) => self.call(handle, function, i),
             _ => self.operation(handle, i),
@@ -934,7 +945,7 @@ impl<'a> Writer<'a> {
     }
 
     fn operation(&mut self, handle: Handle<Expression>, i: Option<u8>) -> Result<Text> {
-        if self.way.0 == Numbers::Any && !self.is_float(handle) {
+        if self.shape.numbers == Numbers::Any && !self.is_float(handle) {
             return Err("bits of any number".to_owned());
         }
         match self.function.expressions[handle] {
@@ -964,7 +975,7 @@ impl<'a> Writer<'a> {
                 accept,
                 reject,
             } => {
-                if self.way.0 == Numbers::Any {
+                if self.shape.numbers == Numbers::Any {
                     return Err("a choice between any numbers".to_owned());
                 }
                 let condition = self.operand(condition, i)?.text;
@@ -1132,13 +1143,13 @@ impl<'a> Writer<'a> {
         constant?.name.as_deref()
     }
 
-    fn way_of(&self, function: Handle<Function>) -> Result<Way> {
+    fn shape_of(&self, function: Handle<Function>) -> Result<Shape> {
         let name = self.module.functions[function]
             .name
             .as_deref()
             .unwrap_or_default();
         match self.known.get(name) {
-            Some((way, _)) => Ok(*way),
+            Some((shape, _)) => Ok(*shape),
             None => Err(format!("a call of {name}, which is not written")),
         }
     }
@@ -1149,19 +1160,19 @@ impl<'a> Writer<'a> {
         function: Handle<Function>,
         i: Option<u8>,
     ) -> Result<Text> {
-        let (numbers, vectors) = self.way_of(function)?;
+        let Shape { numbers, vectors } = self.shape_of(function)?;
         let name = self.module.functions[function]
             .name
             .as_deref()
             .unwrap_or_default();
-        if self.way.0 == Numbers::Any && numbers == Numbers::One {
+        if self.shape.numbers == Numbers::Any && numbers == Numbers::One {
             return Err(format!("a call of {name}, which takes f32"));
         }
         let arguments = self.calls[&result].clone();
         let takes_vectors = arguments
             .iter()
             .any(|&argument| matches!(self.inner(argument), TypeInner::Vector { .. }));
-        if self.way.1 == Vectors::Alike && vectors == Vectors::Apart && takes_vectors {
+        if self.shape.vectors == Vectors::Alike && vectors == Vectors::Apart && takes_vectors {
             return Err(format!("a call of {name}, which takes vectors apart"));
         }
         let arguments: Result<Vec<String>> = arguments
@@ -1172,7 +1183,7 @@ impl<'a> Writer<'a> {
     }
 
     /// A variable, or a part of one.
-    fn place(&mut self, pointer: Handle<Expression>) -> Result<String> {
+    fn variable(&mut self, pointer: Handle<Expression>) -> Result<String> {
         match self.function.expressions[pointer] {
             Expression::LocalVariable(variable) => {
                 let variable = &self.function.local_variables[variable];
@@ -1182,12 +1193,12 @@ impl<'a> Writer<'a> {
                 let TypeInner::Pointer { base: ty, .. } = *self.inner(base) else {
                     return Err("a component of a variable".to_owned());
                 };
-                let place = self.place(base)?;
+                let variable = self.variable(base)?;
                 match &self.module.types[ty].inner {
                     TypeInner::Struct { members, .. } => {
-                        Ok(format!("{place}.{}", field(&members[index as usize])))
+                        Ok(format!("{variable}.{}", field(&members[index as usize])))
                     }
-                    TypeInner::Array { .. } => Ok(format!("{place}[{index}]")),
+                    TypeInner::Array { .. } => Ok(format!("{variable}[{index}]")),
                     other => Err(format!("a part of {other:?}")),
                 }
             }
@@ -1196,10 +1207,10 @@ impl<'a> Writer<'a> {
     }
 
     fn literal(&self, literal: Literal) -> Result<Text> {
-        if let (Some(name), Numbers::One) = (self.name_of(literal), self.way.0) {
+        if let (Some(name), Numbers::One) = (self.name_of(literal), self.shape.numbers) {
             return Ok(atom(name));
         }
-        let value = match (literal, self.way.0) {
+        let value = match (literal, self.shape.numbers) {
             (Literal::F32(value), Numbers::Any) => return Ok(atom(format!("N::all({value:?})"))),
             (Literal::F32(value), Numbers::One) => format!("{value:?}"),
             (Literal::U32(value), Numbers::One) if value > 0xff => format!("{value:#x}"),
@@ -1226,11 +1237,11 @@ impl<'a> Writer<'a> {
     }
 
     fn zero(&self, ty: Handle<Type>) -> Result<String> {
-        let number = match self.way.0 {
+        let number = match self.shape.numbers {
             Numbers::Any => "N::all(0.0)",
             Numbers::One => "0.0",
         };
-        Ok(match (&self.module.types[ty].inner, self.way.1) {
+        Ok(match (&self.module.types[ty].inner, self.shape.vectors) {
             (TypeInner::Scalar(scalar), _) if scalar.kind == ScalarKind::Float => number.to_owned(),
             (TypeInner::Scalar(_), _) => "0".to_owned(),
             (TypeInner::Vector { .. }, Vectors::Alike) => number.to_owned(),

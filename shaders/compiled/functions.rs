@@ -26,7 +26,7 @@ pub(crate) struct MatrixRows<N> {
 #[derive(Clone, Copy)]
 pub(crate) struct SmallAngleCubic<N> {
     pub(crate) powers: [[N; 4]; 7],
-    pub(crate) holds: bool,
+    pub(crate) is_valid: bool,
 }
 
 /// Components below 2^-64 in magnitude become +0.
@@ -727,7 +727,7 @@ pub(crate) fn small_angle_cubic(
     let without_first = composed(small_exp([-w1[0], -w1[1], -w1[2]]), whole);
     let w2 = small_log(composed(without_first, small_exp([-v3[0], -v3[1], -v3[2]])).vector);
     let squared_extent = dot3(w1, w1) + dot3(w2, w2) + dot3(v3, v3);
-    let holds = (squared_extent <= SMALL_SQUARED_EXTENT)
+    let is_valid = (squared_extent <= SMALL_SQUARED_EXTENT)
         & (norm_squared(chord_before) <= LONGEST_STEP)
         & (norm_squared(chord) <= LONGEST_STEP)
         & (norm_squared(chord_after) <= LONGEST_STEP)
@@ -892,6 +892,6 @@ pub(crate) fn small_angle_cubic(
                 dot3(c, c) * -0.5,
             ),
         ],
-        holds,
+        is_valid,
     }
 }

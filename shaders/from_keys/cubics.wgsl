@@ -28,5 +28,5 @@ fn rotation_between(key: u32, start: vec4f, next: u32, all_rows: Hoisted) -> vec
     let third = c[3] * s + c[2];
     let high = c[6] * z + (c[5] * s + c[4]);
     let gain = high * (z * z) + (third * z + c[1] * s);
-    return select(vec4f(0.0), c[0] + gain, curve.holds);
+    return select(vec4f(0.0), c[0] + gain, curve.is_valid);
 }

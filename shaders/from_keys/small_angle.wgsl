@@ -93,7 +93,7 @@ struct SmallAngleCubic {
     // The coefficients of 1, s, s², … s⁶.
     powers: array<vec4f, 7>,
     // Whether the curve turns little enough for the series.
-    holds: bool,
+    is_valid: bool,
 }
 
 fn cross3(a: vec3f, b: vec3f) -> vec3f {
@@ -192,7 +192,7 @@ fn small_angle_cubic(
     let w2 = small_log(composed(without_first, small_exp(-w3)).vector);
 
     let squared_extent = dot3(w1, w1) + dot3(w2, w2) + dot3(w3, w3);
-    let holds = (squared_extent <= SMALL_SQUARED_EXTENT)
+    let is_valid = (squared_extent <= SMALL_SQUARED_EXTENT)
         & (norm_squared(chord_before) <= LONGEST_STEP)
         & (norm_squared(chord) <= LONGEST_STEP)
         & (norm_squared(chord_after) <= LONGEST_STEP)
@@ -262,7 +262,7 @@ fn small_angle_cubic(
             canonical_product(m, odd * 3.0 + f5, -dot3(b, c) - volume * B_123_5),
             canonical_product(m, (x13 - (even + even)) + f6, dot3(c, c) * -0.5),
         ),
-        holds,
+        is_valid,
     );
 }
 

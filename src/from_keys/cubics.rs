@@ -46,14 +46,14 @@ impl InLanes for CubicBlock {
             let s = self.parameters[j];
             let t = s * s;
             let is_held = self.held[j] == 1.0;
-            let found = if curve.holds { 1.0 } else { 0.0 };
+            let found = if curve.is_valid { 1.0 } else { 0.0 };
             macro_rules! component {
                 ($c:literal) => {{
                     let third = c[3][$c] * s + c[2][$c];
                     let high = c[6][$c] * t + (c[5][$c] * s + c[4][$c]);
                     let gain = high * (t * t) + (third * t + c[1][$c] * s);
                     let value = canonical(c[0][$c] + gain);
-                    let value = if curve.holds { value } else { 0.0 };
+                    let value = if curve.is_valid { value } else { 0.0 };
                     if is_held { start[j][$c] } else { value }
                 }};
             }

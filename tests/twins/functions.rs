@@ -223,7 +223,7 @@ pub(super) fn from_keys() -> Vec<Twin> {
             },
             |([before, start, end, after], first, last)| {
                 let curve = small_angle_cubic(before, start, end, after, first, last);
-                (curve.powers, curve.holds)
+                (curve.powers, curve.is_valid)
             },
         ),
     ]

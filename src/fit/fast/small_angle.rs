@@ -65,7 +65,7 @@ impl SmallAngleLanes {
             for (powers, power) in found.powers.iter_mut().zip(curve.powers) {
                 powers[lane] = power;
             }
-            found.is_valid[lane] = curve.holds;
+            found.is_valid[lane] = curve.is_valid;
         }
     }
 
@@ -128,7 +128,7 @@ impl InLanes for SmallAnglePass<'_> {
                     powers[power][c][j + 1] = curve.powers[power][c];
                 }
             }
-            is_valid[j + 1] = curve.holds;
+            is_valid[j + 1] = curve.is_valid;
         }
         self.lanes.is_valid = is_valid;
         for power in 0..7 {
