@@ -112,6 +112,7 @@ mod time;
 mod tracks;
 mod twin;
 pub mod verify;
+mod work;
 
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,

@@ -264,7 +264,7 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 26] = [
+const LAYERS: [&str; 27] = [
     "names",
     "memory",
     "threads",
@@ -285,6 +285,7 @@ const LAYERS: [&str; 26] = [
     "output",
     "from_keys",
     "cpu",
+    "work",
     "gpu",
     "evaluate",
     FACE,

@@ -251,13 +251,11 @@ pub(crate) mod crowd {
     use crate::gpu::engine::VulkanEngine;
     use crate::gpu::error::VulkanError;
     use crate::output::crowd::{CrowdFrame, CrowdOutput};
-    use crate::shader::CrowdDispatch;
+    use crate::work::crowd::CrowdShape;
 
     pub(crate) struct CrowdTables {
         pub(crate) instances: u32,
-        pub(crate) levels: Vec<u32>,
-        pub(crate) only_arcs: bool,
-        pub(crate) arguments: CrowdDispatch,
+        pub(crate) shape: CrowdShape,
         pub(crate) clips: Never,
         pub(crate) bases: Never,
         pub(crate) spans: Never,

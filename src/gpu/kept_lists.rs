@@ -5,12 +5,15 @@ use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::submission::{Binding, Submission};
+use crate::gpu::job::Job;
+use crate::gpu::recorded::Recorded;
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
-use crate::gpu::work_list::{ListRequest, Work, WorkLists};
+use crate::gpu::work_list::{ListRequest, Stored, Work, WorkLists};
 use crate::output::window::Window;
 use crate::threads::{lock, on_threads};
 use crate::time::frames::{Ticks, Timeline};
+use crate::work::recording::{Recording, Resource};
 
 /// The lists of a result, window by window, in device memory.
 pub(crate) struct KeptLists {
@@ -27,10 +30,12 @@ pub(crate) struct KeptWindow {
 }
 
 impl KeptWindow {
-    /// The bindings of the lists, in the kernels' order.
-    pub(crate) fn bindings(&self) -> Vec<Binding> {
+    /// The lists as resources of this work, in the order of the kernels' bindings.
+    pub(crate) fn resources(&self, work: &mut Recorded) -> Vec<Resource> {
         let uploads = self.lists.uploads(self.work.list).into_iter();
-        uploads.filter_map(Upload::binding).collect()
+        uploads
+            .filter_map(|upload| upload.resource_of(work))
+            .collect()
     }
 }
 
@@ -61,10 +66,13 @@ impl KeptLists {
         };
         if uploads().any(Upload::is_copied) {
             let mut submission = Submission::new(device, QueueLane::Kernels)?;
-            submission.begin(0)?;
-            Upload::record(uploads(), &mut submission);
-            submission.submit()?;
-            submission.wait()?;
+            submission.begin()?;
+            let work = &mut submission.work;
+            for upload in uploads() {
+                upload.copied_in(work);
+            }
+            work.recording.publish();
+            submission.run()?;
         }
         for window in &mut windows {
             window.lists.forget_written();
@@ -84,6 +92,31 @@ impl KeptLists {
         self.windows
             .get(index)
             .filter(|kept| kept.window == *window)
+    }
+
+    /// Adds the kernels of all windows, with the lists and the result.
+    pub(crate) fn add_sets(&self, job: Job<'_>, work: &mut Recorded, result: Resource) {
+        for kept in &self.windows {
+            let lists = kept.resources(work);
+            job.add_sets(work, &kept.work, &lists, result);
+        }
+    }
+
+    /// Records all windows, with the sets of [`KeptLists::add_sets`]. `stored` is where the whole result is stored.
+    pub(crate) fn record(&self, recording: &mut Recording, result: Resource, stored: Stored) {
+        let of_window = |window: &Window| Stored {
+            first: stored.first + window.start as u32,
+            stride: window.stride() as u32,
+            ..stored
+        };
+        let mut sets = recording.all_sets();
+        for kept in &self.windows {
+            (kept.work).record(recording, &mut sets, of_window(&kept.window));
+        }
+        for kept in &self.windows {
+            (kept.work).patch(recording, result, of_window(&kept.window));
+        }
+        recording.publish();
     }
 
     /// The size in device memory, bytes.

@@ -8,7 +8,6 @@ use glam::Vec3;
 
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
-use crate::gpu::whole_instances::WholeInstances;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::slerp::SLERP;
@@ -19,6 +18,7 @@ use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, Kernel, LINE_VECTORS, MAX_WHOLE_JOINTS, MAX_WHOLE_POSITIONS,
 };
 use crate::tracks::set::TrackSet;
+use crate::work::whole_instances::WholeInstances;
 
 use super::lines::{CARDS, Lines, cells, global, loads_of, store, walk};
 use super::machine::{Machine, Touch};

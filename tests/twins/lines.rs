@@ -386,7 +386,7 @@ fn of_clip(
         kernel: format!("{form}_{listed}_coalesced_f32"),
         builtins: Builtins::Workgroup,
         workgroup: WORKGROUP,
-        groups: grids[0].workgroups(65_535),
+        groups: grids[0].workgroups(),
         globals,
         rotations,
     }

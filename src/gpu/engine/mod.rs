@@ -33,7 +33,7 @@ use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::run_once::run_once;
-use crate::gpu::submission::{Access, Submission};
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::writable;
 use crate::gpu::work_list::{ListRequest, WorkLists};
 use crate::output::buffer::OutputBuffer;
@@ -45,6 +45,7 @@ use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
+use crate::work::recording::workgroups;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
 /// require fewer.
@@ -399,11 +400,12 @@ impl VulkanEngine {
         }
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
-        submission.begin(0)?;
-        (submission.commands()).copy(&upload, &resident, upload.size);
-        (submission.commands()).barrier(Access::Copy, Access::Kernel);
-        submission.submit()?;
-        submission.wait()?;
+        submission.begin()?;
+        let work = &mut submission.work;
+        let [from, to] = [&upload, &resident].map(|buffer| work.whole(buffer));
+        work.recording.copy(from, to);
+        work.recording.publish();
+        submission.run()?;
         Ok(resident)
     }
 
@@ -496,7 +498,7 @@ impl VulkanEngine {
             self.check_size("poses", bytes)?;
         }
         let [count, detail] = [count as u32, detail as u32];
-        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
+        let (pipeline, groups) = (self.pipeline(kernel)?, workgroups(count));
         let pass = PoseDispatch { count, detail };
         run_once(&pipeline, inputs, bytemuck::bytes_of(&pass), groups, output)
     }

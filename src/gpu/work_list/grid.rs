@@ -172,8 +172,8 @@ impl GroupGrid {
         (block * self.arguments.rows + row) as usize
     }
 
-    /// The workgroups of its dispatch; `max_x` is the limit along x.
-    pub(crate) fn workgroups(&self, max_x: u32) -> [u32; 3] {
+    /// The workgroups of its dispatch.
+    pub(crate) fn workgroups(&self) -> [u32; 3] {
         let samples = WORKGROUP * SAMPLES_EACH;
         let (tiles, z) = match self.all.stride {
             1 => (self.arguments.samples.div_ceil(samples), 1),
@@ -183,8 +183,7 @@ impl GroupGrid {
                 (tiles, self.arguments.samples.div_ceil(samples / LINE))
             }
         };
-        let x = tiles.clamp(1, max_x);
-        [x, tiles.div_ceil(x), z]
+        [tiles.max(1), 1, z]
     }
 }
 

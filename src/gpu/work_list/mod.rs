@@ -5,14 +5,12 @@ pub(crate) mod sample_list;
 
 use std::sync::Arc;
 
-use ash::vk;
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::EvaluateError;
 use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::submission::{Access, Commands};
 use crate::gpu::upload::Upload;
 use crate::gpu::work_list::grid::{GridRows, GroupGrid, write_blocks};
 use crate::gpu::work_list::sample_list::SampleList;
@@ -20,7 +18,9 @@ use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::{Block, IS_CONSTANT, ITEM_SAMPLES, Item, List, ListedSample, MAY_BE_TINY};
+use crate::shader::{
+    Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, LINE, List, ListedSample, MAY_BE_TINY,
+};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::threads::copy;
@@ -28,6 +28,7 @@ use crate::time::error::SampleTimesError;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
+use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
 pub(crate) struct Work {
@@ -44,18 +45,50 @@ impl Work {
         self.groups.iter().filter(|group| group.items > 0)
     }
 
-    /// Records the writing of the host's rotations after the kernels, to a window that starts at `start` of a buffer.
-    pub(crate) fn patch(
+    /// Records the dispatches of the window, with the next sets.
+    pub(crate) fn record(
         &self,
-        commands: Commands<'_>,
-        buffer: vk::Buffer,
-        start: u64,
-        encoding: Encoding,
+        recording: &mut Recording,
+        sets: &mut impl Iterator<Item = Set>,
+        stored: Stored,
     ) {
-        if self.patches.is_empty() {
-            return;
+        for (group, set) in self.dispatched().zip(sets) {
+            let detail = stored.encoding.row().detail;
+            if let Some(of_group) = group.grid {
+                let mut grid = Grid {
+                    detail,
+                    ..of_group.arguments
+                };
+                match grid.stride {
+                    1 => grid.shift = stored.first,
+                    _ => grid.first_output += stored.first,
+                }
+                recording.dispatch(set, &grid, of_group.workgroups());
+                continue;
+            }
+            let first_output = group.first_output + stored.first;
+            // Only samples lie one after another.
+            let idle = match stored.begins_lines && self.list == List::Samples {
+                true => first_output % LINE,
+                false => 0,
+            };
+            let dispatch = Dispatch {
+                first_item: group.first_item.wrapping_sub(idle),
+                item_count: group.items,
+                stride: stored.stride,
+                detail,
+                first_output: first_output - idle,
+                idle,
+            };
+            recording.dispatch(set, &dispatch, workgroups(group.items + idle));
         }
-        commands.barrier(Access::Kernel, Access::Copy);
+    }
+
+    /// Records the writing of the host's rotations after the kernels.
+    pub(crate) fn patch(&self, recording: &mut Recording, result: Resource, stored: Stored) {
+        let Stored {
+            encoding, first, ..
+        } = stored;
         let bytes = encoding.bytes();
         let mut encoded = [0; PATCHED_BYTES];
         // Neighbours go together.
@@ -67,11 +100,23 @@ impl Work {
             for ((_, value), into) in patches.iter().zip(values.chunks_exact_mut(bytes)) {
                 encoding.encode_all(&[*value], into);
             }
-            let offset = start + (patches[0].0 * bytes) as u64;
-            commands.update(buffer, offset, values);
+            let offset = (first as usize + patches[0].0) * bytes;
+            let to = result.slice(offset as u64, values.len() as u64);
+            recording.write(to, values);
         }
-        commands.barrier(Access::Copy, Access::Any);
     }
+}
+
+/// Where and how the values of a window are stored.
+#[derive(Clone, Copy)]
+pub(crate) struct Stored {
+    pub(crate) encoding: Encoding,
+    /// The distance between neighbouring samples of a track.
+    pub(crate) stride: u32,
+    /// The index of the window's first value in the result.
+    pub(crate) first: u32,
+    /// Whether neighbouring invocations store neighbouring values, from the start of a memory line on.
+    pub(crate) begins_lines: bool,
 }
 
 /// The maximum number of bytes that one command patches. It is a whole number of values in every encoding, and Vulkan

@@ -1,0 +1,5 @@
+//! Work for a device, as values that know no device.
+
+pub(crate) mod crowd;
+pub(crate) mod recording;
+pub(crate) mod whole_instances;
