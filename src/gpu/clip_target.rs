@@ -49,7 +49,12 @@ impl ClipTarget {
         let values_per_window = engine
             .at_once()
             .unwrap_or_else(|| engine.window_of(job.encoding));
-        let lists = KeptLists::new(engine.list_request(job), whole, values_per_window)?;
+        let lists = KeptLists::new(
+            &engine.device,
+            engine.list_request(job),
+            whole,
+            values_per_window,
+        )?;
         let mut work = Recorded::new(&engine.device);
         let result = work.resource(Binding::range(buffer.buffer, bound, range));
         lists.add_sets(job, &mut work, result);

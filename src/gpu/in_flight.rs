@@ -19,9 +19,9 @@ use crate::gpu::options::Timings;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::{Binding, Recorded};
 use crate::gpu::submission::{Semaphore, Spent, Submission};
-use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
 use crate::threads::copy;
+use crate::work::lists::Patch;
 use crate::work::recording::Resource;
 
 /// The resources of one piece of work in flight; `U` are its uploads.

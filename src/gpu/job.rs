@@ -6,13 +6,13 @@ use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::kept_lists::ListCache;
 use crate::gpu::recorded::Recorded;
-use crate::gpu::work_list::Work;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Kernel, List};
 use crate::time::frames::Timeline;
+use crate::work::lists::Work;
 use crate::work::recording::Resource;
 
 /// The segments and constants of a clip, on the device.

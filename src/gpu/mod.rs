@@ -22,7 +22,7 @@
 //!    ([`ClipBuffers`](job::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
-//! 3. [`work_list`] lists which samples of a window belong to which segment, as runs, single samples, or a grid;
+//! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples, or a grid;
 //!    [`kept_lists`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
 //! 4. The copies of the lists and a dispatch for each group of segments become a
 //!    [`Recording`](crate::work::recording::Recording), which [`recorded`] writes into commands with the barriers that
@@ -84,4 +84,3 @@ pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;
-pub(crate) mod work_list;

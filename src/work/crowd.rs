@@ -487,10 +487,10 @@ mod tests {
 
     #[test]
     fn changes_come_before_all_that_read_them() {
-        let (entry, change) = (CrowdEntry::zeroed(), CrowdChange::zeroed());
+        let (entries, change) = ([CrowdEntry::zeroed()], CrowdChange::zeroed());
         let rotations = CrowdValues::Rotations.into();
         let listed = [3, 1];
-        let range = frame(EntryChanges::Range(2, &[entry]), VisibleInstances::All);
+        let range = frame(EntryChanges::Range(2, &entries), VisibleInstances::All);
         let after = "D|D|D|D[KernelAndCopy>Any]";
         let expected = format!("^W[Copy>Kernel]{after}");
         assert_eq!(steps(rotations, false, &range), expected);

@@ -12,9 +12,6 @@ use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::KeyJob;
-use crate::gpu::work_list::grid::{GridRows, write_blocks};
-use crate::gpu::work_list::sample_list::SampleList;
-use crate::gpu::work_list::{Cut, GroupWork, work, write};
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -29,6 +26,9 @@ use crate::shader::{
 };
 use crate::time::frames::{SampleTimes, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
+use crate::work::lists::grid::{GridRows, write_blocks};
+use crate::work::lists::sample_list::SampleList;
+use crate::work::lists::{Cut, GroupWork, work, write};
 
 use super::machine::{Machine, Touch};
 use super::operations::FloatMode;

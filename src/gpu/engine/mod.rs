@@ -25,6 +25,7 @@ use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
 use crate::gpu::job::{ClipBuffers, Job};
+use crate::gpu::kept_lists::WorkLists;
 use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
@@ -35,7 +36,6 @@ use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::run_once::run_once;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::writable;
-use crate::gpu::work_list::{ListRequest, WorkLists};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -45,6 +45,7 @@ use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
+use crate::work::lists::ListRequest;
 use crate::work::recording::workgroups;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
@@ -336,7 +337,6 @@ impl VulkanEngine {
     /// The request for the work lists of a job.
     pub(crate) fn list_request<'a>(&'a self, job: Job<'a>) -> ListRequest<'a> {
         ListRequest {
-            device: &self.device,
             maps_samples: self.maps_samples,
             clip: job.clip,
             timeline: job.timeline,

@@ -11,16 +11,16 @@ use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
 use crate::gpu::job::Job;
-use crate::gpu::kept_lists::KeptLists;
+use crate::gpu::kept_lists::{KeptLists, WorkLists};
 use crate::gpu::recorded::Binding;
 use crate::gpu::submission::Submission;
-use crate::gpu::work_list::{Stored, WorkLists};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
 use crate::shader::Item;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
+use crate::work::lists::Stored;
 
 /// The maximum size of the lines in which a card's memory is written, bytes.
 const LINE_BYTES: u64 = 128;
@@ -77,7 +77,8 @@ impl VulkanEngine {
         if self.clip_bytes.is_some() {
             return Ok(None);
         }
-        (job.lists).lists(self.list_request(job), whole, values_per_window)
+        let request = self.list_request(job);
+        (job.lists).lists(&self.device, request, whole, values_per_window)
     }
 
     /// Evaluates a window of a result, divided into smaller windows that suit the device.
@@ -137,7 +138,7 @@ impl VulkanEngine {
             }
             None => {
                 let uploads = &mut flight.uploads;
-                let list = || uploads.list(self.list_request(job), window);
+                let list = || uploads.list(&self.device, self.list_request(job), window);
                 fresh = on_threads(list)??;
                 kernels.begin()?;
                 let uploads = uploads.uploads(fresh.list).into_iter();

@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use crate::gpu::work_list::GroupWork;
 use crate::output::window::Window;
 use crate::shader::{
     BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY, SAMPLES_EACH, WORKGROUP,
 };
+use crate::work::lists::GroupWork;
 
 /// The rows of a window: one for a track-major window, otherwise one for each track.
 #[derive(Debug, Clone, Copy)]
@@ -192,8 +192,8 @@ mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
-    use crate::gpu::work_list::WorkChunk;
     use crate::output::rotations::Layout;
+    use crate::work::lists::WorkChunk;
 
     /// Items with gaps between them, in two chunks, as (row, position, samples).
     fn listed(rows: GridRows, tracks: u32) -> GroupWork {

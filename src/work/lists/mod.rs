@@ -3,17 +3,9 @@
 pub(crate) mod grid;
 pub(crate) mod sample_list;
 
-use std::sync::Arc;
-
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
-use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::EvaluateError;
-use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::upload::Upload;
-use crate::gpu::work_list::grid::{GridRows, GroupGrid, write_blocks};
-use crate::gpu::work_list::sample_list::SampleList;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
@@ -28,6 +20,8 @@ use crate::time::error::SampleTimesError;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
+use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
+use crate::work::lists::sample_list::SampleList;
 use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
@@ -160,10 +154,9 @@ impl GroupWork {
     }
 }
 
-/// The samples to list, and properties of the device.
+/// The samples to list.
 #[derive(Clone, Copy)]
 pub(crate) struct ListRequest<'a> {
-    pub(crate) device: &'a Arc<LogicalDevice>,
     /// Whether neighbouring invocations evaluate neighbouring samples, if possible; otherwise each evaluates a run of
     /// samples.
     pub(crate) maps_samples: bool,
@@ -171,40 +164,43 @@ pub(crate) struct ListRequest<'a> {
     pub(crate) timeline: &'a Timeline,
 }
 
-/// The lists of a window for upload to the device, in memory that is kept for the next window.
+/// Memory of a device for the lists of a window.
+pub(crate) trait ListRoom<'r> {
+    type Error: From<SampleTimesError>;
+
+    /// Room for lists of so many bytes: items or listed samples, distances, and blocks; none for those that kernels do
+    /// not bind. It may be slow to read.
+    fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], Self::Error>;
+}
+
+/// Memory that is kept for the lists of the next window.
 #[derive(Default)]
-pub(crate) struct WorkLists {
-    /// Items, or the samples of a sample list.
-    items: Upload,
-    distances: Upload,
-    /// The blocks of a grid.
-    blocks: Upload,
+pub(crate) struct Lister {
     /// Emptied work lists.
     spare: Vec<WorkChunk>,
-    /// Blocks before they are uploaded.
+    /// Blocks before they are written to the device's memory.
     listed_blocks: Vec<Block>,
 }
 
-impl WorkLists {
-    /// Writes the work list of a window to its buffers, one group after another. If the request maps samples,
+impl Lister {
+    /// Writes the work list of a window into a device's memory, one group after another. If the request maps samples,
     /// neighbouring invocations evaluate neighbouring samples if possible. Must be called on one of the engine's
     /// threads.
-    pub(crate) fn list(
+    pub(crate) fn list<'r, R: ListRoom<'r>>(
         &mut self,
         request: ListRequest<'_>,
         window: &Window,
-    ) -> Result<Work, EvaluateError> {
+        memory: R,
+    ) -> Result<Work, R::Error> {
         let ListRequest {
-            device,
             maps_samples,
             clip,
             timeline,
         } = request;
-        let often = KernelReads::Often;
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = window.len() * size_of::<ListedSample>();
-            let room = self.items.room(device, "tumble items", often, bytes)?;
-            return Ok(list.write(bytemuck::cast_slice_mut(room))?);
+            let [samples, ..] = memory.room([Some(bytes), None, None])?;
+            return Ok(list.write(bytemuck::cast_slice_mut(samples))?);
         }
         let mut rows = GridRows::new(window).filter(|_| maps_samples);
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
@@ -223,20 +219,19 @@ impl WorkLists {
         let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
         // A grid has one item without samples after all others.
         let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
-        let items = (self.items).room(device, "tumble items", often, item_bytes)?;
-        let bytes = distance_count * size_of::<f32>();
-        let distances = (self.distances).room(device, "tumble distances", often, bytes)?;
+        let distance_bytes = distance_count * size_of::<f32>();
+        let block_count = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
+        let block_bytes = rows.map(|_| block_count * size_of::<Block>());
+        let sizes = [Some(item_bytes), Some(distance_bytes), block_bytes];
+        let [items, distances, blocks] = memory.room(sizes)?;
         let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
         nothing.fill(Item::zeroed());
         write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
         if rows.is_some() {
-            let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
             // They are written out of order, and read meanwhile.
-            self.listed_blocks.resize(blocks, Block::zeroed());
+            self.listed_blocks.resize(block_count, Block::zeroed());
             write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
-            let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
-            let room = (self.blocks).room(device, "tumble blocks", often, bytes.len())?;
-            copy(room, bytes);
+            copy(blocks, bytemuck::cast_slice(&self.listed_blocks));
         }
 
         let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
@@ -275,30 +270,6 @@ impl WorkLists {
             self.spare.push(chunk);
         }
         patches
-    }
-
-    /// Frees memory that only the next list would use.
-    pub(crate) fn forget_spare(&mut self) {
-        self.spare = Vec::new();
-        self.listed_blocks = Vec::new();
-    }
-
-    /// Frees the buffers that the device has copied.
-    pub(crate) fn forget_written(&mut self) {
-        for upload in [&mut self.items, &mut self.distances, &mut self.blocks] {
-            upload.forget_written();
-        }
-    }
-
-    /// The uploads of a list that kernels read, in the order of their bindings.
-    pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
-        let (items, blocks, distances) = (&self.items, &self.blocks, &self.distances);
-        match list {
-            List::Samples | List::Frames => vec![items],
-            List::Times => vec![items, distances],
-            List::FramesCoalesced => vec![items, blocks],
-            List::TimesCoalesced => vec![items, blocks, distances],
-        }
     }
 }
 
