@@ -354,6 +354,16 @@ fn imports_go_down_the_layers() {
     assert!(checked > 500, "only {checked} imports were found");
 }
 
+/// A plan is made from numbers; machines carry it out.
+#[test]
+fn the_plan_knows_no_machine() {
+    let text = read("src/evaluate/plan.rs");
+    let code = text.split("#[cfg(test)]").next().unwrap();
+    for machine in ["crate::cpu", "crate::gpu", "Backend"] {
+        assert!(!code.contains(machine), "src/evaluate/plan.rs uses {machine}");
+    }
+}
+
 /// The test of the layers can fail.
 #[test]
 fn an_import_upwards_is_refused() {

@@ -80,6 +80,7 @@ pub(crate) mod engine {
     pub(crate) struct VulkanEngine {
         pub(crate) never: Never,
         pub(crate) group_bytes: usize,
+        pub(crate) prepares_arcs_from: usize,
         pub(crate) clip_bytes: Option<usize>,
         pub(crate) timings: Mutex<Timings>,
         pub(crate) device: Arc<LogicalDevice>,
@@ -109,10 +110,6 @@ pub(crate) mod engine {
         }
 
         pub(crate) fn owns(&self, _buffers: &ClipBuffers) -> bool {
-            match self.never {}
-        }
-
-        pub(crate) fn prepares_arcs(&self, _keys: usize) -> bool {
             match self.never {}
         }
 

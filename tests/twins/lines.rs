@@ -407,8 +407,8 @@ fn dispatch_of(count: usize, stride: usize) -> Dispatch {
 fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     let interpolation = Interpolation::from(method);
     let timeline: Timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
-    let curve = KeyCurve::of_set(set, &interpolation, &timeline).expect("fewer samples than keys");
     let request = SetRequest::whole(set, &interpolation, &timeline);
+    let curve = KeyCurve::of(&request).expect("fewer samples than keys");
     let job = KeyJob {
         request: &request,
         curve,

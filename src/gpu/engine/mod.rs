@@ -73,7 +73,7 @@ pub(crate) struct VulkanEngine {
     /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
     /// The number of keys from which on the arcs between them are prepared on the device.
-    prepares_arcs_from: usize,
+    pub(crate) prepares_arcs_from: usize,
     /// Whether the caller's memory is imported if the device can.
     pub(crate) imports: bool,
     /// Rotations of one window.
