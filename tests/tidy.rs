@@ -360,7 +360,10 @@ fn the_plan_knows_no_machine() {
     let text = read("src/evaluate/plan.rs");
     let code = text.split("#[cfg(test)]").next().unwrap();
     for machine in ["crate::cpu", "crate::gpu", "Backend"] {
-        assert!(!code.contains(machine), "src/evaluate/plan.rs uses {machine}");
+        assert!(
+            !code.contains(machine),
+            "src/evaluate/plan.rs uses {machine}"
+        );
     }
 }
 

@@ -223,14 +223,14 @@ fn no_request_prepares_all_segments_at_once() {
     };
 
     let (set, method) = (set_of(100, 3000), method::BESSEL_OVERHAUSER);
-    let (segments, limit) = (set.key_count() * 176, 4 * MIB);
-    assert!(segments > 10 * limit);
-    let frames = SampleTimes::fps(60);
+    let (segments, limit) = (set.key_count() * 176, 8 * MIB);
+    assert!(segments > 6 * limit);
+    let frames = SampleTimes::fps(120);
     let request = engine.request(&set, method, &frames);
     let encodings = Encoding::ALL
         .into_iter()
         .map(|it| request.clone().encoding(it));
-    let parts = [0..1200, 300..1700].map(|samples| request.clone().samples(samples));
+    let parts = [0..1200, 300..3400].map(|samples| request.clone().samples(samples));
     for request in encodings.chain(parts) {
         let peak = peak(&request);
         assert!(peak < limit, "{}: {peak}", request.explain().unwrap());
