@@ -9,4 +9,3 @@ pub(crate) mod poses;
 pub(crate) mod skeleton;
 pub(crate) mod smooth;
 pub(crate) mod transforms;
-pub(crate) mod tree;
