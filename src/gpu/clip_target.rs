@@ -57,7 +57,7 @@ impl ClipTarget {
         )?;
         let mut work = Recorded::new(&engine.device);
         let result = work.resource(Binding::range(buffer.buffer, bound, range));
-        lists.add_sets(job, &mut work, result);
+        job.add_kept_sets(&lists, &mut work, result);
         work.bind(|kernel| engine.pipeline(kernel))?;
         let target = Self {
             engine: Arc::clone(engine),

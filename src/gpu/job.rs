@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::kept_lists::ListCache;
+use crate::gpu::kept_lists::{KeptLists, ListCache};
 use crate::gpu::recorded::Recorded;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
@@ -55,6 +55,14 @@ impl Job<'_> {
             let all = read.iter().chain(lists).chain([&result]);
             let bindings = all.map(|&resource| resource.into());
             work.recording.set(self.kernel(listed.list), bindings);
+        }
+    }
+
+    /// Adds the kernels of all windows of kept lists.
+    pub(crate) fn add_kept_sets(&self, kept: &KeptLists, work: &mut Recorded, result: Resource) {
+        for window in &kept.windows {
+            let lists = window.resources(work);
+            self.add_sets(work, &window.work, &lists, result);
         }
     }
 

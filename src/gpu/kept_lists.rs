@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::job::Job;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::recorded::Recorded;
 use crate::gpu::submission::Submission;
@@ -172,15 +171,7 @@ impl KeptLists {
             .filter(|kept| kept.window == *window)
     }
 
-    /// Adds the kernels of all windows, with the lists and the result.
-    pub(crate) fn add_sets(&self, job: Job<'_>, work: &mut Recorded, result: Resource) {
-        for kept in &self.windows {
-            let lists = kept.resources(work);
-            job.add_sets(work, &kept.work, &lists, result);
-        }
-    }
-
-    /// Records all windows, with the sets of [`KeptLists::add_sets`]. `stored` is where the whole result is stored.
+    /// Records all windows, with the sets of `Job::add_kept_sets`. `stored` is where the whole result is stored.
     pub(crate) fn record(&self, recording: &mut Recording, result: Resource, stored: Stored) {
         let of_window = |window: &Window| Stored {
             first: stored.first + window.start as u32,

@@ -267,7 +267,7 @@ impl VulkanEngine {
         let end = (kept.windows.last()).map_or(0, |part| part.window.start + part.window.len());
         let size = (end as u64 + shift) * rotation;
         let result = work.resource(Binding::range(target.buffer, aligned, size));
-        kept.add_sets(job, work, result);
+        job.add_kept_sets(kept, work, result);
         let stored = self.stored(encoding, 0, shift as u32);
         kept.record(&mut work.recording, result, stored);
         work.bind(|kernel| self.pipeline(kernel))?;
