@@ -32,11 +32,11 @@ pub(crate) struct Limits {
     pub(crate) memory: Option<usize>,
     /// Bytes of segments that go into one buffer of a device; `None` on the CPU.
     pub(crate) group_bytes: Option<usize>,
-    /// The number of keys from which on a device prepares the arcs between them; `None` on the CPU.
+    /// With at least so many keys, the device prepares the arcs between them; `None` if the host always does.
     pub(crate) prepares_arcs_from: Option<usize>,
 }
 
-/// Who evaluates.
+/// The kind of machine that evaluates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum MachineKind {
     /// Threads of the CPU.
