@@ -379,7 +379,7 @@ impl fmt::Display for Route {
                 "far fewer samples than keys: only the intervals that contain a sample are prepared"
             }
             Self::Pieces { .. } => {
-                "as a clip: all segments are prepared and uploaded to the device, as many at a time as it has memory for, then evaluated"
+                "as a clip: all segments are prepared, and uploaded if a device evaluates, as many at a time as there is memory for"
             }
         })
     }
