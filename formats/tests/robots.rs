@@ -211,7 +211,14 @@ fn bodies_of_urdf_are_where_pinocchio_has_them() {
         assert_eq!(robot.format, RobotFormat::Urdf);
         let tree = &robot.tree;
         let all = bodies(&mut arrays);
-        let [positions, rates, places, turns, linear, angular] = [
+        let [
+            positions,
+            rates,
+            root_positions,
+            root_rotations,
+            linear,
+            angular,
+        ] = [
             "joint_pos",
             "joint_vel",
             "root_pos",
@@ -224,8 +231,8 @@ fn bodies_of_urdf_are_where_pinocchio_has_them() {
         for row in 0..positions.len() {
             let configuration = Configuration {
                 base: BodyPose {
-                    position: DVec3::from_slice(&places[row]),
-                    rotation: quaternion(&turns[row]),
+                    position: DVec3::from_slice(&root_positions[row]),
+                    rotation: quaternion(&root_rotations[row]),
                 },
                 scalars: positions[row].clone(),
                 ..tree.rest()
@@ -317,6 +324,14 @@ fn names_poses_and_couplings_are_read() {
     );
     assert_eq!(*rest, robot.tree.rest());
     assert_eq!(rest.free[0].position, DVec3::Z);
+}
+
+#[test]
+fn bodies_that_mujoco_merges_are_told() {
+    let text = "<mujoco>\n<compiler fusestatic='true'/><worldbody><body/></worldbody></mujoco>";
+    let warnings = read(text, &[]).unwrap().warnings;
+    assert_eq!(warnings[0].code, Code::RobotMerged);
+    assert_eq!(warnings.len(), 1);
 }
 
 #[test]

@@ -40,7 +40,7 @@ struct Reader<'a> {
 struct EulerAxis {
     axis: DVec3,
     /// About the axis as the rotations before have turned it; else about the fixed axis.
-    is_turned: bool,
+    is_intrinsic: bool,
 }
 
 /// An element whose children are read: the world, a body or a frame.
@@ -257,9 +257,9 @@ impl<'a> Reader<'a> {
         }
         if let Some(angles) = documents.list::<3>(element, "euler")? {
             let mut q = DQuat::IDENTITY;
-            for (turn, angle) in self.euler_sequence.iter().zip(angles) {
-                let r = about(turn.axis, angle * self.unit);
-                q = if turn.is_turned { q * r } else { r * q };
+            for (euler, angle) in self.euler_sequence.iter().zip(angles) {
+                let r = about(euler.axis, angle * self.unit);
+                q = if euler.is_intrinsic { q * r } else { r * q };
             }
             return Ok(q);
         }
@@ -407,8 +407,8 @@ fn euler_sequence(text: &str) -> Option<Vec<EulerAxis>> {
             'z' => DVec3::Z,
             _ => return None,
         };
-        let is_turned = letter.is_ascii_lowercase();
-        Some(EulerAxis { axis, is_turned })
+        let is_intrinsic = letter.is_ascii_lowercase();
+        Some(EulerAxis { axis, is_intrinsic })
     };
     let axes: Option<Vec<_>> = text.chars().map(axis).collect();
     axes.filter(|axes| axes.len() == 3)

@@ -64,7 +64,7 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
     }
     if bodies.len() < links.len() {
         return Err(refuse(
-            "some joints form a circle, so that the root leads not to all links".to_owned(),
+            "some joints form a circle, so that the root does not lead to all links".to_owned(),
         ));
     }
     let tree = Tree::new(bodies).map_err(|error| refuse(error.to_string()))?;

@@ -2,7 +2,8 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::pose::tree::{JointKind, JointValue, Tree, TreeBody, TreeError};
+use crate::math::quaternion::sine_cosine;
+use crate::pose::tree::{JointKind, JointValue, Tree, TreeBody, TreeError, TreeJoint};
 
 /// A value for each joint of a [`Tree`].
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +73,73 @@ impl BodyMotion {
     pub fn velocity_at(&self, point: DVec3) -> DVec3 {
         let BodyVelocity { linear, angular } = self.velocity;
         linear + angular.cross(self.pose.rotation * point)
+    }
+
+    /// A child of this body before its joints act.
+    pub(super) fn with(self, child: &TreeBody) -> Self {
+        let Self { pose, velocity } = self;
+        Self {
+            velocity: BodyVelocity {
+                linear: self.velocity_at(child.position),
+                ..velocity
+            },
+            pose: BodyPose {
+                position: pose.position + pose.rotation * child.position,
+                rotation: pose.rotation * child.rotation,
+            },
+        }
+    }
+
+    /// After a free joint: in the world, or relative to where the body is.
+    pub(super) fn freely(self, pose: BodyPose, rate: BodyVelocity, is_relative: bool) -> Self {
+        let rotation = pose.rotation.normalize();
+        if !is_relative {
+            let pose = BodyPose { rotation, ..pose };
+            return Self {
+                pose,
+                velocity: rate,
+            };
+        }
+        let axes = self.pose.rotation;
+        Self {
+            velocity: BodyVelocity {
+                linear: self.velocity_at(pose.position) + axes * rate.linear,
+                angular: self.velocity.angular + axes * rate.angular,
+            },
+            pose: BodyPose {
+                position: self.pose.position + axes * pose.position,
+                rotation: axes * rotation,
+            },
+        }
+    }
+
+    /// After a hinge turned by `value` rad, or a slide shifted by `value` metres.
+    pub(super) fn by_scalar(self, joint: &TreeJoint, value: f64, rate: f64) -> Self {
+        let axis = self.pose.rotation * joint.axis;
+        if joint.kind == JointKind::Hinge {
+            let (sine, cosine) = sine_cosine(value * 0.5);
+            let [x, y, z] = (joint.axis * sine).to_array();
+            let rotation = DQuat::from_xyzw(x, y, z, cosine);
+            return self.about(joint.anchor, rotation, axis * rate);
+        }
+        let (shift, mut moved) = (axis * value, self);
+        moved.velocity.linear += self.velocity.angular.cross(shift) + axis * rate;
+        moved.pose.position += shift;
+        moved
+    }
+
+    /// After a rotation about an anchor; `rate` is the angular velocity in the world's axes.
+    pub(super) fn about(self, anchor: DVec3, rotation: DQuat, rate: DVec3) -> Self {
+        let Self { pose, velocity } = self;
+        let rotation = pose.rotation * rotation;
+        let fixed = pose.position + pose.rotation * anchor;
+        let position = fixed - rotation * anchor;
+        let angular = velocity.angular + rate;
+        let linear = self.velocity_at(anchor) + angular.cross(position - fixed);
+        Self {
+            pose: BodyPose { position, rotation },
+            velocity: BodyVelocity { linear, angular },
+        }
     }
 }
 
