@@ -327,7 +327,7 @@ fn names_poses_and_couplings_are_read() {
 }
 
 #[test]
-fn bodies_that_mujoco_merges_are_told() {
+fn bodies_that_mujoco_merges_are_named() {
     let text = "<mujoco>\n<compiler fusestatic='true'/><worldbody><body/></worldbody></mujoco>";
     let warnings = read(text, &[]).unwrap().warnings;
     assert_eq!(warnings[0].code, Code::RobotMerged);
