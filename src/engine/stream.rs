@@ -20,7 +20,7 @@ use crate::tracks::set::TrackSet;
 
 /// The limit of the segments that are prepared before the first chunk, if the engine's options have no limit; more
 /// segments are prepared piece by piece.
-const SEGMENT_BYTES: usize = 256 << 20;
+pub(super) const SEGMENT_BYTES: usize = 256 << 20;
 
 impl Engine {
     /// Evaluates a window of a set's result in chunks of about `chunk` values.

@@ -1,4 +1,4 @@
-//! A clip: a set prepared for one method, stored on a device, for evaluation at any times.
+//! A clip: a set prepared for its interpolation, or one for each track, stored on a device, for evaluation at any times.
 
 pub(crate) mod request;
 
@@ -8,8 +8,10 @@ use crate::checks::{check_encoding, check_window};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::engine::clip::request::Request;
+use crate::engine::groups::GroupedClip;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
+use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
@@ -18,16 +20,40 @@ use crate::stream::{Chunk, run};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::{SampleTimes, Timeline};
 
-/// A set that is prepared for one method and stored on its engine's device. It may be evaluated any number of times,
-/// at any sample times.
+/// A set that is prepared for its method, or for the method of each track, and stored on its engine's device. It may be
+/// evaluated any number of times, at any sample times.
 pub struct Clip {
     engine: Engine,
-    pub(crate) uploaded: Uploaded,
+    tracks: ClipTracks,
+}
+
+/// The prepared tracks of a clip.
+enum ClipTracks {
+    /// Tracks with the same interpolation.
+    Alike(Uploaded),
+    Grouped(GroupedClip),
 }
 
 impl Clip {
     pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
-        Self { engine, uploaded }
+        let tracks = ClipTracks::Alike(uploaded);
+        Self { engine, tracks }
+    }
+
+    pub(crate) fn of_groups(engine: Engine, grouped: GroupedClip) -> Self {
+        let tracks = ClipTracks::Grouped(grouped);
+        Self { engine, tracks }
+    }
+
+    /// The tracks as one set of segments, as results need that stay on a device.
+    ///
+    /// # Errors
+    /// When the tracks have several interpolations.
+    pub(crate) fn uploaded(&self) -> Result<&Uploaded, Error> {
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => Ok(uploaded),
+            ClipTracks::Grouped(_) => Err(Error::SeveralInterpolations),
+        }
     }
 
     /// The engine to which the clip was uploaded.
@@ -37,7 +63,10 @@ impl Clip {
 
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
-        self.uploaded.data.track_count()
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data.track_count(),
+            ClipTracks::Grouped(grouped) => grouped.track_count,
+        }
     }
 
     /// The sample times of `frames` for this clip.
@@ -45,7 +74,11 @@ impl Clip {
     /// # Errors
     /// When the frames do not fit the clip.
     pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
-        frames.resolve(self.track_count(), self.uploaded.data.time_span)
+        let span = match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data.time_span,
+            ClipTracks::Grouped(grouped) => grouped.time_span,
+        };
+        frames.resolve(self.track_count(), span)
     }
 
     /// Evaluates the rotation of every track at every sample, `[track][frame]`. Short for
@@ -68,7 +101,10 @@ impl Clip {
     }
 
     pub(crate) fn quantity(&self) -> Quantity {
-        self.uploaded.data.interpolation.quantity
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data.interpolation.quantity,
+            ClipTracks::Grouped(grouped) => grouped.quantity,
+        }
     }
 
     /// The values of any quantity.
@@ -77,8 +113,17 @@ impl Clip {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let storage = (self.uploaded).evaluate(timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
+        let storage = match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.evaluate(timeline, layout)?,
+            ClipTracks::Grouped(grouped) => {
+                let whole = Window::whole(tracks, samples, layout);
+                let mut quats = OutputBuffer::new(whole.len())?;
+                let output = bytemuck::cast_slice_mut(&mut quats);
+                grouped.evaluate_into(timeline, &whole, Encoding::F32, output)?;
+                Box::new(quats)
+            }
+        };
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
@@ -113,8 +158,15 @@ impl Clip {
         if output.is_empty() {
             return Ok(());
         }
-        let timeline = self.uploaded.folded(timeline)?;
-        Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => {
+                let timeline = uploaded.folded(timeline)?;
+                Ok(uploaded.evaluate_into(&timeline, window, encoding, output)?)
+            }
+            ClipTracks::Grouped(grouped) => {
+                grouped.evaluate_into(timeline, window, encoding, output)
+            }
+        }
     }
 
     /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
@@ -131,10 +183,14 @@ impl Clip {
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let timeline = self.uploaded.folded(timeline).map_err(Error::from)?;
+        let uploaded = match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded,
+            ClipTracks::Grouped(grouped) => return grouped.stream(timeline, window, chunk, sink),
+        };
+        let timeline = uploaded.folded(timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             let bytes = bytemuck::cast_slice_mut(output);
-            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
+            Ok(uploaded.evaluate_into(&timeline, window, Encoding::F32, bytes)?)
         };
         run(window.cut(chunk), self.quantity(), fill, sink)
     }
@@ -142,9 +198,17 @@ impl Clip {
 
 impl std::fmt::Debug for Clip {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Clip")
-            .field("engine", &self.engine)
-            .field("method", &self.uploaded.data.interpolation.method)
+        let mut fields = f.debug_struct("Clip");
+        fields.field("engine", &self.engine);
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => {
+                fields.field("method", &uploaded.data.interpolation.method)
+            }
+            ClipTracks::Grouped(grouped) => {
+                fields.field("methods", &grouped.methods().collect::<Vec<_>>())
+            }
+        };
+        fields
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
     }

@@ -14,6 +14,7 @@ use crate::checks::{check_encoding, check_rows, check_within, in_quats};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::engine::clip::Clip;
+use crate::engine::groups::GroupedSet;
 use crate::error::Error;
 #[cfg(feature = "vulkan")]
 use crate::evaluate::uploaded::Uploaded;
@@ -34,6 +35,7 @@ use crate::output::window::Window;
 use crate::prepare::prepared::SEGMENTS;
 use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
 
 /// A request for samples of a clip ([`Clip::request`]) or of a set ([`Engine::request`]).
@@ -72,8 +74,8 @@ pub struct Request<'a> {
 }
 
 /// The clip or the set that is evaluated.
-#[derive(Debug, Clone, Copy)]
-#[allow(clippy::large_enum_variant)] // it lives on the stack of one call, and is copied
+#[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant)] // it lives on the stack of one call
 enum RequestSource<'a> {
     Clip(&'a Clip),
     Set {
@@ -81,27 +83,32 @@ enum RequestSource<'a> {
         set: &'a TrackSet,
         interpolation: Interpolation,
     },
+    /// A set whose tracks have several interpolations.
+    Grouped(GroupedSet<'a>),
 }
 
 impl RequestSource<'_> {
-    fn quantity(&self) -> Quantity {
+    fn quantity(&self) -> Result<Quantity, Error> {
         match self {
-            Self::Clip(clip) => clip.quantity(),
-            Self::Set { interpolation, .. } => interpolation.quantity,
+            Self::Clip(clip) => Ok(clip.quantity()),
+            Self::Set { interpolation, .. } => Ok(interpolation.quantity),
+            Self::Grouped(grouped) => grouped.quantity(),
         }
     }
 
     fn track_count(&self) -> usize {
         match self {
             Self::Clip(clip) => clip.track_count(),
-            Self::Set { set, .. } => set.track_count(),
+            Self::Set { set, .. } | Self::Grouped(GroupedSet { set, .. }) => set.track_count(),
         }
     }
 
     fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, Error> {
         Ok(match self {
             Self::Clip(clip) => clip.timeline(frames)?,
-            Self::Set { set, .. } => frames.resolve(set.track_count(), set.time_span())?,
+            Self::Set { set, .. } | Self::Grouped(GroupedSet { set, .. }) => {
+                frames.resolve(set.track_count(), set.time_span())?
+            }
         })
     }
 
@@ -109,7 +116,7 @@ impl RequestSource<'_> {
     fn engine(&self) -> &Engine {
         match self {
             Self::Clip(clip) => clip.engine(),
-            Self::Set { engine, .. } => engine,
+            Self::Set { engine, .. } | Self::Grouped(GroupedSet { engine, .. }) => engine,
         }
     }
 
@@ -123,9 +130,11 @@ impl RequestSource<'_> {
     ) -> Result<T, Error> {
         Ok(match *self {
             Self::Clip(clip) => {
-                let folded = clip.uploaded.folded(timeline)?;
-                work(&clip.uploaded, &folded, window)
+                let uploaded = clip.uploaded()?;
+                let folded = uploaded.folded(timeline)?;
+                work(uploaded, &folded, window)
             }
+            Self::Grouped(_) => return Err(Error::SeveralInterpolations),
             Self::Set {
                 engine,
                 set,
@@ -160,13 +169,16 @@ impl<'a> Request<'a> {
     pub(crate) fn of_set(
         engine: &'a Engine,
         set: &'a TrackSet,
-        interpolation: Interpolation,
+        interpolations: PerTrack<Interpolation>,
         frames: &'a SampleTimes,
     ) -> Self {
-        let source = RequestSource::Set {
-            engine,
-            set,
-            interpolation,
+        let source = match interpolations.uniform(set.track_count()) {
+            Some(interpolation) => RequestSource::Set {
+                engine,
+                set,
+                interpolation,
+            },
+            None => RequestSource::Grouped(GroupedSet::new(engine, set, interpolations)),
         };
         Self::new(source, frames)
     }
@@ -211,8 +223,9 @@ impl Request<'_> {
     /// The number of values of the result, and the bytes of each.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, the tracks or samples are out of range, or the encoding is for rotations
-    /// and the quantity is a velocity or an acceleration.
+    /// When the frames do not fit the clip, the tracks or samples are out of range, the encoding is for rotations and the
+    /// quantity is a velocity or an acceleration, or the set's interpolations are for another number of tracks or have
+    /// several quantities.
     pub fn size(&self) -> Result<(usize, usize), Error> {
         let (_, window) = self.window()?;
         Ok((window.len(), self.encoding.bytes()))
@@ -224,7 +237,7 @@ impl Request<'_> {
     /// As [`Request::size`]; also when the quantity is a velocity or an acceleration, the encoding is not f32, there
     /// is not enough memory for the result, or the device fails.
     pub fn evaluate(&self) -> Result<Rotations, Error> {
-        check_rows::<Quat>(self.source.quantity())?;
+        check_rows::<Quat>(self.source.quantity()?)?;
         self.values()
     }
 
@@ -234,7 +247,7 @@ impl Request<'_> {
     /// # Errors
     /// As [`Request::evaluate`], but the quantity must not be the rotation.
     pub fn rates(&self) -> Result<Vectors, Error> {
-        check_rows::<Vec4>(self.source.quantity())?;
+        check_rows::<Vec4>(self.source.quantity()?)?;
         self.values()
     }
 
@@ -267,7 +280,7 @@ impl Request<'_> {
         &self,
         output: &mut [R],
     ) -> Result<(), Error> {
-        check_rows::<R>(self.source.quantity())?;
+        check_rows::<R>(self.source.quantity()?)?;
         let (timeline, window) = self.window()?;
         in_quats(output, window.len(), |quats| {
             self.fill(&timeline, &window, bytemuck::cast_slice_mut(quats))
@@ -280,7 +293,8 @@ impl Request<'_> {
     /// The memory is that of three chunks, and for a set also of segments:
     ///
     /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
-    /// * otherwise: all segments that the request's samples need, if they take no more than
+    /// * otherwise: all segments that the request's samples need (with several interpolations: all of the set), if they
+    ///   take no more than
     ///   [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) (256 MiB if it has no limit), and else
     ///   those of a part of a chunk at a time.
     ///
@@ -309,13 +323,14 @@ impl Request<'_> {
     ) -> Result<(), E> {
         self.check_f32()?;
         let (timeline, window) = self.window()?;
-        match self.source {
+        match &self.source {
             RequestSource::Clip(clip) => clip.stream_window(&timeline, &window, chunk, sink),
-            RequestSource::Set {
+            &RequestSource::Set {
                 engine,
                 set,
                 interpolation,
             } => engine.stream_window(set, interpolation, &timeline, &window, chunk, sink),
+            RequestSource::Grouped(grouped) => grouped.stream(&timeline, &window, chunk, sink),
         }
     }
 
@@ -324,14 +339,15 @@ impl Request<'_> {
         self.check_f32()?;
         let (timeline, window) = self.window()?;
         if window == Window::whole(self.source.track_count(), timeline.len(), self.layout) {
-            return match self.source {
-                RequestSource::Clip(clip) => clip.samples(&timeline, self.layout),
+            match self.source {
+                RequestSource::Clip(clip) => return clip.samples(&timeline, self.layout),
                 RequestSource::Set {
                     engine,
                     set,
                     interpolation,
-                } => engine.samples(set, interpolation, &timeline, self.layout),
-            };
+                } => return engine.samples(set, interpolation, &timeline, self.layout),
+                RequestSource::Grouped(_) => {} // put together in memory, as any window
+            }
         }
         let mut quats = OutputBuffer::new(window.len())?;
         self.fill(&timeline, &window, bytemuck::cast_slice_mut(&mut quats))?;
@@ -341,11 +357,14 @@ impl Request<'_> {
 
     /// Evaluates a window of the result into `output`, in the request's encoding; refuses what does not fit.
     fn fill(&self, timeline: &Timeline, window: &Window, output: &mut [u8]) -> Result<(), Error> {
-        match self.source {
+        match &self.source {
             RequestSource::Clip(clip) => {
                 clip.encode_window_into(timeline, window, self.encoding, output)
             }
-            RequestSource::Set {
+            RequestSource::Grouped(grouped) => {
+                grouped.encode_window_into(timeline, window, self.encoding, output)
+            }
+            &RequestSource::Set {
                 engine,
                 set,
                 interpolation,
@@ -366,7 +385,7 @@ impl Request<'_> {
 
     /// The sample times of the request, and the part of them that the result has.
     pub(crate) fn window(&self) -> Result<(Timeline, Window), Error> {
-        check_encoding(self.encoding, self.source.quantity())?;
+        check_encoding(self.encoding, self.source.quantity()?)?;
         let timeline = self.source.timeline(self.frames)?;
         let (tracks, samples) = (self.source.track_count(), timeline.len());
         let part = |asked: &Option<Range<usize>>, all| asked.clone().unwrap_or(0..all);
