@@ -17,6 +17,7 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
+use crate::prepare::error::SetError;
 use crate::prepare::prepared::{Prepared, SEGMENTS};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::lock;
@@ -82,13 +83,23 @@ impl Uploaded {
             refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
             return Self::new(backend, set, interpolation, PrepareRequest::all(set), None);
         }
+        Self::unprepared(backend, set.clone(), interpolation)
+    }
+
+    /// A set that every evaluation prepares anew; refuses what cannot be interpolated.
+    pub(crate) fn unprepared(
+        backend: &Arc<Backend>,
+        set: TrackSet,
+        interpolation: Interpolation,
+    ) -> Result<Self, EvaluateError> {
+        let data = ClipData::unprepared(&set, interpolation).map_err(SetError::from)?;
         Ok(Self {
             backend: Arc::clone(backend),
-            data: ClipData::unprepared(set, interpolation)?,
+            data,
             buffers: Mutex::default(),
             uploading: Exclusive::default(),
             lists: ListCache::default(),
-            unprepared: Some(set.clone()),
+            unprepared: Some(set),
         })
     }
 

@@ -57,7 +57,7 @@ impl Clip {
     /// and on devices that cannot allocate the result at once.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// When the frames do not fit the clip, its tracks have several interpolations, or the device fails.
     pub fn resident(
         &self,
         frames: &SampleTimes,
@@ -69,7 +69,7 @@ impl Clip {
         };
         check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.data.folded(&timeline)?;
+        let timeline = self.uploaded()?.data.folded(&timeline)?;
         let engine = opened.engine();
         let count = (self.track_count() * timeline.len()) as u64;
         let bytes = count.saturating_mul(encoding.bytes() as u64);
@@ -116,7 +116,7 @@ impl Resident<'_> {
         let _ = self.clip.engine().take_timings();
         let started = Instant::now();
         self.clip
-            .uploaded
+            .uploaded()?
             .on_device(opened, &self.timeline, self.encoding, |engine, job| {
                 if !Arc::ptr_eq(&engine.device, &buffer.device) {
                     *buffer = room(engine, bytes)?;
