@@ -128,7 +128,7 @@ pub use crate::method::interpolation::Interpolation;
 pub use crate::method::interpolation_options::{
     InterpolationOption, InterpolationOptions, OptionValue, OptionValueError,
 };
-pub use crate::method::vector_method::VectorMethod;
+pub use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 pub use crate::method::{METHODS, Method};
 pub use crate::names::UnknownNameError;
 pub use crate::output::buffer::OutputBuffer;
@@ -137,6 +137,7 @@ pub use crate::output::encoding::{Encoding, EncodingLengthError, EncodingOptions
 pub use crate::output::euler::{EulerSequence, EulerSequenceError};
 pub use crate::output::pose_error::{PassOperand, PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
+pub use crate::output::scalars::Scalars;
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::output::value::OutputValue;
 pub use crate::pose::local_to_model::ModelMatrices;
@@ -158,6 +159,7 @@ pub use crate::tracks::joints::{JointMatchError, JointPairs, Joints};
 pub use crate::tracks::per_track::{PerTrack, PerTrackCountError, TrackGroup};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
+pub use crate::tracks::set::scalars::ScalarKeys;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};
 pub use crate::tracks::set::{Track, TrackSet, UNIT_TOLERANCE};
 

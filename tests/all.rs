@@ -30,6 +30,7 @@ mod outside;
 mod per_track;
 mod poses;
 mod reduce;
+mod scalars;
 mod sparse_samples;
 #[cfg(feature = "vulkan")]
 mod speed;

@@ -88,13 +88,15 @@ impl Interpolation {
     /// As [`Interpolation::check`], and whether the quantity is defined outside the keys: a mirrored velocity is not.
     pub(crate) fn check_wraps(&self) -> Result<(), InterpolationError> {
         self.check()?;
-        let wraps = [self.before, self.after];
         match self.quantity {
-            Quantity::Velocity(_) if wraps.contains(&WrapMode::Mirror) => {
-                Err(InterpolationError::MirroredVelocity)
-            }
+            Quantity::Velocity(_) if self.mirrors() => Err(InterpolationError::MirroredVelocity),
             _ => Ok(()),
         }
+    }
+
+    /// Whether tracks are played backwards somewhere.
+    pub(crate) fn mirrors(&self) -> bool {
+        [self.before, self.after].contains(&WrapMode::Mirror)
     }
 
     /// As [`Interpolation::check`], and whether the track `index` of a set fits the ends.

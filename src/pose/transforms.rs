@@ -6,7 +6,7 @@ use crate::engine::groups::fill_by_group;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
@@ -131,10 +131,9 @@ impl Engine {
         interpolation: Interpolation,
         only_for: &Timeline,
     ) -> Result<Clip, Error> {
-        interpolation.check()?;
-        let bytes = self.backend.limits().group_bytes;
-        let only_for = Some(only_for);
-        let data = ClipData::of_vectors(set, channel, method, &interpolation, bytes, only_for)?;
+        let value = ScalarQuantity::Value;
+        let request = self.vector_request(value, method, &interpolation, only_for)?;
+        let data = ClipData::of_vectors(set, channel, &request)?;
         self.clip_of(data)
     }
 

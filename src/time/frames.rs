@@ -283,6 +283,11 @@ impl Timeline {
         (0..count).map(move |sample| self.time_at(track, sample))
     }
 
+    /// Whether times are listed for each track.
+    pub(crate) fn is_per_track(&self) -> bool {
+        matches!(self.ticks, Ticks::Times { stride: 1.., .. })
+    }
+
     /// The exact time of a sample within [`Timeline::len`].
     pub(crate) fn moment_at(&self, track: usize, sample: usize) -> Moment {
         match &self.ticks {
