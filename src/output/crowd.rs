@@ -69,6 +69,44 @@ impl CrowdOutput {
     }
 }
 
+/// A step of a frame, over all instances or over one: the CPU and devices take the same steps in the same order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FrameStep {
+    /// The position of each layer in its clip.
+    Positions,
+    /// Rotations of joints, layers over layers.
+    Rotations,
+    /// Rotations, translations and scales as matrices in the parent's frame.
+    Locals,
+    /// Matrices in the model's frame, parents first.
+    Walk,
+    /// Products with the inverse bind matrices.
+    Skin,
+    /// Rounding to 16 bits.
+    Half,
+}
+
+impl FrameStep {
+    /// The steps of an output, in their order.
+    pub(crate) fn of(output: CrowdOutput) -> impl Iterator<Item = Self> {
+        use CrowdValues::{Model, Rotations, Skinning};
+        let walks = matches!(output.values, Model | Skinning);
+        let joints = match output.values {
+            Rotations => Self::Rotations,
+            _ => Self::Locals,
+        };
+        [
+            Some(Self::Positions),
+            Some(joints),
+            walks.then_some(Self::Walk),
+            (output.values == Skinning).then_some(Self::Skin),
+            output.is_half.then_some(Self::Half),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
 /// The changes that a device needs for an evaluation.
 pub(crate) struct CrowdFrame<'a> {
     /// The clock, ticks.

@@ -85,7 +85,7 @@ impl Engine {
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
         interpolation.check()?;
-        let group_bytes = self.backend.limits().group_bytes;
+        let group_bytes = self.machine.limits().group_bytes;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
         let only_for = Some(&timeline);
         let data =
@@ -100,7 +100,7 @@ impl Engine {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let uploaded = Uploaded::of_data(&self.backend, data, None)?;
+        let uploaded = Uploaded::of_data(&self.machine, data)?;
         let clip = Clip::new(self.clone(), uploaded);
         clip.samples(&clip.timeline(frames)?, layout)
     }

@@ -126,6 +126,11 @@ pub(crate) fn count() -> usize {
 }
 
 impl Threads {
+    /// The process's threads, which run [`on_threads`].
+    pub(crate) fn of_process() -> &'static Self {
+        &SHARED
+    }
+
     pub(crate) const fn new(count: Option<usize>) -> Self {
         Self {
             count,

@@ -37,7 +37,7 @@ impl Clip {
 
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
-        self.uploaded.data.track_count()
+        self.uploaded.data().track_count()
     }
 
     /// The sample times of `frames` for this clip.
@@ -45,7 +45,7 @@ impl Clip {
     /// # Errors
     /// When the frames do not fit the clip.
     pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
-        frames.resolve(self.track_count(), self.uploaded.data.time_span)
+        frames.resolve(self.track_count(), self.uploaded.data().time_span)
     }
 
     /// Evaluates the rotation of every track at every sample, `[track][frame]`. Short for
@@ -68,7 +68,7 @@ impl Clip {
     }
 
     pub(crate) fn quantity(&self) -> Quantity {
-        self.uploaded.data.interpolation.quantity
+        self.uploaded.data().interpolation.quantity
     }
 
     /// The values of any quantity.
@@ -77,8 +77,8 @@ impl Clip {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let timeline = self.uploaded.data.folded(timeline)?;
-        let storage = (self.uploaded).evaluate(&timeline, layout)?;
+        let timeline = self.uploaded.data().folded(timeline)?;
+        let storage = (self.uploaded.prepared()?).evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -115,8 +115,8 @@ impl Clip {
         if output.len() == 0 {
             return Ok(());
         }
-        let timeline = self.uploaded.data.folded(timeline)?;
-        Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
+        let timeline = self.uploaded.data().folded(timeline)?;
+        Ok((self.uploaded.prepared()?).evaluate_into(&timeline, window, output)?)
     }
 
     /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
@@ -133,10 +133,11 @@ impl Clip {
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let timeline = self.uploaded.data.folded(timeline).map_err(Error::from)?;
+        let timeline = self.uploaded.data().folded(timeline).map_err(Error::from)?;
+        let prepared = self.uploaded.prepared().map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
-            Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
+            Ok(prepared.evaluate_into(&timeline, window, output)?)
         };
         run(window.cut(chunk), self.quantity(), fill, sink)
     }
@@ -146,7 +147,7 @@ impl std::fmt::Debug for Clip {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Clip")
             .field("engine", &self.engine)
-            .field("method", &self.uploaded.data.interpolation.method)
+            .field("method", &self.uploaded.data().interpolation.method)
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
     }

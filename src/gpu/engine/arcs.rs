@@ -4,12 +4,12 @@
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
-use crate::gpu::options::PrepareArcs;
 use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::reports::DeviceKind;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
+use crate::machine::error::VulkanError;
+use crate::machine::options::PrepareArcs;
+use crate::machine::reports::DeviceKind;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{ArcsDispatch, Kernel};
 use crate::work::recording::{Slice, workgroups};
@@ -95,8 +95,7 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::evaluate::Backend;
-    use crate::gpu::options::{EngineOptions, Reads, Transfer, Uploads};
+    use crate::machine::options::{EngineOptions, Reads, Transfer, Uploads};
     use crate::math::quaternion::dot;
     use crate::method::SLERP;
     use crate::prepare::clip_data::PrepareRequest;
@@ -125,10 +124,7 @@ mod tests {
     }
 
     fn vulkan(engine: &Engine) -> Arc<VulkanEngine> {
-        match &*engine.backend {
-            Backend::Vulkan(opened) => opened.engine(),
-            Backend::Cpu(_) => panic!("a Vulkan device"),
-        }
+        engine.opened().expect("a Vulkan device").engine()
     }
 
     /// The first bytes of a buffer of the device.

@@ -1,9 +1,7 @@
 //! A request: which samples of a clip or of a set are evaluated, in which layout and encoding, and into which memory.
 
 #[cfg(feature = "vulkan")]
-mod application_device;
-#[cfg(feature = "vulkan")]
-mod exported;
+mod on_device;
 
 use std::ops::Range;
 
@@ -15,17 +13,7 @@ use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::engine::clip::Clip;
 use crate::error::Error;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::plan::PREPARED;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::plan::bytes_of;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::Uploaded;
-#[cfg(feature = "vulkan")]
-use crate::gpu::error::EvaluateError;
-#[cfg(feature = "vulkan")]
-use crate::memory::OutOfMemoryError;
+use crate::machine::plan::PREPARED;
 use crate::memory::zeroed;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
@@ -35,8 +23,6 @@ use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
 use crate::prepare::preparation::SetRequest;
-#[cfg(feature = "vulkan")]
-use crate::prepare::prepared::SEGMENTS;
 use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::TrackSet;
@@ -110,19 +96,11 @@ impl RequestSource<'_> {
         })
     }
 
-    #[cfg(feature = "vulkan")]
-    fn engine(&self) -> &Engine {
-        match self {
-            Self::Clip(clip) => clip.engine(),
-            Self::Set { engine, .. } => engine,
-        }
-    }
-
     /// The clip if its segments are prepared, else what is evaluated of a set.
     fn prepared_or_set<'r>(&'r self, part: &'r RequestPart) -> Result<&'r Clip, SetWork<'r>> {
         let (engine, set, interpolation) = match self {
             Self::Clip(clip) => match &clip.uploaded.unprepared {
-                Some(set) => (clip.engine(), set, &clip.uploaded.data.interpolation),
+                Some(set) => (clip.engine(), set, &clip.uploaded.data().interpolation),
                 None => return Ok(clip),
             },
             Self::Set {
@@ -137,29 +115,6 @@ impl RequestSource<'_> {
             engine,
             request: request.part(tracks, samples),
         })
-    }
-
-    /// Calls `work` for a window of the clip, or for the segments of the set that the window needs, with the samples
-    /// and the window relative to them.
-    #[cfg(feature = "vulkan")]
-    fn with_uploaded<T>(
-        &self,
-        part: &RequestPart,
-        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
-    ) -> Result<T, Error> {
-        let SetWork { engine, request } = match self.prepared_or_set(part) {
-            Ok(clip) => {
-                let folded = clip.uploaded.data.folded(&part.timeline)?;
-                return Ok(work(&clip.uploaded, &folded, &part.window)?);
-            }
-            Err(of_set) => of_set,
-        };
-        let needed = bytes_of(&request);
-        if (engine.backend.limits().memory).is_some_and(|limit| needed > limit) {
-            return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
-        }
-        let prepared = PreparedWindow::whole(&engine.backend, &request)?;
-        Ok(prepared.with(&part.window, work)?)
     }
 }
 
@@ -305,7 +260,7 @@ impl Request<'_> {
     ///
     /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
     /// * otherwise: all segments that the request's samples need, if they take no more than
-    ///   [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) (256 MiB if it has no limit), and else
+    ///   [`EngineOptions::memory`](crate::machine::options::EngineOptions::memory) (256 MiB if it has no limit), and else
     ///   those of a part of a chunk at a time.
     ///
     /// ```
