@@ -11,7 +11,6 @@ use glam::Quat;
 use crate::checks::{check_encoding, check_window};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
-use crate::engine::clip::request::RequestPart;
 use crate::error::Error;
 use crate::evaluate::Backend;
 use crate::evaluate::pieces::PreparedWindow;
@@ -279,14 +278,14 @@ impl GroupedTracks {
         Ok(prepared.into_iter().chain(planned).collect())
     }
 
-    /// Evaluates a part of the result into `output`, in an encoding; refuses what does not fit.
+    /// Evaluates a window of the result into `output`, in an encoding; refuses what does not fit.
     pub(crate) fn fill(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         output: EncodedOutput<'_>,
     ) -> Result<(), Error> {
-        let RequestPart { timeline, window } = part;
         let encoding = output.encoding;
         check_encoding(encoding, self.quantity)?;
         check_window(
@@ -301,15 +300,15 @@ impl GroupedTracks {
         fill_window(engine, &works, window, output)
     }
 
-    /// Evaluates a part of the result in chunks of about `chunk` values.
+    /// Evaluates a window of the result in chunks of about `chunk` values.
     pub(crate) fn stream<E: From<Error>>(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let RequestPart { timeline, window } = part;
         let timelines = self.timelines(timeline);
         let mut works = self.works(engine, &timelines, window, Encoding::F32, Some(chunk))?;
         for GroupWork { group, source } in &mut works {
@@ -328,20 +327,21 @@ impl GroupedTracks {
         run(window.cut(chunk), self.quantity, fill, sink)
     }
 
-    /// A line for each group that has tracks in a part of the result: their number, the method and how they are
+    /// A line for each group that has tracks in a window of the result: their number, the method and how they are
     /// evaluated.
     pub(crate) fn explain(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         encoding: Encoding,
         chunk: Option<usize>,
     ) -> Result<String, Error> {
-        let timelines = self.timelines(&part.timeline);
-        let works = self.works(engine, &timelines, &part.window, encoding, chunk)?;
+        let timelines = self.timelines(timeline);
+        let works = self.works(engine, &timelines, window, encoding, chunk)?;
         let mut lines = Vec::new();
         for GroupWork { group, source } in &works {
-            let count = listed(&group.tracks, &part.window.tracks).len();
+            let count = listed(&group.tracks, &window.tracks).len();
             let method = group.uploaded.data.interpolation.method;
             let tracks = if count == 1 { "track" } else { "tracks" };
             let route = match source {

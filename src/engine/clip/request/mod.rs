@@ -380,7 +380,7 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.stream_request(&request, self.layout, chunk, sink)
             }
-            RequestWork::Groups { engine, groups } => groups.stream(engine, &part, chunk, sink),
+            RequestWork::Groups { engine, groups } => groups.stream(engine, &part.timeline, &part.window, chunk, sink),
         }
     }
 
@@ -423,7 +423,7 @@ impl Request<'_> {
                 plan.to_string()
             }
             RequestWork::Groups { engine, groups } => {
-                groups.explain(engine, &part, self.encoding, chunk)?
+                groups.explain(engine, &part.timeline, &part.window, self.encoding, chunk)?
             }
         })
     }
@@ -470,7 +470,7 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.fill_request(request, self.layout, output)
             }
-            RequestWork::Groups { engine, groups } => groups.fill(engine, part, output),
+            RequestWork::Groups { engine, groups } => groups.fill(engine, &part.timeline, &part.window, output),
         }
     }
 
