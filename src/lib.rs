@@ -122,6 +122,9 @@ pub use crate::error::Error;
 pub use crate::machine::options::{CacheFiles, EngineOptions};
 pub use crate::memory::{OutOfMemoryError, available_memory};
 pub use crate::method::interpolation::Interpolation;
+pub use crate::method::interpolation_options::{
+    InterpolationOption, InterpolationOptions, OptionValue, OptionValueError,
+};
 pub use crate::method::vector_method::VectorMethod;
 pub use crate::method::{METHODS, Method};
 pub use crate::names::UnknownNameError;
@@ -149,6 +152,7 @@ pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::error::{NORM_TOLERANCE, TrackError};
 pub use crate::tracks::joints::{JointMatchError, JointPairs, Joints};
+pub use crate::tracks::per_track::{PerTrack, PerTrackCountError, TrackGroup};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};

@@ -27,6 +27,7 @@ mod names;
 mod numbers;
 mod original;
 mod outside;
+mod per_track;
 mod poses;
 mod reduce;
 mod sparse_samples;

@@ -189,7 +189,7 @@ impl FramesToEnd {
 /// # Errors
 /// As [`Engine::evaluate`].
 pub fn sample_to_end(
-    methods: &ChannelMethods<'_>,
+    methods: &ChannelMethods,
     engine: &Engine,
     clip: &Motion,
     frames: &SampleTimes,

@@ -1,24 +1,77 @@
 //! Sampling clips: each channel by its own sampler, or all by one method.
 
-use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
 
 use glam::{Quat, Vec3, Vec4};
 use tumble::{
-    Channel, Engine, Error, FrameRate, Interpolation, Layout, Method, Rotations, SampleTimes,
-    TrackSet, VectorMethod, Vectors, method,
+    Channel, Engine, Error, FrameRate, Interpolation, InterpolationOptions, Layout, METHODS,
+    Method, PerTrack, SampleTimes, UnknownNameError, VectorMethod, method,
 };
 
 use crate::motion::{ChannelInterpolation, Channels, Motion, SampledClip};
 use crate::signs::continue_signs;
 
+/// A method for every channel that is not STEP; `None`: as each channel's sampler says, and
+/// [`method::BESSEL_OVERHAUSER`] where the file names none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MethodChoice(pub Option<Method>);
+
+impl MethodChoice {
+    /// Every channel as its sampler says.
+    pub const AUTHORED: Self = Self(None);
+
+    /// The name that programs use: `authored`, or that of the method.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.0.map_or("authored", |method| method.name)
+    }
+
+    /// The purpose, in one sentence.
+    #[must_use]
+    pub fn summary(self) -> &'static str {
+        let authored =
+            "as the file states for each channel; bessel-overhauser where it states none";
+        self.0.map_or(authored, |method| method.summary)
+    }
+
+    /// `authored`, then all methods.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let methods = METHODS.into_iter().map(Some);
+        std::iter::once(None).chain(methods).map(Self)
+    }
+}
+
+impl fmt::Display for MethodChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for MethodChoice {
+    type Err = UnknownNameError;
+
+    fn from_str(name: &str) -> Result<Self, UnknownNameError> {
+        if name == Self::AUTHORED.name() {
+            return Ok(Self::AUTHORED);
+        }
+        name.parse()
+            .map(Some)
+            .map(Self)
+            .map_err(|mut error: UnknownNameError| {
+                error.known.insert(0, Self::AUTHORED.name());
+                error
+            })
+    }
+}
+
 /// The methods by which the channels of clips are interpolated.
-#[derive(Clone, Copy)]
-pub struct ChannelMethods<'a> {
-    /// The method for all channels that are not STEP; `None`: as each channel's sampler says, and
-    /// [`method::BESSEL_OVERHAUSER`] where the file names none.
-    pub method: Option<Method>,
-    /// What else is said of the interpolation, such as ends and wrap modes, for a method.
-    pub with: &'a dyn Fn(Method) -> Interpolation,
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ChannelMethods {
+    /// The method.
+    pub method: MethodChoice,
+    /// The options of every method, such as ends and wrap modes.
+    pub options: InterpolationOptions,
 }
 
 /// The rotations, translations and scales of a clip, in the order `[sample][track]`.
@@ -34,25 +87,67 @@ pub struct Samples {
     pub scales: Vec<Vec3>,
 }
 
-impl ChannelMethods<'static> {
+impl ChannelMethods {
     /// Every channel as its sampler says, with the default options.
     pub const AUTHORED: Self = Self {
-        method: None,
-        with: &|method| Interpolation::from(method),
+        method: MethodChoice::AUTHORED,
+        options: InterpolationOptions::DEFAULT,
     };
-}
 
-impl ChannelMethods<'_> {
+    /// One method for all channels that are not STEP, with the default options.
+    #[must_use]
+    pub fn by(method: Method) -> Self {
+        Self {
+            method: MethodChoice(Some(method)),
+            options: InterpolationOptions::DEFAULT,
+        }
+    }
+
+    /// The method for the rotations of each track.
+    pub fn methods<'a>(&self, clip: &'a Motion) -> impl ExactSizeIterator<Item = Method> + use<'a> {
+        let (this, resting) = (*self, self.resting_method(clip));
+        (0..clip.set.track_count())
+            .map(move |track| this.rotation_method(clip.channel(track), resting))
+    }
+
+    /// The interpolation of each track's rotations.
+    #[must_use]
+    pub fn interpolations(&self, clip: &Motion) -> PerTrack<Interpolation> {
+        let with = |method| self.options.with(method);
+        match self.method_of(clip) {
+            Some(method) => PerTrack::All(with(method)),
+            None => PerTrack::Each(self.methods(clip).map(with).collect()),
+        }
+    }
+
     /// The one method for the rotations of all tracks; `None` where their samplers differ.
     #[must_use]
     pub fn method_of(&self, clip: &Motion) -> Option<Method> {
-        let resting = self.resting_method(clip);
-        let mut methods = (0..clip.set.track_count())
-            .map(|track| self.rotation_method(clip.channel(track), resting));
-        let first = methods.next().unwrap_or(resting);
+        let mut methods = self.methods(clip);
+        let first = (methods.next()).unwrap_or_else(|| self.resting_method(clip));
         methods
             .all(|method| method.name == first.name)
             .then_some(first)
+    }
+
+    /// The one method for all rotations that change; [`method::SLERP`] if none does.
+    ///
+    /// # Errors
+    /// The first two methods, where there are several.
+    pub fn moving_method_of(&self, clip: &Motion) -> Result<Method, [Method; 2]> {
+        let moves = |track: usize| {
+            let track = clip.set.get(track);
+            track.is_some_and(|track| track.keys.iter().any(|key| *key != track.keys[0]))
+        };
+        let methods = self.methods(clip).enumerate();
+        let mut moving = methods
+            .filter(|&(track, _)| moves(track))
+            .map(|(_, method)| method);
+        let first = moving.next().unwrap_or(method::SLERP);
+        match moving.find(|method| *method != first) {
+            Some(second) => Err([first, second]),
+            None => Ok(first),
+        }
     }
 
     /// The one method for the translations and scales of all tracks; `None` where their samplers
@@ -75,20 +170,20 @@ impl ChannelMethods<'_> {
     /// The method of tracks whose rotation has no sampler. One at rest has one key, which every
     /// method holds: it goes with most of the others.
     fn resting_method(&self, clip: &Motion) -> Method {
-        self.method.unwrap_or_else(|| most_common_method(clip))
+        self.method.0.unwrap_or_else(|| most_common_method(clip))
     }
 
     fn rotation_method(&self, channels: Channels, resting: Method) -> Method {
         match channels.rotation {
             Some(ChannelInterpolation::Step) => method::STEP,
-            Some(ChannelInterpolation::Linear) => self.method.unwrap_or(method::SLERP),
-            Some(ChannelInterpolation::Cubic) => self.method.unwrap_or(method::GLTF_CUBIC),
+            Some(ChannelInterpolation::Linear) => self.method.0.unwrap_or(method::SLERP),
+            Some(ChannelInterpolation::Cubic) => self.method.0.unwrap_or(method::GLTF_CUBIC),
             None => resting,
         }
     }
 
     fn vector_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
-        match (sampler, self.method) {
+        match (sampler, self.method.0) {
             (Some(ChannelInterpolation::Step), _) => VectorMethod::Step,
             (Some(ChannelInterpolation::Linear), None) => VectorMethod::Linear,
             (Some(ChannelInterpolation::Cubic), None) => VectorMethod::GltfCubic,
@@ -108,30 +203,18 @@ impl ChannelMethods<'_> {
         frames: &SampleTimes,
     ) -> Result<Samples, Error> {
         let tracks = clip.set.track_count();
-        let frames = over(clip, frames);
-        let timeline = frames.resolve(tracks, None)?;
+        let timeline = frames.resolve(tracks, clip.set.time_span())?;
         let times: Vec<f64> = timeline.times(0).collect();
         let layout = Layout::FrameMajor;
         let mut samples = Samples {
-            rotations: self.rotations(engine, clip, &frames, layout)?,
+            rotations: self.rotations(engine, clip, frames, layout)?,
             times,
             ..Samples::default()
         };
         continue_signs(&mut samples.rotations, tracks);
-        samples.translations = self.vectors(engine, clip, &frames, Channel::Translation)?;
-        samples.scales = self.vectors(engine, clip, &frames, Channel::Scale)?;
+        samples.translations = self.vectors(engine, clip, frames, Channel::Translation)?;
+        samples.scales = self.vectors(engine, clip, frames, Channel::Scale)?;
         Ok(samples)
-    }
-
-    /// The tracks of a clip by the methods of their rotations.
-    #[must_use]
-    pub fn groups_of(&self, clip: &Motion) -> Vec<(Method, Vec<usize>)> {
-        let resting = self.resting_method(clip);
-        let method = |track: usize| self.rotation_method(clip.channel(track), resting);
-        groups(clip.set.track_count(), |track| method(track).name)
-            .into_iter()
-            .map(|group| (method(group[0]), group))
-            .collect()
     }
 
     /// Evaluates the rotations of a clip, each track by its own sampler.
@@ -145,10 +228,8 @@ impl ChannelMethods<'_> {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
-        let frames = over(clip, frames);
-        let evaluate =
-            |set: &TrackSet, how| engine.request(set, how, &frames).layout(layout).evaluate();
-        self.by_method(clip, layout, evaluate, Rotations::as_quats)
+        let request = engine.request(&clip.set, self.interpolations(clip), frames);
+        Ok(request.layout(layout).evaluate()?.as_quats().to_vec())
     }
 
     /// As [`ChannelMethods::rotations`], the angular velocities or accelerations, each followed by
@@ -163,29 +244,8 @@ impl ChannelMethods<'_> {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vec<Vec4>, Error> {
-        let frames = over(clip, frames);
-        let evaluate = |set: &TrackSet, how| engine.rates(set, how, &frames, layout);
-        self.by_method(clip, layout, evaluate, Vectors::as_slice)
-    }
-
-    /// The values of all tracks; `evaluate` gives those of tracks with one method.
-    fn by_method<S, T: Copy + Default>(
-        &self,
-        clip: &Motion,
-        layout: Layout,
-        evaluate: impl Fn(&TrackSet, Interpolation) -> Result<tumble::Samples<S>, Error>,
-        values: fn(&tumble::Samples<S>) -> &[T],
-    ) -> Result<Vec<T>, Error> {
-        let tracks = clip.set.track_count();
-        let mut all = Vec::new();
-        for (method, group) in self.groups_of(clip) {
-            let interpolation = (self.with)(method);
-            let set = selected(clip, &group)?;
-            let found = evaluate(&set, interpolation)?;
-            all.resize(tracks * found.sample_count(), T::default());
-            scatter(values(&found), &group, tracks, layout, &mut all);
-        }
-        Ok(all)
+        let request = engine.request(&clip.set, self.interpolations(clip), frames);
+        Ok(request.layout(layout).rates()?.as_slice().to_vec())
     }
 
     /// The vectors of all tracks; none where no track has keys of them and no rest matters.
@@ -203,24 +263,20 @@ impl ChannelMethods<'_> {
         if !(0..tracks).any(is_keyed) && rests.iter().all(|&rest| rest == nothing) {
             return Ok(Vec::new());
         }
-        let samples = frames.resolve(tracks, None)?.len();
-        let mut all: Vec<Vec3> = (0..samples).flat_map(|_| rests.iter().copied()).collect();
         let method = |track: usize| self.vector_method(clip.channel(track).of(channel));
-        for group in groups(tracks, |track| {
-            is_keyed(track).then(|| method(track).name())
-        }) {
-            if !is_keyed(group[0]) {
-                continue;
-            }
-            let set = selected(clip, &group)?;
-            let interpolation = (self.with)(method::SLERP);
-            let method = method(group[0]);
-            let layout = Layout::FrameMajor;
-            let found = engine.vectors(&set, channel, method, interpolation, frames, layout)?;
-            let found: Vec<Vec3> = found.as_slice().iter().map(|v| v.truncate()).collect();
-            scatter(&found, &group, tracks, layout, &mut all);
-        }
-        Ok(all)
+        let first_keyed = (0..tracks).find(|&track| is_keyed(track)).unwrap_or(0);
+        // A track without keys goes with others: its vectors are replaced.
+        let methods =
+            (0..tracks).map(|track| method(if is_keyed(track) { track } else { first_keyed }));
+        let methods: Vec<VectorMethod> = methods.collect();
+        let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
+        let found = engine.vectors(&clip.set, channel, methods, how, frames, layout)?;
+        let of_track = (0..tracks).cycle().zip(found.as_slice());
+        let vector = |(track, found): (usize, &Vec4)| match is_keyed(track) {
+            true => found.truncate(),
+            false => rests[track],
+        };
+        Ok(of_track.map(vector).collect())
     }
 }
 
@@ -246,14 +302,6 @@ impl Samples {
     }
 }
 
-/// Some tracks as a separate set; borrowed where the group is all tracks.
-fn selected<'a>(clip: &'a Motion, group: &[usize]) -> Result<Cow<'a, TrackSet>, Error> {
-    if group.len() == clip.set.track_count() {
-        return Ok(Cow::Borrowed(&clip.set));
-    }
-    Ok(Cow::Owned(clip.set.select(group.iter().copied())?))
-}
-
 /// What most of the rotations are keyed for.
 fn most_common_method(clip: &Motion) -> Method {
     let count = |sampler| {
@@ -275,40 +323,6 @@ fn most_common_method(clip: &Motion) -> Method {
     }
 }
 
-/// Frames over the whole of a clip: all tracks are sampled at the same times, whatever their own keys
-/// span and whichever of them are evaluated together.
-fn over(clip: &Motion, frames: &SampleTimes) -> SampleTimes {
-    let span = clip.set.time_span();
-    span.map_or_else(|| frames.clone(), |span| frames.clone().spanning(span))
-}
-
-/// Tracks with the same property, in lists, by the first of each.
-fn groups<P: PartialEq>(tracks: usize, property: impl Fn(usize) -> P) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(P, Vec<usize>)> = Vec::new();
-    for track in 0..tracks {
-        let value = property(track);
-        match groups.iter_mut().find(|(known, _)| *known == value) {
-            Some((_, group)) => group.push(track),
-            None => groups.push((value, vec![track])),
-        }
-    }
-    groups.into_iter().map(|(_, group)| group).collect()
-}
-
-/// Puts the values of a group of tracks where they belong among those of all.
-fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout, all: &mut [T]) {
-    let samples = values.len() / group.len();
-    for (index, &track) in group.iter().enumerate() {
-        for sample in 0..samples {
-            let to = layout.index(track, sample, tracks, samples);
-            let from = layout.index(index, sample, group.len(), samples);
-            if let (Some(to), Some(from)) = (to, from) {
-                all[to] = values[from];
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -327,10 +341,7 @@ mod tests {
                 ..Channels::default()
             });
         }
-        let methods = ChannelMethods {
-            method: None,
-            with: &Interpolation::from,
-        };
+        let methods = ChannelMethods::AUTHORED;
         let engine = Engine::new(tumble::Device::Cpu).unwrap();
         let (frames, layout) = (SampleTimes::fps(2), Layout::TrackMajor);
         let found = methods.rotations(&engine, &clip, &frames, layout).unwrap();

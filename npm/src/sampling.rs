@@ -1,5 +1,6 @@
 //! What clips are at times: the samples that JavaScript asks for.
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use glam::{Quat, Vec3};
@@ -7,18 +8,18 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::json;
 use tumble::{
-    Axes, Ends, Engine, FrameRate, Interpolation, KeySigns, Layout, METHODS, Method, Quantity,
-    SampleTimes, Speed, Tcb, UnknownNameError, WrapMode,
+    Axes, Engine, FrameRate, InterpolationOption, InterpolationOptions, Layout, OptionValue,
+    Quantity, SampleTimes, UnknownNameError,
 };
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
 use tumble_formats::world::{world, world_matrices};
 
 use crate::calls::{Answer, Array, Fault};
 
 /// What is asked for. Decimal numbers come as text, which keeps all their digits.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
+#[serde(rename_all = "camelCase")]
 pub(crate) struct Request {
     pub(crate) clip: usize,
     quantity: Sampled,
@@ -30,19 +31,9 @@ pub(crate) struct Request {
     layout: Option<Layout>,
     #[serde(default, deserialize_with = "option")]
     axes: Option<Axes>,
-    #[serde(default, deserialize_with = "option")]
-    ends: Option<Ends>,
-    #[serde(default, deserialize_with = "option")]
-    path: Option<KeySigns>,
-    #[serde(default, deserialize_with = "option")]
-    speed: Option<Speed>,
-    #[serde(default, deserialize_with = "option")]
-    before: Option<WrapMode>,
-    #[serde(default, deserialize_with = "option")]
-    after: Option<WrapMode>,
-    tension: Option<String>,
-    continuity: Option<String>,
-    bias: Option<String>,
+    /// The options of [`InterpolationOption`] by their names.
+    #[serde(flatten)]
+    options: BTreeMap<String, Option<String>>,
 }
 
 /// What is sampled.
@@ -71,19 +62,24 @@ fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
 }
 
 impl Request {
-    fn method(&self) -> Result<Option<Method>, Fault> {
-        let name = match self.method.as_deref() {
-            None | Some("authored") => return Ok(None),
-            Some(name) => name,
+    fn method(&self) -> Result<MethodChoice, UnknownNameError> {
+        let name = self.method.as_deref();
+        name.map_or(Ok(MethodChoice::AUTHORED), str::parse)
+    }
+
+    fn options(&self) -> Result<InterpolationOptions, Fault> {
+        let mut options = InterpolationOptions {
+            quantity: self.quantity(),
+            ..InterpolationOptions::default()
         };
-        let unknown = || {
-            let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
-            let names = names.join(", ");
-            Fault::new(format!(
-                "there is no method `{name}`; there are authored, {names}"
-            ))
-        };
-        Method::named(name).map(Some).ok_or_else(unknown)
+        for (name, value) in &self.options {
+            let option = InterpolationOption::named(name)
+                .ok_or_else(|| Fault::new(format!("there is no option `{name}`")))?;
+            if let Some(value) = value {
+                option.set(&mut options, OptionValue::Text(value))?;
+            }
+        }
+        Ok(options)
     }
 
     fn frames(&self, numbers: &[f64]) -> Result<SampleTimes, Fault> {
@@ -96,20 +92,6 @@ impl Request {
             [] => Ok(SampleTimes::rate(rate)),
             _ => Err(Fault::new("frames have a start and an end")),
         }
-    }
-
-    fn tcb(&self) -> Result<Tcb, Fault> {
-        let number = |name: &str, text: &Option<String>| match text {
-            None => Ok(0.0),
-            Some(text) => text
-                .parse()
-                .map_err(|_| Fault::new(format!("{name} is `{text}`, no number"))),
-        };
-        Ok(Tcb {
-            tension: number("tension", &self.tension)?,
-            continuity: number("continuity", &self.continuity)?,
-            bias: number("bias", &self.bias)?,
-        })
     }
 
     fn quantity(&self) -> Quantity {
@@ -152,7 +134,7 @@ pub(crate) fn sample(
     let frames = request.frames(&numbers)?;
     let timeline = frames.resolve(tracks, clip.set.time_span())?;
     let bytes = tracks as f64 * timeline.len() as f64 * SAMPLE;
-    // To ask is to know: what is there is not said.
+    // The platform does not say how much memory there is; reserving it does.
     let has_room = bytes < usize::MAX as f64 / 2.0
         && Vec::<u8>::new().try_reserve_exact(bytes as usize).is_ok();
     if !has_room {
@@ -162,20 +144,9 @@ pub(crate) fn sample(
             bytes / 1e6
         )));
     }
-    let (tcb, quantity) = (request.tcb()?, request.quantity());
-    let with = |method: Method| Interpolation {
-        method,
-        signs: method.signs.or(request.path).unwrap_or_default(),
-        ends: request.ends.unwrap_or(method.ends),
-        tcb,
-        quantity,
-        speed: request.speed.unwrap_or_default(),
-        before: request.before.unwrap_or_default(),
-        after: request.after.unwrap_or_default(),
-    };
     let methods = ChannelMethods {
         method: request.method()?,
-        with: &with,
+        options: request.options()?,
     };
     let samples = timeline.len();
     let mut arrays = match request.quantity {

@@ -12,7 +12,8 @@ use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, option_named, samples_of};
+use crate::names::option_named;
+use crate::options::{SampleRequest, samples_of};
 use crate::run::{interruptible, work};
 use crate::values::{Pickled, pickled, value};
 

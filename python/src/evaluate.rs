@@ -1,6 +1,5 @@
 //! Results of clips: rotations, what follows from them, and whole poses.
 
-use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -9,15 +8,14 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
-use tumble::method::{C2, SLERP};
+use tumble::method::C2;
 use tumble::{
-    ComponentType, Encoding, Engine, Interpolation, Layout, Method, Quantity, SampleTimes, TrackSet,
+    ComponentType, Encoding, Engine, Interpolation, Layout, Method, Quantity, SampleTimes,
 };
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::rotation_vector;
-use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
 use crate::device_array::DeviceArray;
@@ -65,32 +63,12 @@ impl Default for OutputRequest {
     }
 }
 
-/// Tracks that one method interpolates; `None` for all of them.
-type TrackGroup = (Method, Option<Vec<usize>>);
-
-/// The tracks of a clip by their methods.
-fn groups(clip: &Motion, method: Option<Method>) -> Vec<TrackGroup> {
-    let methods = ChannelMethods {
-        method,
-        with: &Interpolation::from,
-    };
-    match methods.method_of(clip) {
-        Some(method) => vec![(method, None)],
-        None => methods
-            .groups_of(clip)
-            .into_iter()
-            .map(|(method, tracks)| (method, Some(tracks)))
-            .collect(),
-    }
-}
-
 /// What is evaluated: a clip, on an engine, at some times of each track.
 #[derive(Clone, Copy)]
 struct Work<'a> {
     engine: &'a Engine,
     clip: &'a Motion,
     request: &'a Request,
-    samples: &'a SampleRequest,
     frames: &'a SampleTimes,
     /// Samples of a track.
     count: usize,
@@ -152,15 +130,11 @@ impl OutputRequest {
                 engine: &engine,
                 clip,
                 request,
-                samples,
                 frames: &frames,
                 count,
             };
             let array = self.card_array(py, work, shape)?;
-            warn(
-                py,
-                &curve_warnings(py, clip, request, self.quantity, count)?,
-            )?;
+            warn(py, &curve_warnings(py, clip, request, count)?)?;
             return Ok(array.into_any());
         }
         let array = array_of(py, self.encoding.component_type(), &shape, out, inputs)?;
@@ -171,7 +145,6 @@ impl OutputRequest {
                     engine: &engine,
                     clip,
                     request,
-                    samples,
                     frames: &frames,
                     count,
                 };
@@ -182,10 +155,7 @@ impl OutputRequest {
                 Ok(())
             })
         })?;
-        warn(
-            py,
-            &curve_warnings(py, clip, request, self.quantity, count)?,
-        )?;
+        warn(py, &curve_warnings(py, clip, request, count)?)?;
         match self.as_rotation {
             true => self.rotation(&array, self.is_one_track),
             false => Ok(array),
@@ -286,18 +256,25 @@ impl OutputRequest {
                  leave out `device_array`",
             ));
         }
-        let Some(method) = uniform(work.clip, work.request) else {
+        let interpolations = work
+            .request
+            .methods(self.quantity)
+            .interpolations(work.clip);
+        if interpolations
+            .uniform(work.clip.set.track_count())
+            .is_none()
+        {
             return Err(input(
                 "device_array: the file has other methods for some tracks than for others, and such results are put \
                  together on the host; name one `method` for all",
             ));
-        };
+        }
         let array = py.detach(|| {
             guarded(|| {
                 let job = Job {
                     engine: work.engine,
                     set: &work.clip.set,
-                    interpolation: work.request.with(self.quantity)(method),
+                    interpolations: &interpolations,
                     frames: work.frames,
                     samples: work.count,
                     layout: self.layout,
@@ -310,64 +287,19 @@ impl OutputRequest {
     }
 
     fn fill(&self, work: Work<'_>, bytes: &mut [u8]) -> PyResult<()> {
-        let Work {
-            engine,
-            clip,
-            request,
-            samples,
-            frames,
-            count,
-        } = work;
-        let with = request.with(self.quantity);
         let job = Job {
-            engine,
-            set: &clip.set,
-            interpolation: with(SLERP),
-            frames,
-            samples: count,
+            engine: work.engine,
+            set: &work.clip.set,
+            interpolations: &work
+                .request
+                .methods(self.quantity)
+                .interpolations(work.clip),
+            frames: work.frames,
+            samples: work.count,
             layout: self.layout,
             encoding: self.encoding,
         };
-        let tracks = clip.set.track_count();
-        let size = self.encoding.bytes();
-        for (method, group) in groups(clip, request.method) {
-            let Some(group) = group else {
-                let job = Job {
-                    interpolation: with(method),
-                    ..job
-                };
-                job.write(bytes)?;
-                continue;
-            };
-            // Tracks of other methods lie between these.
-            let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
-            let frames = match samples {
-                SampleRequest::Each { .. } => Cow::Owned(samples.frames(clip, Some(&group))?),
-                _ => Cow::Borrowed(frames),
-            };
-            // As the results in NumPy's memory are aligned.
-            let mut found = vec![0_u32; (group.len() * count * size).div_ceil(4)];
-            let found: &mut [u8] = bytemuck::cast_slice_mut(&mut found);
-            let found = &mut found[..group.len() * count * size];
-            let job = Job {
-                set: &set,
-                frames: &frames,
-                interpolation: with(method),
-                ..job
-            };
-            job.write(found)?;
-            for (row, &track) in group.iter().enumerate() {
-                for sample in 0..count {
-                    let from = self.layout.index(row, sample, group.len(), count);
-                    let to = self.layout.index(track, sample, tracks, count);
-                    let (Some(from), Some(to)) = (from, to) else {
-                        continue;
-                    };
-                    let (from, to) = (from * size, to * size);
-                    bytes[to..to + size].copy_from_slice(&found[from..from + size]);
-                }
-            }
-        }
+        job.write(bytes)?;
         self.finish(bytes);
         Ok(())
     }
@@ -499,7 +431,6 @@ impl OutputRequest {
                         engine: &engine,
                         clip: &one,
                         request,
-                        samples: &samples,
                         frames: &frames,
                         count: list.len(),
                     };
@@ -608,20 +539,16 @@ fn curve_warnings(
     py: Python<'_>,
     clip: &Arc<Motion>,
     request: &Request,
-    quantity: Quantity,
     samples: usize,
 ) -> PyResult<Vec<Diagnostic>> {
     let rotations = samples.saturating_mul(clip.set.track_count());
     let has_warnings = |method: &Method| method.name == C2.name;
-    let method = request.method.filter(has_warnings);
+    let method = request.method.0.filter(has_warnings);
     let is_sparse = rotations.saturating_mul(KEYS_OF_A_SAMPLE) < clip.set.key_count();
     let (Some(method), false) = (method, is_sparse) else {
         return Ok(Vec::new());
     };
-    let interpolation = Interpolation {
-        quantity: Quantity::Rotation,
-        ..request.with(quantity)(method)
-    };
+    let interpolation = request.methods(Quantity::Rotation).options.with(method);
     let mut known = CHECKED_CURVES
         .lock()
         .unwrap_or_else(PoisonError::into_inner);
@@ -662,29 +589,4 @@ fn track_of(clip: &Motion, track: usize) -> PyResult<Motion> {
 
 fn of_tracks(error: tumble::TrackError) -> PyErr {
     of_engine(&error.into())
-}
-
-/// The one set and method of a clip whose tracks are all interpolated alike.
-pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
-    match groups(clip, request.method)[..] {
-        [(method, None)] => Some(method),
-        _ => None,
-    }
-}
-
-/// The tracks of one method as a set, and their indices in the clip; `None` where these are all.
-pub(crate) type MethodTracks = (Method, TrackSet, Option<Vec<usize>>);
-
-/// The sets of a clip by their methods.
-pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<MethodTracks>> {
-    groups(clip, request.method)
-        .into_iter()
-        .map(|(method, group)| match group {
-            None => Ok((method, clip.set.clone(), None)),
-            Some(tracks) => {
-                let set = clip.set.select(tracks.iter().copied()).map_err(of_tracks)?;
-                Ok((method, set, Some(tracks)))
-            }
-        })
-        .collect()
 }

@@ -17,7 +17,8 @@ use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 use crate::arrays::{ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{expected, input, of_diagnostic, of_track, warn};
-use crate::options::{frame_rate, one_of, option_of, unknown_name};
+use crate::names::{one_of, option_of, unknown_name};
+use crate::options::frame_rate;
 use crate::run::interruptible;
 
 /// The clips of a file, by their indices or names.

@@ -12,7 +12,8 @@ use tumble_formats::path::{Pace, PathPoints, paths_of};
 use crate::arrays::{ArrayValues, Order, doubles, has_arrays, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, ends, one_of, option_named, option_of};
+use crate::names::{one_of, option_named, option_of};
+use crate::options::{SampleRequest, ends};
 use crate::run::interruptible;
 use crate::samples::of_values;
 

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::{Layout, Quantity};
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::Samples;
 use tumble_formats::world::world;
 
 use crate::clip::Clip;
@@ -106,11 +106,8 @@ fn samples(
     let engine = engine.engine_for(tracks * count)?;
     let motion = Arc::clone(motion);
     let samples = interruptible(clip.py(), move || {
-        let methods = ChannelMethods {
-            method: request.method,
-            with: &request.with(Quantity::Rotation),
-        };
-        methods
+        request
+            .methods(Quantity::Rotation)
             .sample(&engine, &motion, &frames)
             .map_err(|error| of_engine(&error))
     })?;

@@ -4,6 +4,7 @@
 mod application_device;
 mod auto;
 pub(crate) mod clip;
+pub(crate) mod groups;
 mod stream;
 
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use crate::cpu::engine::CpuEngine;
 use crate::device::{Device, VulkanDevice};
 use crate::engine::clip::Clip;
 use crate::engine::clip::request::Request;
+use crate::engine::groups::GroupedSet;
 use crate::error::Error;
 use crate::evaluate;
 use crate::evaluate::uploaded::Uploaded;
@@ -33,6 +35,7 @@ use crate::output::value::OutputValue;
 use crate::prepare::preparation::SetRequest;
 use crate::simd::dispatch::VectorWidth;
 use crate::time::frames::SampleTimes;
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
 
 /// The maximum number of worker threads.
@@ -235,24 +238,30 @@ impl Engine {
         self.machine.take_timings()
     }
 
-    /// Prepares a set for a method and stores it on the device as a clip.
+    /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
     ///
-    /// If the prepared set would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
+    /// If the prepared tracks of an interpolation would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
     /// evaluation prepares them piece by piece: slower, with the same bits.
     ///
     /// # Errors
-    /// When a track cannot be interpolated as requested, there is not enough memory, or the device fails.
-    /// [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
+    /// When a track cannot be interpolated as requested, there are interpolations for another number of tracks or with
+    /// several quantities, there is not enough memory, or the device fails. [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
     pub fn upload(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
     ) -> Result<Clip, Error> {
-        let uploaded = Uploaded::whole(&self.machine, set, interpolation.into())?;
+        let (interpolations, tracks) = (interpolations.into(), set.track_count());
+        let Some(interpolation) = interpolations.uniform(tracks) else {
+            let grouped = GroupedSet::new(self, set, interpolations);
+            return Ok(Clip::of_groups(self.clone(), grouped.prepared()?));
+        };
+        let uploaded = Uploaded::whole(&self.machine, set, interpolation)?;
         Ok(Clip::new(self.clone(), uploaded))
     }
 
-    /// Starts a request for the samples of a set at the times of `frames`. The set need not be uploaded.
+    /// Starts a request for the samples of a set at the times of `frames`, by an interpolation, or by [one of each
+    /// track](PerTrack). The set need not be uploaded.
     ///
     /// By default the result has all tracks, track by track, with four f32 a value. Only the segments that the
     /// samples need are prepared. On a Vulkan device a set larger than its memory (or than [`EngineOptions::memory`])
@@ -274,13 +283,13 @@ impl Engine {
     pub fn request<'a>(
         &'a self,
         set: &'a TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &'a SampleTimes,
     ) -> Request<'a> {
-        Request::of_set(self, set, interpolation.into(), frames)
+        Request::of_set(self, set, interpolations.into(), frames)
     }
 
-    /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolation,
+    /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolations,
     /// frames).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
@@ -288,10 +297,10 @@ impl Engine {
     pub fn evaluate(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
     ) -> Result<Rotations, Error> {
-        self.request(set, interpolation, frames).evaluate()
+        self.request(set, interpolations, frames).evaluate()
     }
 
     /// Evaluates the angular velocity or acceleration ([`Interpolation::quantity`]) of every track at every sample.
@@ -339,7 +348,7 @@ impl Engine {
 
     /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
     /// velocities and accelerations, or `[f32; 4]` for both. Short for [`request`](Engine::request)`(set,
-    /// interpolation,
+    /// interpolations,
     /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which
     /// accepts memory of any type.
     ///
@@ -353,12 +362,12 @@ impl Engine {
     pub fn evaluate_into<R: OutputValue>(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        self.request(set, interpolation, frames)
+        self.request(set, interpolations, frames)
             .layout(layout)
             .evaluate_values_into(output)
     }
@@ -389,7 +398,7 @@ impl Engine {
     }
 
     /// Describes in words how a whole set would be evaluated in f32: whether it is prepared, and in which pieces. All
-    /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolation,
+    /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolations,
     /// frames).`[`layout`](Request::layout)`(layout).`[`explain`](Request::explain)`()`, which also knows encodings and
     /// parts of a set.
     ///
@@ -398,11 +407,11 @@ impl Engine {
     pub fn explain_route(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<String, Error> {
-        self.request(set, interpolation, frames)
+        self.request(set, interpolations, frames)
             .layout(layout)
             .explain()
     }

@@ -40,7 +40,7 @@ impl Engine {
                 };
                 run(windows, quantity, fill_chunk, sink)
             }
-            Chunks::Single | Chunks::Each => {
+            Chunks::Single | Chunks::Each | Chunks::SomeTracks => {
                 let fill_chunk = |window: &Window, output: &mut [Quat]| {
                     let part = request.part(window.tracks.clone(), window.samples.clone());
                     let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));

@@ -8,6 +8,7 @@ use crate::machine::{Machine, MachineClip};
 use crate::memory::{OutOfMemoryError, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
+use crate::prepare::error::SetError;
 use crate::prepare::prepared::SEGMENTS;
 use crate::tracks::set::TrackSet;
 
@@ -35,11 +36,16 @@ pub(crate) fn prepare(
     }
 }
 
-/// Tracks that are prepared for any timeline.
-pub(crate) struct Uploaded {
-    clip: Box<dyn MachineClip>,
-    /// The set, if its segments exceed the engine's memory limit; then nothing is prepared before the evaluation.
-    pub(crate) unprepared: Option<TrackSet>,
+/// The tracks of a clip.
+pub(crate) enum Uploaded {
+    /// Prepared for any timeline.
+    Prepared(Box<dyn MachineClip>),
+    /// A set that every evaluation prepares anew, because its segments exceed the engine's memory limit.
+    Unprepared {
+        set: TrackSet,
+        /// What is known without segments.
+        data: ClipData,
+    },
 }
 
 impl Uploaded {
@@ -48,10 +54,7 @@ impl Uploaded {
         machine: &Arc<dyn Machine>,
         data: ClipData,
     ) -> Result<Self, EvaluateError> {
-        Ok(Self {
-            clip: Arc::clone(machine).clip(data)?,
-            unprepared: None,
-        })
+        Ok(Self::Prepared(Arc::clone(machine).clip(data)?))
     }
 
     /// Prepares a whole set; nothing if its segments exceed the engine's memory limit.
@@ -61,30 +64,45 @@ impl Uploaded {
         interpolation: Interpolation,
     ) -> Result<Self, EvaluateError> {
         let needed = segment_bytes(set, &interpolation);
-        let fits = machine.limits().memory.is_none_or(|limit| needed <= limit);
-        let clip = match fits {
-            true => {
-                refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
-                prepare(machine, set, interpolation, PrepareRequest::all(set), None)?
-            }
-            false => Arc::clone(machine).clip(ClipData::unprepared(set, interpolation)?)?,
-        };
-        Ok(Self {
-            clip,
-            unprepared: (!fits).then(|| set.clone()),
-        })
+        if machine.limits().memory.is_some_and(|limit| needed > limit) {
+            return Self::of_set(set.clone(), interpolation);
+        }
+        refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
+        let clip = prepare(machine, set, interpolation, PrepareRequest::all(set), None)?;
+        Ok(Self::Prepared(clip))
     }
 
+    /// A set that every evaluation prepares anew; refuses what cannot be interpolated.
+    pub(crate) fn of_set(
+        set: TrackSet,
+        interpolation: Interpolation,
+    ) -> Result<Self, EvaluateError> {
+        let data = ClipData::unprepared(&set, interpolation).map_err(SetError::from)?;
+        Ok(Self::Unprepared { set, data })
+    }
+
+    /// The segments, or what is known without them.
     pub(crate) fn data(&self) -> &ClipData {
-        self.clip.data()
+        match self {
+            Self::Prepared(clip) => clip.data(),
+            Self::Unprepared { data, .. } => data,
+        }
+    }
+
+    /// The set, if nothing is prepared.
+    pub(crate) fn unprepared(&self) -> Option<&TrackSet> {
+        match self {
+            Self::Prepared(_) => None,
+            Self::Unprepared { set, .. } => Some(set),
+        }
     }
 
     /// The prepared tracks; an error if the segments exceed the engine's memory limit.
     pub(crate) fn prepared(&self) -> Result<&dyn MachineClip, EvaluateError> {
-        match &self.unprepared {
-            None => Ok(&*self.clip),
-            Some(set) => {
-                let needed = segment_bytes(set, &self.data().interpolation);
+        match self {
+            Self::Prepared(clip) => Ok(&**clip),
+            Self::Unprepared { set, data } => {
+                let needed = segment_bytes(set, &data.interpolation);
                 Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into())
             }
         }

@@ -11,6 +11,7 @@ use crate::reference::curve::ReferenceCurve;
 use crate::shader::Form;
 use crate::threads::on_threads;
 use crate::time::wrap::{Wrap, WrapMode};
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::key_data::Tcb;
 use crate::tracks::set::{Track, TrackSet};
 
@@ -210,17 +211,8 @@ impl ReferenceCurve {
     }
 }
 
-impl From<Method> for Interpolation {
-    fn from(method: Method) -> Self {
-        Self {
-            method,
-            signs: method.signs.unwrap_or_default(),
-            ends: method.ends,
-            tcb: Tcb::default(),
-            quantity: Quantity::Rotation,
-            speed: Speed::AsKeyed,
-            before: WrapMode::Hold,
-            after: WrapMode::Hold,
-        }
+impl<I: Into<Interpolation>> From<I> for PerTrack<Interpolation> {
+    fn from(interpolation: I) -> Self {
+        Self::All(interpolation.into())
     }
 }

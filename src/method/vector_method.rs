@@ -1,6 +1,7 @@
 //! The interpolation methods for translations and scales.
 
 use crate::names::names;
+use crate::tracks::per_track::PerTrack;
 
 /// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -32,4 +33,10 @@ names! {
     GltfCubic => "gltf-cubic",
     C2 => "c2",
     BSpline => "b-spline",
+}
+
+impl From<VectorMethod> for PerTrack<VectorMethod> {
+    fn from(method: VectorMethod) -> Self {
+        Self::All(method)
+    }
 }

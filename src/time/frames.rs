@@ -207,6 +207,16 @@ impl Timeline {
         }
     }
 
+    /// The same sample times for a set that has only these of the tracks.
+    pub(crate) fn of_listed(&self, tracks: &[usize]) -> Self {
+        let mut timeline = self.clone();
+        if let Ticks::Times { times, stride: 1.. } = &mut timeline.ticks {
+            let of_track = |&track: &usize| &times[track * self.count..][..self.count];
+            *times = Arc::new(tracks.iter().flat_map(of_track).copied().collect());
+        }
+        timeline
+    }
+
     /// The times for some samples of some tracks, and the index of the first of these samples in it. Explicit times
     /// are only those of the part; frames have the same start as before.
     pub(crate) fn part(

@@ -69,7 +69,7 @@ impl Clip {
         };
         check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.data().folded(&timeline)?;
+        let timeline = self.uploaded()?.data().folded(&timeline)?;
         let engine = opened.engine();
         let count = (self.track_count() * timeline.len()) as u64;
         let bytes = count.saturating_mul(encoding.bytes() as u64);
@@ -109,7 +109,7 @@ impl Resident<'_> {
     /// # Errors
     /// As [`Clip::evaluate`].
     pub fn evaluate(&mut self) -> Result<ResidentTime, Error> {
-        let on_device = VulkanClip::of(self.clip.uploaded.prepared()?);
+        let on_device = VulkanClip::of(self.clip.uploaded()?.prepared()?);
         let on_device = on_device.ok_or(Error::BufferOnCpu)?;
         let (layout, bytes, buffer) = (self.layout, self.bytes, &mut self.buffer);
         let _ = self.clip.engine().take_timings();

@@ -1,7 +1,7 @@
 //! Compares an estimated path with its reference: errors after an alignment, at the poses of the sparser of both.
 
 use serde::Serialize;
-use tumble::{Engine, Interpolation, SampleTimes, method};
+use tumble::{Engine, SampleTimes, method};
 
 use crate::compare::CompareError;
 use crate::compare::clips::check_known_parents;
@@ -230,10 +230,7 @@ fn path_poses(
     engine: &Engine,
     times: Vec<f64>,
 ) -> Result<Vec<Pose>, CompareError> {
-    let lines = ChannelMethods {
-        method: Some(method::SLERP),
-        with: &|method| Interpolation::from(method),
-    };
+    let lines = ChannelMethods::by(method::SLERP);
     let samples = lines.sample(engine, clip, &SampleTimes::at(times));
     let samples = samples.map_err(|error| CompareError::Evaluating {
         input: input.to_owned(),

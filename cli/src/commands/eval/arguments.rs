@@ -11,7 +11,7 @@ use tumble_formats::quaternion::ComponentOrder;
 
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
+use crate::arguments::interpolation::{InterpolationArguments, method_argument};
 use crate::arguments::options::{
     AppliesTo, CommandLine, OPTIONS, ResultKind, ResultOptions, ResultRequest,
 };
@@ -22,6 +22,7 @@ use crate::arguments::time::{
 };
 use crate::messages::exit::Failure;
 use crate::messages::words;
+use tumble_formats::sample::MethodChoice;
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -60,7 +61,7 @@ pub(crate) struct Arguments {
         default_value = "authored",
         value_parser = method_argument()
     )]
-    pub(super) method: MethodArgument,
+    pub(super) method: MethodChoice,
     #[command(flatten)]
     pub(super) sampling: SamplingArguments,
     #[command(flatten)]

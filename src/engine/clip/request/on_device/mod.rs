@@ -4,7 +4,8 @@ mod application_device;
 mod exported;
 
 use crate::engine::Engine;
-use crate::engine::clip::request::{RequestPart, RequestSource, SetWork};
+use crate::engine::clip::request::{RequestPart, RequestSource, RequestWork, SetWork};
+use crate::engine::groups::GroupedSet;
 use crate::error::Error;
 use crate::evaluate::pieces::PreparedWindow;
 use crate::gpu::clip::VulkanClip;
@@ -20,7 +21,7 @@ impl RequestSource<'_> {
     pub(super) fn engine(&self) -> &Engine {
         match self {
             Self::Clip(clip) => clip.engine(),
-            Self::Set { engine, .. } => engine,
+            Self::Set { engine, .. } | Self::Grouped(GroupedSet { engine, .. }) => engine,
         }
     }
 
@@ -31,13 +32,14 @@ impl RequestSource<'_> {
         part: &RequestPart,
         work: impl FnOnce(&VulkanClip, &Timeline, &Window) -> Result<T, EvaluateError>,
     ) -> Result<T, Error> {
-        let SetWork { engine, request } = match self.prepared_or_set(part) {
-            Ok(clip) => {
-                let folded = clip.uploaded.data().folded(&part.timeline)?;
-                let clip = on_vulkan(clip.uploaded.prepared()?)?;
+        let SetWork { engine, request } = match self.work(part)? {
+            RequestWork::Prepared(clip) => {
+                let clip = on_vulkan(clip.uploaded()?.prepared()?)?;
+                let folded = clip.data().folded(&part.timeline)?;
                 return Ok(work(clip, &folded, &part.window)?);
             }
-            Err(of_set) => of_set,
+            RequestWork::Set(of_set) => of_set,
+            RequestWork::Groups { .. } => return Err(Error::SeveralInterpolations),
         };
         let needed = bytes_of(&request);
         if (engine.machine.limits().memory).is_some_and(|limit| needed > limit) {
