@@ -73,7 +73,6 @@
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-#![cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 
 mod checks;
 mod cpu;
@@ -100,6 +99,8 @@ mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
+// Devices alone run kernels.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod shader;
 mod simd;
 mod smooth;
@@ -107,8 +108,11 @@ mod stream;
 mod threads;
 mod time;
 mod tracks;
+// Checks of devices run twins that the CPU has no use for.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod twin;
 pub mod verify;
+#[cfg(feature = "vulkan")]
 mod work;
 
 pub use crate::curve::options::{

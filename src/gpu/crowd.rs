@@ -13,11 +13,10 @@ use crate::gpu::in_flight::KernelResults;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
 use crate::machine::crowd::{CrowdSource, MachineCrowd};
 use crate::machine::error::VulkanError;
-use crate::output::crowd::{
-    CrowdFrame, CrowdOutput, EntryChanges, VisibleInstances, listed_changes,
-};
+use crate::output::crowd::{CrowdOutput, listed_changes};
 use crate::shader::{CrowdChange, CrowdEntry, CrowdLink};
 use crate::threads::lock;
 use crate::work::crowd::{self, CrowdDevice, CrowdResources, CrowdShape, FrameKernels, Frames};

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::from_keys::dispatches::KeyJob;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::clip::VulkanClip;
 use crate::gpu::crowd::VulkanCrowd;
@@ -24,6 +23,7 @@ use crate::prepare::clip_data::ClipData;
 use crate::prepare::preparation::SetRequest;
 use crate::shader::Form;
 use crate::threads::{lock, on_threads};
+use crate::work::lists::keys::KeyJob;
 
 impl ListedDevice for PhysicalDevice {
     fn info(&self) -> &DeviceInfo {

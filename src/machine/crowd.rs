@@ -3,8 +3,11 @@
 use std::any::Any;
 
 use crate::machine::error::VulkanError;
-use crate::output::crowd::{CrowdFrame, CrowdOutput};
-use crate::shader::{CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdLink, CrowdSpan};
+use crate::output::crowd::CrowdOutput;
+use crate::shader::{
+    CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdLink,
+    CrowdSpan,
+};
 
 /// The tables of a crowd's library, and the number of its instances.
 pub(crate) struct CrowdSource<'a> {
@@ -23,6 +26,35 @@ pub(crate) struct CrowdSource<'a> {
     pub(crate) only_arcs: bool,
     /// The push constants that all dispatches share.
     pub(crate) arguments: CrowdDispatch,
+}
+
+/// The changes that a device needs for an evaluation.
+pub(crate) struct CrowdFrame<'a> {
+    /// The clock, ticks.
+    pub(crate) clock: u64,
+    pub(crate) changes: EntryChanges<'a>,
+    /// Number of instances that are evaluated.
+    pub(crate) instances: u32,
+    pub(crate) visible: VisibleInstances<'a>,
+}
+
+/// The entries that changed since the previous evaluation.
+pub(crate) enum EntryChanges<'a> {
+    None,
+    /// The entries from an index on, one after another; some of them may be unchanged.
+    Range(usize, &'a [CrowdEntry]),
+    /// Single entries, no more than [`listed_changes`](crate::output::crowd::listed_changes).
+    List(&'a [CrowdChange]),
+}
+
+/// Which instances are evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VisibleInstances<'a> {
+    All,
+    /// The instances of the list that the device has.
+    AsBefore,
+    /// The instances of a list that the device does not have yet.
+    List(&'a [u32]),
 }
 
 /// A crowd whose tables and entries a machine keeps.

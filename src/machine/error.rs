@@ -224,6 +224,7 @@ pub(crate) enum EvaluateError {
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
     /// A device has no memory for prepared tracks; fewer may fit.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     #[error(transparent)]
     NoRoom(VulkanError),
     #[error(transparent)]

@@ -12,6 +12,8 @@
 //! ask for the device itself (`gpu::Opened::of`).
 
 pub(crate) mod cache;
+// The host evaluates its crowds without them.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod crowd;
 pub(crate) mod error;
 pub(crate) mod options;

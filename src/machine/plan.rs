@@ -45,6 +45,7 @@ pub(crate) enum MachineKind {
         threads: usize,
     },
     /// A device that evaluates at most `window` rotations at once.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     Device {
         /// The number of rotations.
         window: usize,

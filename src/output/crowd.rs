@@ -1,7 +1,6 @@
 //! The values that a crowd's evaluation stores, and their sizes.
 
 use crate::names::names;
-use crate::shader::{CrowdChange, CrowdEntry};
 
 /// The values that are stored for every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -105,35 +104,6 @@ impl FrameStep {
         .into_iter()
         .flatten()
     }
-}
-
-/// The changes that a device needs for an evaluation.
-pub(crate) struct CrowdFrame<'a> {
-    /// The clock, ticks.
-    pub(crate) clock: u64,
-    pub(crate) changes: EntryChanges<'a>,
-    /// Number of instances that are evaluated.
-    pub(crate) instances: u32,
-    pub(crate) visible: VisibleInstances<'a>,
-}
-
-/// The entries that changed since the previous evaluation.
-pub(crate) enum EntryChanges<'a> {
-    None,
-    /// The entries from an index on, one after another; some of them may be unchanged.
-    Range(usize, &'a [CrowdEntry]),
-    /// Single entries, no more than [`listed_changes`].
-    List(&'a [CrowdChange]),
-}
-
-/// Which instances are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum VisibleInstances<'a> {
-    All,
-    /// The instances of the list that the device has.
-    AsBefore,
-    /// The instances of a list that the device does not have yet.
-    List(&'a [u32]),
 }
 
 /// The maximum number of changes that are listed, for a crowd with `entries` entries. If more entries changed, all

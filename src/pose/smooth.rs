@@ -7,6 +7,7 @@ use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Rotations, Samples, Vectors};
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::SmoothingPass;
+use crate::threads::copy;
 
 impl Engine {
     /// Smooths the rotations of every track over its samples, which must be evenly spaced in time: `q' = q exp(Σ b_m
@@ -71,7 +72,10 @@ impl Engine {
         let mut output = OutputBuffer::new(count)?;
         let mut other = OutputBuffer::new(if passes > 1 { count } else { 0 })?;
         if passes == 0 {
-            output.copy_from_slice(bytemuck::cast_slice(values.as_arrays()));
+            copy(
+                bytemuck::cast_slice_mut(&mut output),
+                bytemuck::cast_slice(values.as_arrays()),
+            );
         }
         for done in 0..passes {
             let (from, to) = match (passes - done) % 2 {

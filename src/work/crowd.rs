@@ -1,6 +1,7 @@
 //! The recording of a crowd's frames, whose steps and their order are those of [`FrameStep`].
 
-use crate::output::crowd::{CrowdFrame, CrowdOutput, EntryChanges, FrameStep, VisibleInstances};
+use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
+use crate::output::crowd::{CrowdOutput, FrameStep};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
 };

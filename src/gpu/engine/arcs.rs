@@ -102,6 +102,7 @@ mod tests {
     use crate::prepare::prepared::Prepared;
     use crate::shader::ArcSegment;
     use crate::tracks::set::TrackSet;
+    use crate::work::lists::may_be_tiny;
     use crate::{Device, Engine};
 
     /// Every device of this machine, with arcs prepared on it.
@@ -281,7 +282,7 @@ mod tests {
         for (computed, listed) in computed.groups.iter().zip(&listed.groups) {
             assert_eq!(computed.segments.len(), listed.segments.len());
             for index in 0..computed.segments.len() as u32 {
-                let [needs, asks] = [computed, listed].map(|group| group.may_be_tiny(index));
+                let [needs, asks] = [computed, listed].map(|group| may_be_tiny(group, index));
                 counts[usize::from(needs) * 2 + usize::from(asks)] += 1;
             }
         }

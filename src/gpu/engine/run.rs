@@ -91,9 +91,13 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         let max_values = || self.window_of(job.encoding);
         // Each is cut again before it starts: windows may have been halved since.
-        let windows = window
-            .cut(max_values())
-            .flat_map(|window| window.within(max_values()));
+        let windows = window.cut(max_values()).flat_map(|window| {
+            let first = window.start;
+            window.cut(max_values()).map(move |part| Window {
+                start: first + part.start,
+                ..part
+            })
+        });
         self.run_pipelined(
             &self.in_flight,
             &mut target,
