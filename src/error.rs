@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::crowd_error::CrowdError;
 use crate::curve::options::{InterpolationError, Quantity};
-use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::machine::error::{EvaluateError, VulkanError};
 use crate::memory::OutOfMemoryError;
 use crate::names::UnknownNameError;
 use crate::output::encoding::Encoding;
@@ -197,7 +197,7 @@ impl From<SetError> for Error {
 impl From<EvaluateError> for Error {
     fn from(error: EvaluateError) -> Self {
         match error {
-            EvaluateError::Vulkan(error) => Self::Vulkan(error),
+            EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => Self::Vulkan(error),
             EvaluateError::Set(error) => error.into(),
         }
     }

@@ -11,13 +11,13 @@ use glam::Quat;
 use crate::checks::{check_encoding, check_window};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
-use crate::engine::clip::request::RequestPart;
 use crate::error::Error;
-use crate::evaluate::Backend;
+use crate::evaluate;
 use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::plan::{Chunks, PREPARED, Plan, tracks_at_once};
 use crate::evaluate::uploaded::Uploaded;
-use crate::gpu::error::EvaluateError;
+use crate::machine::Machine;
+use crate::machine::error::EvaluateError;
+use crate::machine::plan::{Chunks, PREPARED, Plan, tracks_at_once};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoded::EncodedOutput;
@@ -140,20 +140,20 @@ impl<'a> GroupedSet<'a> {
     /// The tracks prepared for any sample times; groups whose segments exceed the engine's memory limit are prepared
     /// piece by piece by each evaluation.
     pub(crate) fn prepared(&self) -> Result<GroupedTracks, Error> {
-        self.with(&(0..self.set.track_count()), |backend, set, value| {
-            Uploaded::whole(backend, &set, value)
+        self.with(&(0..self.set.track_count()), |machine, set, value| {
+            Uploaded::whole(machine, &set, value)
         })
     }
 
     /// Some of the tracks, which each evaluation prepares.
     pub(crate) fn unprepared(&self, tracks: &Range<usize>) -> Result<GroupedTracks, Error> {
-        self.with(tracks, Uploaded::unprepared)
+        self.with(tracks, |_, set, value| Uploaded::of_set(set, value))
     }
 
     fn with(
         &self,
         range: &Range<usize>,
-        upload: impl Fn(&Arc<Backend>, TrackSet, Interpolation) -> Result<Uploaded, EvaluateError>,
+        upload: impl Fn(&Arc<dyn Machine>, TrackSet, Interpolation) -> Result<Uploaded, EvaluateError>,
     ) -> Result<GroupedTracks, Error> {
         let Self { engine, set, .. } = *self;
         let (of_all, quantity) = (self.groups()?, self.quantity()?);
@@ -164,7 +164,7 @@ impl<'a> GroupedSet<'a> {
                 continue;
             }
             let set = set.select(tracks.iter().copied())?;
-            let uploaded = upload(&engine.backend, set, *value);
+            let uploaded = upload(&engine.machine, set, *value);
             let uploaded = uploaded.map_err(|error| Error::from(error).of_tracks(&tracks))?;
             groups.push(Group { tracks, uploaded });
         }
@@ -217,12 +217,14 @@ impl GroupWork<'_> {
     ) -> Result<(), EvaluateError> {
         match &self.source {
             WorkSource::Prepared(timeline) => {
-                (self.group.uploaded).evaluate_into(timeline, window, output)
+                let prepared = self.group.uploaded.prepared()?;
+                prepared.evaluate_into(timeline, window, output)
             }
             WorkSource::PreparedWindow(prepared) => prepared.evaluate_into(window, output),
             WorkSource::Planned(request, plan) => {
                 let part = request.part(window.tracks.clone(), window.samples.clone());
-                (engine.backend).fill(&part, &plan.of_chunk(request, window), output)
+                let plan = plan.of_chunk(request, window);
+                evaluate::fill(&engine.machine, &part, &plan, output)
             }
         }
     }
@@ -232,7 +234,7 @@ impl GroupedTracks {
     /// The names of the methods.
     pub(super) fn methods(&self) -> impl Iterator<Item = &'static str> {
         let groups = self.groups.iter();
-        groups.map(|group| group.uploaded.data.interpolation.method.name)
+        groups.map(|group| group.uploaded.data().interpolation.method.name)
     }
 
     /// The sample times of each group's tracks.
@@ -255,8 +257,8 @@ impl GroupedTracks {
         let mut prepared = Vec::new();
         let (mut planned, mut requests) = (Vec::new(), Vec::new());
         for (group, timeline) in self.groups.iter().zip(timelines) {
-            let (tracks, data) = (listed(&group.tracks, &window.tracks), &group.uploaded.data);
-            match &group.uploaded.unprepared {
+            let (tracks, data) = (listed(&group.tracks, &window.tracks), group.uploaded.data());
+            match group.uploaded.unprepared() {
                 _ if tracks.is_empty() => {}
                 None => prepared.push(GroupWork {
                     group,
@@ -269,7 +271,7 @@ impl GroupedTracks {
                 }
             }
         }
-        let limits = engine.backend.limits();
+        let limits = engine.machine.limits();
         let plans = Plan::of_groups(&requests, window.layout, encoding, chunk, &limits);
         let planned = planned.into_iter().zip(requests).zip(plans);
         let planned = planned.map(|((group, request), plan)| GroupWork {
@@ -279,14 +281,14 @@ impl GroupedTracks {
         Ok(prepared.into_iter().chain(planned).collect())
     }
 
-    /// Evaluates a part of the result into `output`, in an encoding; refuses what does not fit.
+    /// Evaluates a window of the result into `output`, in an encoding; refuses what does not fit.
     pub(crate) fn fill(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         output: EncodedOutput<'_>,
     ) -> Result<(), Error> {
-        let RequestPart { timeline, window } = part;
         let encoding = output.encoding;
         check_encoding(encoding, self.quantity)?;
         check_window(
@@ -301,15 +303,15 @@ impl GroupedTracks {
         fill_window(engine, &works, window, output)
     }
 
-    /// Evaluates a part of the result in chunks of about `chunk` values.
+    /// Evaluates a window of the result in chunks of about `chunk` values.
     pub(crate) fn stream<E: From<Error>>(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let RequestPart { timeline, window } = part;
         let timelines = self.timelines(timeline);
         let mut works = self.works(engine, &timelines, window, Encoding::F32, Some(chunk))?;
         for GroupWork { group, source } in &mut works {
@@ -317,7 +319,7 @@ impl GroupedTracks {
             if let WorkSource::Planned(request, plan) = source
                 && plan.chunks == Chunks::PreparedOnce
             {
-                let prepared = PreparedWindow::whole(&engine.backend, request);
+                let prepared = PreparedWindow::whole(&engine.machine, request);
                 *source = WorkSource::PreparedWindow(prepared.map_err(of_tracks)?);
             }
         }
@@ -328,21 +330,22 @@ impl GroupedTracks {
         run(window.cut(chunk), self.quantity, fill, sink)
     }
 
-    /// A line for each group that has tracks in a part of the result: their number, the method and how they are
+    /// A line for each group that has tracks in a window of the result: their number, the method and how they are
     /// evaluated.
     pub(crate) fn explain(
         &self,
         engine: &Engine,
-        part: &RequestPart,
+        timeline: &Timeline,
+        window: &Window,
         encoding: Encoding,
         chunk: Option<usize>,
     ) -> Result<String, Error> {
-        let timelines = self.timelines(&part.timeline);
-        let works = self.works(engine, &timelines, &part.window, encoding, chunk)?;
+        let timelines = self.timelines(timeline);
+        let works = self.works(engine, &timelines, window, encoding, chunk)?;
         let mut lines = Vec::new();
         for GroupWork { group, source } in &works {
-            let count = listed(&group.tracks, &part.window.tracks).len();
-            let method = group.uploaded.data.interpolation.method;
+            let count = listed(&group.tracks, &window.tracks).len();
+            let method = group.uploaded.data().interpolation.method;
             let tracks = if count == 1 { "track" } else { "tracks" };
             let route = match source {
                 WorkSource::Planned(_, plan) => plan.to_string(),

@@ -18,24 +18,22 @@ use crate::engine::clip::Clip;
 use crate::engine::clip::request::Request;
 use crate::engine::groups::GroupedSet;
 use crate::error::Error;
-use crate::evaluate::Backend;
-use crate::evaluate::plan::Plan;
+use crate::evaluate;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
 use crate::gpu::engine::choices::EngineChoices;
-use crate::gpu::options::{EngineOptions, Timings};
 #[cfg(feature = "prove")]
 use crate::gpu::physical::details::DeviceDetails;
-use crate::gpu::recovery::Opened;
-use crate::gpu::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
-use crate::gpu::self_test;
+use crate::machine::Machine;
+use crate::machine::options::{EngineOptions, Timings};
+use crate::machine::plan::Plan;
+use crate::machine::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
 use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::prepare::preparation::SetRequest;
 use crate::simd::dispatch::VectorWidth;
-use crate::threads::lock;
 use crate::time::frames::SampleTimes;
 use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
@@ -65,7 +63,7 @@ const MAX_THREADS: usize = 1024;
 /// after another.
 #[derive(Clone)]
 pub struct Engine {
-    pub(crate) backend: Arc<Backend>,
+    pub(crate) machine: Arc<dyn Machine>,
 }
 
 impl Engine {
@@ -107,18 +105,12 @@ impl Engine {
                 let (stores, memory) = (options.streaming_stores, options.memory);
                 let engine = CpuEngine::new(width, stores, options.thread_count, memory)?;
                 Ok(Self {
-                    backend: Arc::new(Backend::Cpu(engine)),
+                    machine: Arc::new(engine),
                 })
             }
-            Device::Vulkan(VulkanDevice { physical }) => {
-                Ok(Self::with_opened(Opened::new(&physical, options)?))
-            }
-        }
-    }
-
-    pub(crate) fn with_opened(opened: Opened) -> Self {
-        Self {
-            backend: Arc::new(Backend::Vulkan(Box::new(opened))),
+            Device::Vulkan(VulkanDevice { listed }) => Ok(Self {
+                machine: listed.open(options)?,
+            }),
         }
     }
 
@@ -131,31 +123,28 @@ impl Engine {
     /// Name, kind and limits of the Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
-        self.backend.opened().map(|opened| &opened.info)
+        self.machine.info()
     }
 
     /// All details that Vulkan reports of the device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn device_details(&self) -> Option<DeviceDetails> {
-        let opened = self.backend.opened()?;
-        Some(opened.engine().device.physical.details())
+        Some(self.opened()?.engine().device.physical.details())
     }
 
     /// The engine's choices for its device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn choices(&self) -> Option<EngineChoices> {
-        Some(self.backend.opened()?.engine().choices())
+        Some(self.opened()?.engine().choices())
     }
 
     /// The results of the self-test that ran when the device was opened, one report for each expression; empty on the
     /// CPU, with which devices are compared.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
-        self.backend
-            .opened()
-            .map_or(&[], |opened| &opened.self_tests)
+        self.machine.self_tests()
     }
 
     /// Compiles every kernel, one after the other, and calls `each` with its name and the time that the driver took.
@@ -170,10 +159,10 @@ impl Engine {
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
     ) -> Result<(), Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(());
-        };
-        Ok(opened.engine().compile_kernels(each)?)
+        match self.opened() {
+            Some(opened) => Ok(opened.engine().compile_kernels(each)?),
+            None => Ok(()),
+        }
     }
 
     /// Compares every kernel on the device with its twin on the CPU, bit by bit, for small, ordinary and extreme
@@ -198,10 +187,7 @@ impl Engine {
         &self,
         each: &mut dyn FnMut(KernelCheck) -> bool,
     ) -> Result<(), Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(());
-        };
-        Ok(opened.engine().check_kernels(false, each)?)
+        Ok(self.machine.check_kernels(false, each)?)
     }
 
     /// As [`Engine::check_kernels`], without running the kernels that are known to be exact on this device; they are
@@ -217,20 +203,16 @@ impl Engine {
     /// [`remembered`](KernelCheck::remembered); for the others no values were compared. Empty on the CPU.
     #[must_use]
     pub fn known_kernels(&self) -> Vec<KernelCheck> {
-        let known = |opened: &Opened| opened.engine().known_kernels();
-        self.backend.opened().map_or_else(Vec::new, known)
+        self.machine.known_kernels()
     }
 
     fn kernel_checks(&self, only_unknown: bool) -> Result<Vec<KernelCheck>, Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(Vec::new());
-        };
         let mut checks = Vec::new();
         let mut each = |check| {
             checks.push(check);
             true
         };
-        opened.engine().check_kernels(only_unknown, &mut each)?;
+        self.machine.check_kernels(only_unknown, &mut each)?;
         Ok(checks)
     }
 
@@ -240,28 +222,20 @@ impl Engine {
     /// # Errors
     /// When the device fails.
     pub fn negative_control(&self) -> Result<Option<NegativeControl>, Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(None);
-        };
-        Ok(Some(self_test::negative_control(&opened.engine())?))
+        Ok(self.machine.negative_control()?)
     }
 
     /// The messages of the validation layer so far; see [`Device::list_with`].
     #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
-        let messages = |opened: &Opened| {
-            let device = &opened.engine().device;
-            device.physical.instance.validation_messages()
-        };
-        self.backend.opened().map_or_else(Vec::new, messages)
+        self.machine.validation_messages()
     }
 
     /// Returns the times of this engine's evaluations since the last call, or since the engine was opened; zero on
     /// the CPU.
     #[must_use]
     pub fn take_timings(&self) -> Timings {
-        let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
-        self.backend.opened().map_or_else(Timings::default, timings)
+        self.machine.take_timings()
     }
 
     /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
@@ -282,7 +256,7 @@ impl Engine {
             let grouped = GroupedSet::new(self, set, interpolations);
             return Ok(Clip::of_groups(self.clone(), grouped.prepared()?));
         };
-        let uploaded = Uploaded::whole(&self.backend, set, interpolation)?;
+        let uploaded = Uploaded::whole(&self.machine, set, interpolation)?;
         Ok(Clip::new(self.clone(), uploaded))
     }
 
@@ -356,7 +330,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let plan = self.plan(request, layout, Encoding::F32, None);
-        let storage = self.backend.evaluate(request, &plan)?;
+        let storage = evaluate::evaluate(&self.machine, request, &plan)?;
         let (tracks, samples) = (request.tracks.len(), request.samples.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -369,7 +343,7 @@ impl Engine {
         encoding: Encoding,
         chunk: Option<usize>,
     ) -> Plan {
-        Plan::of(request, layout, encoding, chunk, &self.backend.limits())
+        Plan::of(request, layout, encoding, chunk, &self.machine.limits())
     }
 
     /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
@@ -420,10 +394,7 @@ impl Engine {
     ) -> Result<(), Error> {
         let interpolation = interpolation.into();
         check_encoding(encoding, interpolation.quantity)?;
-        match self.backend.opened() {
-            Some(opened) => Ok(opened.warm(interpolation.form(), encoding)?),
-            None => Ok(()),
-        }
+        Ok(self.machine.warm(interpolation.form(), encoding)?)
     }
 
     /// Describes in words how a whole set would be evaluated in f32: whether it is prepared, and in which pieces. All

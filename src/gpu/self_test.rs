@@ -7,12 +7,12 @@ use bytemuck::Zeroable as _;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::kernel_check::self_test::probes;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-pub(crate) use crate::gpu::reports::{NegativeControl, SelfTestReport};
 use crate::gpu::run_once::run_once;
+use crate::machine::error::VulkanError;
+pub(crate) use crate::machine::reports::{NegativeControl, SelfTestReport};
 use crate::shader::{Dispatch, Kernel, Reply, WORKGROUP};
 use crate::twin::self_test::reply;
 

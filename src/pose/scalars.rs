@@ -58,7 +58,7 @@ impl Engine {
         let samples = timeline.len();
         let mut scalars = Scalars::new(count, samples, layout)?;
         let pack_of = |scalar: usize| packs.partition_point(|&first| first <= scalar) - 1;
-        let places: Vec<Component> = (0..count)
+        let components: Vec<Component> = (0..count)
             .map(|scalar| Component {
                 pack: pack_of(scalar),
                 index: scalar - packs[pack_of(scalar)],
@@ -68,7 +68,7 @@ impl Engine {
         let values = scalars.as_mut_slice();
         on_threads(|| match layout {
             Layout::TrackMajor => {
-                let rows = values.par_chunks_mut(samples.max(1)).zip(&places);
+                let rows = values.par_chunks_mut(samples.max(1)).zip(&components);
                 rows.for_each(|(row, component)| {
                     let vectors = &vectors[component.pack * samples..];
                     for (value, vector) in row.iter_mut().zip(vectors) {
@@ -80,7 +80,7 @@ impl Engine {
                 let frames = values.par_chunks_mut(count.max(1)).with_min_len(MIN_FRAMES);
                 frames.zip(vectors.par_chunks(width.max(1))).for_each(
                     |(values, vectors): (&mut [f32], &[[f32; 4]])| {
-                        for (value, component) in values.iter_mut().zip(&places) {
+                        for (value, component) in values.iter_mut().zip(&components) {
                             *value = vectors[component.pack][component.index];
                         }
                     },
@@ -154,7 +154,7 @@ impl Engine {
             quantity,
             method,
             interpolation,
-            group_bytes: self.backend.limits().group_bytes,
+            group_bytes: self.machine.limits().group_bytes,
             only_for: Some(only_for),
         })
     }

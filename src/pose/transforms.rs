@@ -149,7 +149,7 @@ impl Engine {
     }
 
     fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {
-        let uploaded = Uploaded::of_data(&self.backend, data, None)?;
+        let uploaded = Uploaded::of_data(&self.machine, data)?;
         Ok(Clip::new(self.clone(), uploaded))
     }
 }

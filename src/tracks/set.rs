@@ -185,12 +185,6 @@ impl TrackSet {
         !self.signs.any_long
     }
 
-    /// The signs of the keys of consecutive tracks along the shortest path.
-    pub(crate) fn signs_of(&self, tracks: Range<usize>) -> Signs<'_> {
-        let first = self.first_key(tracks.start);
-        self.signs.of(first..self.first_key(tracks.end))
-    }
-
     /// The signs of a track's keys along the shortest path.
     #[inline]
     pub(crate) fn signs(&self, index: usize) -> Signs<'_> {
@@ -250,6 +244,7 @@ impl TrackSet {
     }
 
     /// The keys of all tracks, one track after another.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn keys(&self) -> &[Quat] {
         &self.keys
     }

@@ -11,7 +11,6 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
-use crate::from_keys::dispatches::KeyJob;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -27,6 +26,7 @@ use crate::shader::{
 use crate::time::frames::{SampleTimes, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 use crate::work::lists::grid::{GridRows, write_blocks};
+use crate::work::lists::keys::KeyJob;
 use crate::work::lists::sample_list::SampleList;
 use crate::work::lists::{Cut, GroupWork, work, write};
 

@@ -65,7 +65,7 @@ impl Clip {
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
         match &self.tracks {
-            ClipTracks::Alike(uploaded) => uploaded.data.track_count(),
+            ClipTracks::Alike(uploaded) => uploaded.data().track_count(),
             ClipTracks::Grouped(grouped) => grouped.track_count,
         }
     }
@@ -76,7 +76,7 @@ impl Clip {
     /// When the frames do not fit the clip.
     pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
         let span = match &self.tracks {
-            ClipTracks::Alike(uploaded) => uploaded.data.time_span,
+            ClipTracks::Alike(uploaded) => uploaded.data().time_span,
             ClipTracks::Grouped(grouped) => grouped.time_span,
         };
         frames.resolve(self.track_count(), span)
@@ -103,7 +103,7 @@ impl Clip {
 
     pub(crate) fn quantity(&self) -> Quantity {
         match &self.tracks {
-            ClipTracks::Alike(uploaded) => uploaded.data.interpolation.quantity,
+            ClipTracks::Alike(uploaded) => uploaded.data().interpolation.quantity,
             ClipTracks::Grouped(grouped) => grouped.quantity,
         }
     }
@@ -115,8 +115,8 @@ impl Clip {
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let uploaded = self.uploaded()?;
-        let timeline = uploaded.data.folded(timeline)?;
-        let storage = uploaded.evaluate(&timeline, layout)?;
+        let timeline = uploaded.data().folded(timeline)?;
+        let storage = uploaded.prepared()?.evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -155,8 +155,10 @@ impl Clip {
             return Ok(());
         }
         let uploaded = self.uploaded()?;
-        let timeline = uploaded.data.folded(timeline)?;
-        Ok(uploaded.evaluate_into(&timeline, window, output)?)
+        let timeline = uploaded.data().folded(timeline)?;
+        Ok(uploaded
+            .prepared()?
+            .evaluate_into(&timeline, window, output)?)
     }
 
     /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
@@ -174,10 +176,11 @@ impl Clip {
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let uploaded = self.uploaded()?;
-        let timeline = uploaded.data.folded(timeline).map_err(Error::from)?;
+        let timeline = uploaded.data().folded(timeline).map_err(Error::from)?;
+        let prepared = uploaded.prepared().map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
-            Ok(uploaded.evaluate_into(&timeline, window, output)?)
+            Ok(prepared.evaluate_into(&timeline, window, output)?)
         };
         run(window.cut(chunk), self.quantity(), fill, sink)
     }
@@ -189,7 +192,7 @@ impl std::fmt::Debug for Clip {
         fields.field("engine", &self.engine);
         match &self.tracks {
             ClipTracks::Alike(uploaded) => {
-                fields.field("method", &uploaded.data.interpolation.method)
+                fields.field("method", &uploaded.data().interpolation.method)
             }
             ClipTracks::Grouped(grouped) => {
                 fields.field("methods", &grouped.methods().collect::<Vec<_>>())

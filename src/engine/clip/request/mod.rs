@@ -1,9 +1,7 @@
 //! A request: which samples of a clip or of a set are evaluated, in which layout and encoding, and into which memory.
 
 #[cfg(feature = "vulkan")]
-mod application_device;
-#[cfg(feature = "vulkan")]
-mod exported;
+mod on_device;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,17 +15,7 @@ use crate::engine::Engine;
 use crate::engine::clip::{Clip, ClipTracks};
 use crate::engine::groups::{GroupedSet, GroupedTracks};
 use crate::error::Error;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::plan::PREPARED;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::plan::bytes_of;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::Uploaded;
-#[cfg(feature = "vulkan")]
-use crate::gpu::error::EvaluateError;
-#[cfg(feature = "vulkan")]
-use crate::memory::OutOfMemoryError;
+use crate::machine::plan::PREPARED;
 use crate::memory::zeroed;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
@@ -37,8 +25,6 @@ use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
 use crate::prepare::preparation::SetRequest;
-#[cfg(feature = "vulkan")]
-use crate::prepare::prepared::SEGMENTS;
 use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::per_track::PerTrack;
@@ -118,20 +104,12 @@ impl RequestSource<'_> {
         })
     }
 
-    #[cfg(feature = "vulkan")]
-    fn engine(&self) -> &Engine {
-        match self {
-            Self::Clip(clip) => clip.engine(),
-            Self::Set { engine, .. } | Self::Grouped(GroupedSet { engine, .. }) => engine,
-        }
-    }
-
     /// What is evaluated for a part of the result.
     fn work<'r>(&'r self, part: &'r RequestPart) -> Result<RequestWork<'r>, Error> {
         let (engine, set, interpolation) = match self {
             Self::Clip(clip) => match &clip.tracks {
-                ClipTracks::Alike(uploaded) => match &uploaded.unprepared {
-                    Some(set) => (clip.engine(), set, &uploaded.data.interpolation),
+                ClipTracks::Alike(uploaded) => match uploaded.unprepared() {
+                    Some(set) => (clip.engine(), set, &uploaded.data().interpolation),
                     None => return Ok(RequestWork::Prepared(clip)),
                 },
                 ClipTracks::Grouped(groups) => {
@@ -156,31 +134,6 @@ impl RequestSource<'_> {
             engine,
             request: request.part(tracks, samples),
         }))
-    }
-
-    /// Calls `work` for a window of the clip, or for the segments of the set that the window needs, with the samples
-    /// and the window relative to them.
-    #[cfg(feature = "vulkan")]
-    fn with_uploaded<T>(
-        &self,
-        part: &RequestPart,
-        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
-    ) -> Result<T, Error> {
-        let SetWork { engine, request } = match self.work(part)? {
-            RequestWork::Prepared(clip) => {
-                let uploaded = clip.uploaded()?;
-                let folded = uploaded.data.folded(&part.timeline)?;
-                return Ok(work(uploaded, &folded, &part.window)?);
-            }
-            RequestWork::Set(of_set) => of_set,
-            RequestWork::Groups { .. } => return Err(Error::SeveralInterpolations),
-        };
-        let needed = bytes_of(&request);
-        if (engine.backend.limits().memory).is_some_and(|limit| needed > limit) {
-            return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
-        }
-        let prepared = PreparedWindow::whole(&engine.backend, &request)?;
-        Ok(prepared.with(&part.window, work)?)
     }
 }
 
@@ -343,7 +296,7 @@ impl Request<'_> {
     ///
     /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
     /// * otherwise: all segments that the request's samples need, if they take no more than
-    ///   [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) (256 MiB if it has no limit), and else
+    ///   [`EngineOptions::memory`](crate::machine::options::EngineOptions::memory) (256 MiB if it has no limit), and else
     ///   those of a part of a chunk at a time.
     ///
     /// With several interpolations it is also that of the keys, whose tracks are sorted by interpolation.
@@ -380,7 +333,9 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.stream_request(&request, self.layout, chunk, sink)
             }
-            RequestWork::Groups { engine, groups } => groups.stream(engine, &part, chunk, sink),
+            RequestWork::Groups { engine, groups } => {
+                groups.stream(engine, &part.timeline, &part.window, chunk, sink)
+            }
         }
     }
 
@@ -423,7 +378,7 @@ impl Request<'_> {
                 plan.to_string()
             }
             RequestWork::Groups { engine, groups } => {
-                groups.explain(engine, &part, self.encoding, chunk)?
+                groups.explain(engine, &part.timeline, &part.window, self.encoding, chunk)?
             }
         })
     }
@@ -470,7 +425,9 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.fill_request(request, self.layout, output)
             }
-            RequestWork::Groups { engine, groups } => groups.fill(engine, part, output),
+            RequestWork::Groups { engine, groups } => {
+                groups.fill(engine, &part.timeline, &part.window, output)
+            }
         }
     }
 

@@ -1,9 +1,10 @@
-//! Errors of Vulkan.
+//! Errors of machines.
+
+#[cfg(feature = "vulkan")]
+pub(crate) mod calls;
 
 use crate::prepare::error::SetError;
 use crate::time::error::SampleTimesError;
-#[cfg(feature = "vulkan")]
-use ash::vk;
 
 /// Why a Vulkan device cannot be used, or failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -120,12 +121,12 @@ pub enum VulkanError {
     },
     /// A Vulkan call failed.
     #[cfg(feature = "vulkan")]
-    #[error("{call} failed: {result:?}{}", hint(*result))]
+    #[error("{call} failed: {result:?}{}", calls::hint(*result))]
     Call {
         /// The function's name.
         call: &'static str,
         /// The returned code.
-        result: vk::Result,
+        result: ash::vk::Result,
     },
     /// The validation layer is requested but not installed.
     #[error(
@@ -212,60 +213,9 @@ pub enum VulkanError {
     },
 }
 
-impl VulkanError {
-    /// Whether the device is lost: its memory is gone, and it must be opened again.
-    pub(crate) fn is_lost(&self) -> bool {
-        #[cfg(feature = "vulkan")]
-        if let Self::Call { result, .. } = self {
-            return *result == vk::Result::ERROR_DEVICE_LOST;
-        }
-        false
-    }
-
-    /// Whether memory ran out: the same work in smaller windows may succeed.
-    pub(crate) fn is_out_of_memory(&self) -> bool {
-        #[cfg(feature = "vulkan")]
-        if let Self::Call { result, .. } = self {
-            return matches!(
-                *result,
-                vk::Result::ERROR_OUT_OF_HOST_MEMORY
-                    | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
-                    | vk::Result::ERROR_OUT_OF_POOL_MEMORY
-                    | vk::Result::ERROR_FRAGMENTED_POOL
-                    | vk::Result::ERROR_TOO_MANY_OBJECTS
-            );
-        }
-        false
-    }
-}
-
 /// A version of Vulkan in digits: `1.3`.
 fn version(packed: u32) -> String {
     format!("{}.{}", packed >> 22 & 0x7f, packed >> 12 & 0x3ff)
-}
-
-#[cfg(feature = "vulkan")]
-fn hint(result: vk::Result) -> &'static str {
-    match result {
-        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-            "; lower the memory budget"
-        }
-        vk::Result::ERROR_DEVICE_LOST => "; the driver gave up on the device",
-        _ => "",
-    }
-}
-
-#[cfg(feature = "vulkan")]
-/// Adds the name of the failed function to an error.
-pub(crate) trait Named<T> {
-    fn named(self, call: &'static str) -> Result<T, VulkanError>;
-}
-
-#[cfg(feature = "vulkan")]
-impl<T> Named<T> for ash::prelude::VkResult<T> {
-    fn named(self, call: &'static str) -> Result<T, VulkanError> {
-        self.map_err(|result| VulkanError::Call { call, result })
-    }
 }
 
 /// Errors of an evaluation.
@@ -273,6 +223,10 @@ impl<T> Named<T> for ash::prelude::VkResult<T> {
 pub(crate) enum EvaluateError {
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
+    /// A device has no memory for prepared tracks; fewer may fit.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
+    #[error(transparent)]
+    NoRoom(VulkanError),
     #[error(transparent)]
     Set(SetError),
 }

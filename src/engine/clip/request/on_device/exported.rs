@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use crate::engine::clip::request::Request;
 use crate::error::Error;
-use crate::evaluate::Backend;
+use crate::gpu::clip::Job;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::EvaluateError;
 use crate::gpu::exported::{Exported, ExportedResult};
 use crate::gpu::in_flight::Target;
-use crate::gpu::job::Job;
+use crate::machine::error::EvaluateError;
 use crate::memory::OutOfMemoryError;
 use crate::output::window::Window;
 
@@ -21,9 +20,9 @@ impl Request<'_> {
     /// As [`Request::size`]; also when the engine is the CPU, the device cannot export memory, there is not enough
     /// memory, or the device fails.
     pub fn export(&self) -> Result<ExportedResult, Error> {
-        let Backend::Vulkan(opened) = &*self.source.engine().backend else {
+        if self.source.engine().opened().is_none() {
             return Err(Error::ExportOnCpu);
-        };
+        }
         let part = self.part()?;
         let bytes = (part.window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
         let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
@@ -45,9 +44,9 @@ impl Request<'_> {
             engine.run(job, window, target, None)?;
             Ok(ExportedResult::new(exported, bytes))
         };
-        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
+        (self.source).with_uploaded(&part, |clip, timeline, window| {
             let export = |engine: &VulkanEngine, job: Job<'_>| export(engine, job, window);
-            uploaded.on_device(opened, timeline, self.encoding, export)
+            clip.on_device(timeline, self.encoding, export)
         })
     }
 }

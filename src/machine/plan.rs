@@ -45,6 +45,7 @@ pub(crate) enum MachineKind {
         threads: usize,
     },
     /// A device that evaluates at most `window` rotations at once.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     Device {
         /// The number of rotations.
         window: usize,
@@ -63,21 +64,29 @@ impl Limits {
 pub(crate) enum Route {
     /// The result is empty.
     Nothing,
-    /// Every sample is evaluated directly from the keys next to it.
-    FromKeys(KeyCurve),
-    /// On the CPU: only the key intervals that have a sample are prepared.
-    SparseSamples,
-    /// In batches: a thread of the CPU prepares some intervals, evaluates them while their segments are in its cache,
-    /// and forgets them.
-    Batches {
-        /// Whether a long track may be divided into several parts.
-        cuts_tracks: bool,
-    },
+    /// In rows, each with the samples of a track.
+    Rows(Rows),
     /// In pieces: all segments of a piece are prepared, and uploaded to a device, before its first sample is
     /// evaluated.
     Pieces {
         /// The maximum size of the segments of a piece, bytes.
         limit: usize,
+    },
+}
+
+/// How rows are computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Rows {
+    /// Every sample is evaluated directly from the keys next to it.
+    FromKeys(KeyCurve),
+    /// Only the key intervals that have a sample are prepared. For a device the host does this, so plans for devices
+    /// do not have it.
+    SparseSamples,
+    /// In batches: a thread of the CPU prepares some intervals, evaluates them while their segments are in its cache,
+    /// and forgets them. For a device as [`Rows::SparseSamples`].
+    Batches {
+        /// Whether a long track may be divided into several parts.
+        cuts_tracks: bool,
     },
 }
 
@@ -261,8 +270,7 @@ impl Plan {
 
     /// Whether rows, each with the samples of a track, are computed and then copied into frames.
     pub(crate) fn transposes(&self) -> bool {
-        let is_of_rows = !matches!(self.route, Route::Pieces { .. } | Route::Nothing);
-        is_of_rows && self.layout == Layout::FrameMajor
+        matches!(self.route, Route::Rows(_)) && self.layout == Layout::FrameMajor
     }
 }
 
@@ -283,8 +291,8 @@ impl Route {
             limit: piece_limit(request, limits),
         };
         match (limits.kind, curve) {
-            (MachineKind::Cpu { .. }, Some(curve)) => Self::FromKeys(curve),
-            (MachineKind::Cpu { .. }, None) if is_sparse => Self::SparseSamples,
+            (MachineKind::Cpu { .. }, Some(curve)) => Self::Rows(Rows::FromKeys(curve)),
+            (MachineKind::Cpu { .. }, None) if is_sparse => Self::Rows(Rows::SparseSamples),
             (MachineKind::Cpu { .. }, None) if !in_rows => pieces,
             (MachineKind::Cpu { threads }, None) => {
                 let cuts_tracks = in_order && request.prepares_apart();
@@ -299,7 +307,7 @@ impl Route {
                 let is_shared = batches >= threads.min(request.len() / SHARE);
                 let is_small = keys * key_bytes(request.interpolation) <= SEGMENT_BYTES;
                 match is_held && (are_short || cuts_tracks) && (is_shared || !is_small) {
-                    true => Self::Batches { cuts_tracks },
+                    true => Self::Rows(Rows::Batches { cuts_tracks }),
                     false => pieces,
                 }
             }
@@ -307,7 +315,7 @@ impl Route {
                 // Where samples are explicit times, the keys of a track are not cut.
                 let longest = (request.set.longest()).max(request.samples.len());
                 match in_order || longest <= window {
-                    true => Self::FromKeys(curve),
+                    true => Self::Rows(Rows::FromKeys(curve)),
                     false => pieces,
                 }
             }
@@ -429,22 +437,22 @@ impl fmt::Display for Route {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Nothing => "no samples: nothing is computed",
-            Self::FromKeys(KeyCurve::Arcs) => {
+            Self::Rows(Rows::FromKeys(KeyCurve::Arcs)) => {
                 "fewer samples than keys: each sample is computed from the two keys beside it"
             }
-            Self::FromKeys(KeyCurve::TwoKeys) => {
+            Self::Rows(Rows::FromKeys(KeyCurve::TwoKeys)) => {
                 "fewer samples than keys, two keys per track: each sample is computed from the keys of its track"
             }
-            Self::FromKeys(KeyCurve::Cubics(_)) => {
+            Self::Rows(Rows::FromKeys(KeyCurve::Cubics(_))) => {
                 "fewer samples than keys, with mostly small rotations between them: each sample is computed from the four keys around it; intervals with too large rotations are prepared"
             }
-            Self::Batches { cuts_tracks: false } => {
+            Self::Rows(Rows::Batches { cuts_tracks: false }) => {
                 "in batches: a thread prepares about a thousand keys, evaluates them while their segments are in the cache, and discards the segments"
             }
-            Self::Batches { cuts_tracks: true } => {
+            Self::Rows(Rows::Batches { cuts_tracks: true }) => {
                 "in batches: a thread prepares about a thousand keys, evaluates them while their segments are in the cache, and discards the segments; long tracks are divided among the threads"
             }
-            Self::SparseSamples => {
+            Self::Rows(Rows::SparseSamples) => {
                 "far fewer samples than keys: only the intervals that contain a sample are prepared"
             }
             Self::Pieces { .. } => {
@@ -466,7 +474,7 @@ mod tests {
     use crate::engine::clip::request::Request;
     use crate::error::Error;
     use crate::evaluate::steps::{self, Step};
-    use crate::gpu::options::EngineOptions;
+    use crate::machine::options::EngineOptions;
     use crate::method;
     use crate::time::frames::SampleTimes;
     use crate::time::wrap::WrapMode;
@@ -490,13 +498,13 @@ mod tests {
     type StepWords = (&'static str, fn(&Step) -> bool);
     const STEPS: [StepWords; 5] = [
         ("is computed from the", |step| {
-            matches!(step, Step::Rows(Route::FromKeys(_)))
+            matches!(step, Step::Rows(Rows::FromKeys(_)))
         }),
         ("only the intervals", |step| {
-            matches!(step, Step::Rows(Route::SparseSamples))
+            matches!(step, Step::Rows(Rows::SparseSamples))
         }),
         ("in batches", |step| {
-            matches!(step, Step::Rows(Route::Batches { .. }))
+            matches!(step, Step::Rows(Rows::Batches { .. }))
         }),
         ("as a clip", |step| *step == Step::Piece),
         ("copied into frames", |step| *step == Step::Transposed),
@@ -511,11 +519,11 @@ mod tests {
     }
 
     fn check(engine: &Engine, request: &Request<'_>, expected: &[u8], label: &str) -> String {
-        steps::of(&engine.backend);
+        steps::of(&*engine.machine);
         let text = request.explain().unwrap();
         let found = request.evaluate_bytes().unwrap();
         assert!(found == expected, "{label}: {text}");
-        let done = steps::of(&engine.backend);
+        let done = steps::of(&*engine.machine);
         assert_described(&text, &done, label);
         let pieces = done.iter().filter(|step| **step == Step::Piece).count();
         let counted: usize = text.lines().map(pieces_in).sum();
@@ -612,7 +620,7 @@ mod tests {
             };
             request.stream(chunk, sink).unwrap();
             assert!(found == expected, "{label}, chunks of {chunk}: {text}");
-            let done = steps::of(&engine.backend);
+            let done = steps::of(&*engine.machine);
             assert_described(&text, &done, label);
             let pieces = done.iter().filter(|step| **step == Step::Piece).count();
             let once = text

@@ -2,15 +2,15 @@
 //! check the application's promises about its buffers.
 #![allow(unsafe_code)]
 
+use std::sync::Arc;
+
 use crate::engine::clip::request::{Request, RequestPart};
 use crate::error::Error;
-use crate::evaluate::Backend;
+use crate::gpu::clip::Job;
 use crate::gpu::clip_target::ClipTarget;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::job::Job;
-use crate::gpu::recovery::Opened;
+use crate::machine::error::VulkanError;
 
 impl Request<'_> {
     /// Evaluates into a buffer of the application, on the device that the engine was made from
@@ -28,11 +28,11 @@ impl Request<'_> {
     /// The buffer must belong to the engine's device, be bound to memory, have the usages `STORAGE_BUFFER` and
     /// `TRANSFER_DST`, and contain the range. Nothing else may use the range until this returns.
     pub unsafe fn to_buffer(&self, buffer: VulkanBuffer) -> Result<(), Error> {
-        let (opened, part) = self.for_buffer(buffer)?;
-        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
+        let (_, part) = self.for_buffer(buffer)?;
+        (self.source).with_uploaded(&part, |clip, timeline, window| {
             let to_buffer =
                 |engine: &VulkanEngine, job: Job<'_>| engine.run_into(job, window, buffer);
-            uploaded.on_device(opened, timeline, self.encoding, to_buffer)
+            clip.on_device(timeline, self.encoding, to_buffer)
         })
     }
 
@@ -42,24 +42,23 @@ impl Request<'_> {
     ///
     /// # Errors
     /// As [`Request::to_buffer`]; also when the range is longer than the device can bind, or the clip's segments take
-    /// more than [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory).
+    /// more than [`EngineOptions::memory`](crate::machine::options::EngineOptions::memory).
     ///
     /// # Safety
     /// As [`Request::to_buffer`]; the buffer must live as long as the target, and the target must be dropped after
     /// all work that was recorded with it has ended, and before the device is destroyed.
     pub unsafe fn target(&self, buffer: VulkanBuffer) -> Result<ClipTarget, Error> {
-        let (opened, part) = self.for_buffer(buffer)?;
-        let engine = opened.engine();
-        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
+        let (engine, part) = self.for_buffer(buffer)?;
+        (self.source).with_uploaded(&part, |clip, timeline, window| {
             let target =
                 |_: &VulkanEngine, job: Job<'_>| ClipTarget::new(&engine, job, window, buffer);
-            uploaded.on_device(opened, timeline, self.encoding, target)
+            clip.on_device(timeline, self.encoding, target)
         })
     }
 
     /// The device and the part of the result, if the result fits the range of the buffer.
-    fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(&Opened, RequestPart), Error> {
-        let Backend::Vulkan(opened) = &*self.source.engine().backend else {
+    fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(Arc<VulkanEngine>, RequestPart), Error> {
+        let Some(opened) = self.source.engine().opened() else {
             return Err(Error::BufferOnCpu);
         };
         let engine = opened.engine();
@@ -78,6 +77,6 @@ impl Request<'_> {
                 needed,
             }));
         }
-        Ok((opened, part))
+        Ok((engine, part))
     }
 }

@@ -233,7 +233,8 @@ impl KeyDispatch<'_, '_> {
 
     /// Whether no key of its tracks is negated: a kernel may then read the keys as they are stored.
     pub(crate) fn has_no_negated_key(&self) -> bool {
-        !self.job.request.set.signs_of(self.tracks.clone()).any()
+        let mut tracks = self.tracks.clone();
+        !tracks.any(|track| self.job.request.set.signs(track).any())
     }
 
     /// Writes the kernel's input. Keys that are read in imported memory (as they are stored, if none is negated) are

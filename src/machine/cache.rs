@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::gpu::options::CacheFiles;
+use crate::machine::options::CacheFiles;
 
 /// The environment variable with the directory; an empty value disables the cache.
 pub(crate) const VARIABLE: &str = "TUMBLE_CACHE_DIR";
