@@ -380,7 +380,9 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.stream_request(&request, self.layout, chunk, sink)
             }
-            RequestWork::Groups { engine, groups } => groups.stream(engine, &part.timeline, &part.window, chunk, sink),
+            RequestWork::Groups { engine, groups } => {
+                groups.stream(engine, &part.timeline, &part.window, chunk, sink)
+            }
         }
     }
 
@@ -470,7 +472,9 @@ impl Request<'_> {
             RequestWork::Set(SetWork { engine, request }) => {
                 engine.fill_request(request, self.layout, output)
             }
-            RequestWork::Groups { engine, groups } => groups.fill(engine, &part.timeline, &part.window, output),
+            RequestWork::Groups { engine, groups } => {
+                groups.fill(engine, &part.timeline, &part.window, output)
+            }
         }
     }
 
