@@ -269,7 +269,7 @@ impl GroupedTracks {
             }
         }
         let limits = engine.backend.limits();
-        let plans = Plan::of_groups(&requests, window.layout, encoding, chunk, &limits);
+        let plans = Plan::of_groups(&requests, window, encoding, chunk, &limits);
         let planned = planned.into_iter().zip(requests).zip(plans);
         let planned = planned.map(|((group, request), plan)| GroupWork {
             group,
