@@ -202,7 +202,7 @@ enum WorkSource<'g> {
     /// Segments for any sample times.
     Prepared(Cow<'g, Timeline>),
     /// Segments for the samples of the window.
-    PreparedWindow(PreparedWindow),
+    PreparedWindow(Box<PreparedWindow>),
     Planned(SetRequest<'g>, Plan),
 }
 
@@ -317,7 +317,7 @@ impl GroupedTracks {
                 && plan.chunks == Chunks::PreparedOnce
             {
                 let prepared = PreparedWindow::whole(&engine.backend, request);
-                *source = WorkSource::PreparedWindow(prepared.map_err(of_tracks)?);
+                *source = WorkSource::PreparedWindow(Box::new(prepared.map_err(of_tracks)?));
             }
         }
         let fill = |window: &Window, output: &mut [Quat]| {
