@@ -75,7 +75,7 @@ const BY_HAND: [(&str, Numbers, &str); 7] = [
 ];
 
 /// What a function cannot be written as, and why.
-type Result<T> = std::result::Result<T, String>;
+pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// What numbers a function takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -239,7 +239,7 @@ impl Functions {
 }
 
 /// The comment above a function, as Rust's documentation.
-fn docs(source: &str, name: &str) -> String {
+pub(crate) fn docs(source: &str, name: &str) -> String {
     let before = source
         .split(&format!("\nfn {name}("))
         .next()
@@ -256,7 +256,7 @@ fn docs(source: &str, name: &str) -> String {
         .collect()
 }
 
-fn formatted(text: &str) -> String {
+pub(crate) fn formatted(text: &str) -> String {
     let rustfmt = Command::new("rustfmt")
         .args(["--edition", "2024"])
         .stdin(Stdio::piped())
@@ -344,19 +344,19 @@ impl Types<'_> {
 
 /// An expression in Rust.
 #[derive(Clone)]
-struct Text {
-    text: String,
+pub(crate) struct Text {
+    pub(crate) text: String,
     /// How strongly its outermost operator binds.
-    level: u8,
+    pub(crate) level: u8,
 }
 
 /// A name, a call, an element: nothing binds more strongly.
-const ATOM: u8 = 20;
-const UNARY: u8 = 18;
+pub(crate) const ATOM: u8 = 20;
+pub(crate) const UNARY: u8 = 18;
 /// Always between parentheses as an operand.
-const LOOSE: u8 = 0;
+pub(crate) const LOOSE: u8 = 0;
 
-fn atom(text: impl Into<String>) -> Text {
+pub(crate) fn atom(text: impl Into<String>) -> Text {
     Text {
         text: text.into(),
         level: ATOM,
@@ -365,7 +365,7 @@ fn atom(text: impl Into<String>) -> Text {
 
 impl Text {
     /// As an operand of an operator that binds this strongly.
-    fn within(self, level: u8) -> String {
+    pub(crate) fn within(self, level: u8) -> String {
         match self.level < level {
             true => format!("({})", self.text),
             false => self.text,
@@ -1260,7 +1260,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text) -> Result<Text> {
+pub(crate) fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text) -> Result<Text> {
     use BinaryOperator as Op;
     let (sign, level) = match op {
         Op::Multiply => ("*", 16),
@@ -1330,7 +1330,7 @@ fn prune(lines: &mut Vec<Line>) {
     }
 }
 
-fn field(member: &StructMember) -> &str {
+pub(crate) fn field(member: &StructMember) -> &str {
     member.name.as_deref().unwrap_or_default()
 }
 

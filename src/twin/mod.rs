@@ -9,6 +9,11 @@ pub(crate) mod crowd_entries;
 pub(crate) mod crowd_layers;
 pub(crate) mod crowd_matrices;
 pub(crate) mod crowd_times;
+// As the shaders say it, whatever clippy would say instead.
+#[cfg(feature = "vulkan")]
+#[allow(clippy::all, clippy::pedantic, clippy::restriction, unused, dead_code)]
+#[path = "../../shaders/compiled/entries.rs"]
+pub(crate) mod entries;
 pub(crate) mod euler;
 pub(crate) mod evaluate_arc;
 pub(crate) mod evaluate_polynomial;
@@ -21,6 +26,8 @@ pub(crate) mod f16;
 )]
 #[path = "../../shaders/compiled/functions.rs"]
 pub(crate) mod functions;
+#[cfg(feature = "vulkan")]
+pub(crate) mod machine;
 pub(crate) mod matrix;
 pub(crate) mod pose_add;
 pub(crate) mod pose_blend;
