@@ -288,7 +288,7 @@ fn a_mistake_anywhere_is_found() {
         }
         of_kernels.push((code.kernel, all));
     }
-    assert!(spots.len() > 1000, "only {} were tried", spots.len());
+    assert!(spots.len() > 900, "only {} were tried", spots.len());
     let mut kept = Vec::new();
     for (&spot, kernels) in &spots {
         PLANTED.set(Some(spot));
