@@ -194,8 +194,8 @@ pub(super) struct Count {
     of_workgroups: Lines,
     /// Operations of waves of 32 lanes, and of their lanes.
     pub(super) steps: [u64; 2],
-    /// How many waves entered each line of the file, once for each path.
-    lines: BTreeMap<u32, u64>,
+    /// How many waves entered each line of the file, once for each path, and how many lanes.
+    lines: BTreeMap<u32, [u64; 2]>,
 }
 
 impl Count {
@@ -223,25 +223,25 @@ impl Count {
             for lane in wave {
                 let steps = lane.blocks.steps.borrow();
                 self.steps[1] += steps.values().map(|(_, steps)| *steps as u64).sum::<u64>();
+                for (line, _) in steps.values() {
+                    self.lines.entry(*line).or_default()[1] += 1;
+                }
                 together.extend(steps.iter().map(|(path, block)| (*path, *block)));
             }
             for (line, steps) in together.into_values() {
                 self.steps[0] += steps as u64;
-                *self.lines.entry(line).or_default() += 1;
+                self.lines.entry(line).or_default()[0] += 1;
             }
         }
     }
 
-    /// How often waves entered the function of the generated file whose first line says so, or the first block
-    /// behind that line.
-    fn entered(&self, name: &str) -> u64 {
+    /// How often waves and lanes entered a function of the generated file.
+    fn entered(&self, function: &str) -> [u64; 2] {
         let text = include_str!("../../shaders/compiled/entries.rs");
-        let before = text
-            .lines()
-            .position(|line| line.contains(name))
-            .expect(name) as u32;
-        let mut behind = self.lines.range(before..);
-        behind.next().map_or(0, |(_, count)| *count)
+        let start = format!("fn {function}<");
+        let before = text.lines().position(|line| line.contains(&start));
+        let mut behind = self.lines.range(before.expect("it is a function") as u32..);
+        behind.next().map_or([0; 2], |(_, count)| *count)
     }
 }
 
@@ -616,24 +616,18 @@ fn an_item_for_each_invocation_touches_more_lines() {
     }
 }
 
-/// An invocation looks for an item in one of four iterations or so, but a wave in every one, for some lane of it does.
+/// A lane looks for an item in few of its iterations, but a wave in most, for some lane of it does.
 #[test]
-fn a_wave_switches_segments_in_every_iteration() {
+fn a_wave_switches_segments_more_often_than_its_lanes() {
     let (set, frames) = sparse(96);
     let launch = of_clip(&set, &frames, SLERP, Layout::TrackMajor, Cut::Whole);
     assert_eq!(launch.kernel, Kernel::ArcFramesCoalescedF32);
     let count = launch.run();
-    let iterations = count.entered("fn cell_of<");
-    let switches = count.entered("fn item_of<");
-    println!("{switches} switches in {iterations} iterations");
-    assert!(
-        iterations > 100 && switches <= iterations,
-        "{switches} of {iterations}"
-    );
-    let [wave, lanes] = count.steps;
-    let of_lane = lanes as f64 / 32.0;
-    println!(
-        "{:.2} times as many operations as a lane's",
-        wave as f64 / of_lane
-    );
+    let (iterations, switches) = (count.entered("cell_of"), count.entered("item_of"));
+    let share = |i: usize| switches[i] as f64 / iterations[i] as f64;
+    let (wave, lane) = (share(0), share(1));
+    println!("switches an iteration: a wave's {wave:.2}, a lane's {lane:.2}");
+    assert!(iterations[0] > 100 && iterations[1] == 32 * iterations[0]);
+    assert!(wave > 0.7 && lane < 0.5 * wave, "{wave}, {lane}");
+    assert!(count.steps[1] < 32 * count.steps[0]);
 }
