@@ -112,6 +112,7 @@ mod time;
 mod tracks;
 mod twin;
 pub mod verify;
+mod work;
 
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
@@ -177,6 +178,19 @@ pub mod paths {
     };
     pub use crate::path::speed::PathSpeed;
     pub use crate::pose::follow::Followed;
+}
+
+pub mod trees {
+    //! Kinematic trees: where the bodies of a robot are for the values of its joints.
+    //!
+    //! A [`Tree`] is made of [`TreeBody`]s, or read from MJCF or URDF by the crate `tumble-formats`.
+    //! [`Tree::poses`] and [`Tree::motions`] compute all bodies for a [`Configuration`] of the joints in f64, with the
+    //! same bits on every processor.
+
+    pub use crate::pose::tree::{
+        BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates,
+        JointCounts, JointKind, Mimic, Siblings, Tree, TreeBody, TreeError, TreeJoint,
+    };
 }
 
 pub mod vulkan {

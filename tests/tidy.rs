@@ -264,7 +264,7 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 26] = [
+const LAYERS: [&str; 27] = [
     "names",
     "memory",
     "threads",
@@ -285,6 +285,7 @@ const LAYERS: [&str; 26] = [
     "output",
     "from_keys",
     "cpu",
+    "work",
     "gpu",
     "evaluate",
     FACE,
@@ -351,6 +352,19 @@ fn imports_go_down_the_layers() {
         }
     }
     assert!(checked > 500, "only {checked} imports were found");
+}
+
+/// A plan is made from numbers; machines carry it out.
+#[test]
+fn the_plan_knows_no_machine() {
+    let text = read("src/evaluate/plan.rs");
+    let code = text.split("#[cfg(test)]").next().unwrap();
+    for machine in ["crate::cpu", "crate::gpu", "Backend"] {
+        assert!(
+            !code.contains(machine),
+            "src/evaluate/plan.rs uses {machine}"
+        );
+    }
 }
 
 /// The test of the layers can fail.

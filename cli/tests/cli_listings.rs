@@ -109,6 +109,54 @@ fn devices_and_info_speak_json() {
     assert!((degrees - 0.9f64.to_degrees()).abs() < 1e-3, "{degrees}");
 }
 
+/// A robot whose order of bodies depth first is not that breadth first.
+pub(crate) const ARM: &str = r#"<mujoco model="arm"><worldbody><body name="base">
+  <body name="lower"><joint name="swing" axis="0 0 2" range="-90 90"/>
+    <body name="hand"><joint name="reach" type="slide" range="0 0.5"/></body></body>
+  <body name="lamp"/></body></worldbody>
+  <equality><joint joint1="swing" joint2="reach"/></equality>
+  <keyframe><key name="home" qpos="0 0.1"/></keyframe></mujoco>"#;
+
+#[test]
+fn info_lists_the_bodies_and_joints_of_robots() {
+    let folder = sample_folder();
+    std::fs::write(folder.path().join("arm.xml"), ARM).unwrap();
+    let run = succeed(folder.path(), &["info", "arm.xml"]);
+    let text = String::from_utf8(run.out).unwrap();
+    let expected = [
+        "robot              arm, mjcf",
+        "joints             2; hinges and slides have 2 values",
+        "poses              home",
+        "1 relation between joints (<equality>) not applied",
+        "0     0  base   fixed",
+        "1     1  lower  hinge swing -1.5708 to 1.5708 rad",
+        "2     3  hand   slide reach 0.0000 to 0.5000 m",
+        "3     2  lamp   fixed",
+    ];
+    for line in expected {
+        assert!(text.contains(line), "{line}:\n{text}");
+    }
+    let run = succeed(folder.path(), &["info", "--json", "arm.xml", "a.dat"]);
+    let info: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    assert_eq!(info[0]["robot"], "mjcf");
+    assert_eq!(
+        info[0]["joint_names"],
+        serde_json::json!(["swing", "reach"])
+    );
+    assert_eq!(info[0]["bodies"][2]["breadth_first"], 3);
+    assert_eq!(info[0]["bodies"][1]["joints"][0]["axis"][2], 1.0);
+    assert_eq!(info[1]["tracks"], 2);
+    // A fault is told with its line.
+    std::fs::write(
+        folder.path().join("bad.urdf"),
+        "<robot>\n<link name='a'/><link name='b'/></robot>",
+    )
+    .unwrap();
+    let refused = crate::program::run(folder.path(), &["info", "bad.urdf"]);
+    let expected = "bad.urdf:1:1: error[E901]: `a` and `b` have no parent";
+    assert!(refused.words.contains(expected), "{}", refused.words);
+}
+
 #[test]
 fn generate_is_deterministic_and_can_be_read_back() {
     let folder = sample_folder();

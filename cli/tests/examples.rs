@@ -104,6 +104,7 @@ fn write_inputs(folder: &Path) {
             &fs::read(root().join("data").join(name)).unwrap(),
         );
     }
+    write("arm.xml", crate::cli_listings::ARM.as_bytes());
     let generate = |line: &str| {
         succeed(folder, &line.split(' ').collect::<Vec<_>>());
     };

@@ -276,6 +276,11 @@ codes! {
     McapMessage = "E802", "a message that cannot be read", "The message does not agree with its type. Its topic is refused; the other topics are read.";
     McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, QuaternionStamped, Imu, TransformStamped, TFMessage and Path, encoded in CDR, are read. The message lists the topics of the log.";
     McapRoute = "E804" elsewhere, "a path without times", "All poses of a path have the same stamp, as a planner writes a route. A route has no times; `tumble follow` moves a body along one.";
+    // E9xx and W9xx: robots.
+    RobotXml = "E900" elsewhere, "an XML file that cannot be read", "A robot's file is well-formed XML in UTF-8 without a document type definition, at most 4 MiB with the files that it includes.";
+    RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs.";
+    RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
+    RobotElement = "E903" elsewhere, "an element that is not read", "It would make or move bodies by rules that are not supported; the message says what to use instead.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -335,6 +340,7 @@ codes! {
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
+    RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
 }
 
 impl Code {

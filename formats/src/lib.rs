@@ -66,6 +66,7 @@ pub mod quaternion;
 mod rate;
 pub mod reduce;
 pub mod referred;
+pub mod robot;
 pub mod rotation_form;
 mod rotation_matrix;
 pub mod sample;

@@ -33,6 +33,7 @@ mod origins;
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod readme;
 mod reduce;
+mod robots;
 mod round_trip;
 mod skins;
 mod support;

@@ -26,7 +26,7 @@ use std::path::Path;
 
 use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 
 use entries::Source;
 use functions::Functions;
@@ -73,11 +73,8 @@ fn compile() -> Files {
             code.extend(words.iter().flat_map(|word| word.to_le_bytes()));
             words.len()
         };
-        let bindings = storage.parsed.global_variables.iter();
         compiled.push(Compiled {
-            bindings: bindings
-                .filter(|(_, variable)| variable.binding.is_some())
-                .count(),
+            bindings: storage.bindings(),
             words: emit(&storage),
             texel_words: texels.as_ref().map(emit),
             name: kernel.name,
@@ -213,6 +210,22 @@ impl Module {
             parsed,
             info,
         }
+    }
+
+    /// How it uses the buffer of each binding, in the order of the bindings.
+    fn bindings(&self) -> Vec<&'static str> {
+        let uses = self.info.get_entry_point(0);
+        let variables = self.parsed.global_variables.iter();
+        let bound = variables.filter_map(|(handle, variable)| {
+            let access = match uses[handle] {
+                all if all.contains(GlobalUse::READ | GlobalUse::WRITE) => "ReadWrite",
+                all if all.contains(GlobalUse::WRITE) => "Write",
+                _ => "Read",
+            };
+            Some((variable.binding.as_ref()?.binding, access))
+        });
+        let bound: BTreeMap<_, _> = bound.collect();
+        bound.into_values().collect()
     }
 
     /// Its SPIR-V, which rounds as it is written.

@@ -220,7 +220,8 @@ fn rust_type(module: &Module, ty: Handle<Type>) -> (String, u32) {
 /// A kernel that was compiled, and how long its code is.
 pub(crate) struct Compiled {
     pub(crate) name: String,
-    pub(crate) bindings: usize,
+    /// How it uses the buffer of each binding.
+    pub(crate) bindings: Vec<&'static str>,
     pub(crate) words: usize,
     /// Of its variant that reads texel buffers.
     pub(crate) texel_words: Option<usize>,
@@ -297,8 +298,9 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
         writeln!(
             text,
             "    KernelCode {{ kernel: Kernel::{}, storage: ({name:?}, {words}), texels: {texels:?}, \
-             bindings: {bindings}, segments: {segments} }},",
-            variant(name)
+             bindings: &[{}], segments: {segments} }},",
+            variant(name),
+            bindings.join(", ")
         )
         .unwrap();
     }

@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, StreamingLines, frames, frames_past_caches};
+use crate::output::encoded::EncodedOutput;
 use crate::simd::cache_line::{CacheLine, EACH};
 use crate::simd::dispatch::{
     InLanesInto, VectorWidth, fence, in_lanes_into, streaming_stores_from,
@@ -31,6 +32,65 @@ pub(crate) struct Stage<'o> {
     lines: Option<Box<[CacheLine; LINES]>>,
     /// The end of the staged rotations, counted from the start of the first staging line.
     filled: usize,
+}
+
+/// The destination of consecutive rows in an encoding.
+pub(crate) enum RowStage<'o> {
+    /// As four f32 a value.
+    Values(Stage<'o>),
+    Encoded(EncodedStage<'o>),
+}
+
+/// Encodes consecutive rows: values wait in memory that stays in the first-level cache until there are enough of them.
+pub(crate) struct EncodedStage<'o> {
+    values: Vec<[f32; 4]>,
+    output: EncodedOutput<'o>,
+}
+
+impl<'o> RowStage<'o> {
+    /// As [`Stage::row`].
+    pub(crate) fn row<E>(
+        &mut self,
+        count: usize,
+        mut make: impl FnMut(Range<usize>, &mut RowOutput<'_, 'o>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let stage = match self {
+            Self::Values(stage) => return stage.row(count, make),
+            Self::Encoded(stage) => stage,
+        };
+        let mut first = 0;
+        while first < count {
+            if stage.values.len() + count - first > EACH * LINES {
+                stage.store();
+            }
+            let (start, some) = (stage.values.len(), (count - first).min(EACH * LINES));
+            stage.values.resize(start + some, [0.0; 4]);
+            let values = &mut stage.values[start..];
+            make(first..first + some, &mut RowOutput::Here(values))?;
+            first += some;
+        }
+        Ok(())
+    }
+
+    /// Stores the rest after the last row.
+    pub(crate) fn finish(self) {
+        match self {
+            Self::Values(stage) => stage.finish(),
+            Self::Encoded(mut stage) => stage.store(),
+        }
+    }
+}
+
+impl<'o> EncodedStage<'o> {
+    pub(crate) fn new(output: EncodedOutput<'o>) -> Self {
+        let values = Vec::with_capacity(output.len().min(EACH * LINES));
+        Self { values, output }
+    }
+
+    fn store(&mut self) {
+        self.output.split_off(self.values.len()).store(&self.values);
+        self.values.clear();
+    }
 }
 
 /// The part of the output that is not stored yet.

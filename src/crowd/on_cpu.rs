@@ -17,6 +17,7 @@ use crate::threads::OutOfThreadsError;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::base_positions;
+use crate::work::crowd::FrameStep;
 
 const TASK: usize = 32;
 
@@ -102,28 +103,47 @@ impl InLanes for InstancesTask<'_, '_> {
             // One call: its many instructions are compiled where it stands.
             let into = if is_all { &mut *output } else { &mut *found };
             rotations::<L>(&context, tables, instance, layered, into);
-            if is_all {
-                continue;
+            if !is_all {
+                matrices(scene, &context, instance as u32, found, output);
             }
-            let (matrices, _) = output.as_chunks_mut::<3>();
-            let instance = instance as u32;
-            for ((joint, &rotation), matrix) in (0..).zip(&*found).zip(&mut *matrices) {
-                let moved = context.layered(instance, joint, TRANSLATION);
-                let scale = context.layered(instance, joint, SCALE);
-                *matrix = transform(rotation, moved, scale);
+        }
+    }
+}
+
+/// The matrices of an instance, whose rotations are `found`.
+#[inline(always)]
+fn matrices(
+    scene: CrowdScene<'_>,
+    context: &Layers<'_>,
+    instance: u32,
+    found: &[[f32; 4]],
+    output: &mut [[f32; 4]],
+) {
+    let (matrices, _) = output.as_chunks_mut::<3>();
+    for step in FrameStep::of(scene.values.into()) {
+        match step {
+            // They are there.
+            FrameStep::Positions | FrameStep::Rotations => {}
+            FrameStep::Locals => {
+                for ((joint, &rotation), matrix) in (0..).zip(found).zip(&mut *matrices) {
+                    let moved = context.layered(instance, joint, TRANSLATION);
+                    let scale = context.layered(instance, joint, SCALE);
+                    *matrix = transform(rotation, moved, scale);
+                }
             }
-            if scene.values == CrowdValues::Local {
-                continue;
+            FrameStep::Walk => {
+                for link in &scene.library.links {
+                    let (joint, parent) = (link.joint as usize, link.parent as usize);
+                    matrices[joint] = affine_product(&matrices[parent], &matrices[joint]);
+                }
             }
-            for link in &scene.library.links {
-                let joint = link.joint as usize;
-                matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
-            }
-            if scene.values == CrowdValues::Skinning {
+            FrameStep::Skin => {
                 for (matrix, bind) in matrices.iter_mut().zip(&scene.library.bind) {
                     *matrix = affine_product(matrix, bind);
                 }
             }
+            // Whoever takes the result rounds it.
+            FrameStep::Half => {}
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::engine::clip::Clip;
 use crate::engine::clip::request::Request;
 use crate::error::Error;
 use crate::evaluate::Backend;
+use crate::evaluate::plan::Plan;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
 use crate::gpu::engine::choices::EngineChoices;
@@ -33,7 +34,7 @@ use crate::output::value::OutputValue;
 use crate::prepare::preparation::SetRequest;
 use crate::simd::dispatch::VectorWidth;
 use crate::threads::lock;
-use crate::time::frames::{SampleTimes, Timeline};
+use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
 
 /// The maximum number of worker threads.
@@ -339,17 +340,27 @@ impl Engine {
             .rates()
     }
 
+    /// The values of a request of any quantity.
     pub(crate) fn samples<T>(
         &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        timeline: &Timeline,
+        request: &SetRequest<'_>,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let request = SetRequest::whole(set, &interpolation, timeline);
-        let storage = (self.backend).evaluate(&request, layout)?;
-        let (tracks, samples) = (set.track_count(), timeline.len());
+        let plan = self.plan(request, layout, Encoding::F32, None);
+        let storage = self.backend.evaluate(request, &plan)?;
+        let (tracks, samples) = (request.tracks.len(), request.samples.len());
         Ok(Samples::new(storage, tracks, samples, layout))
+    }
+
+    /// How the engine evaluates a request; with `chunk`, as a stream in chunks of so many values.
+    pub(crate) fn plan(
+        &self,
+        request: &SetRequest<'_>,
+        layout: Layout,
+        encoding: Encoding,
+        chunk: Option<usize>,
+    ) -> Plan {
+        Plan::of(request, layout, encoding, chunk, &self.backend.limits())
     }
 
     /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
@@ -406,8 +417,10 @@ impl Engine {
         }
     }
 
-    /// Describes in words how a set would be evaluated: whether it is prepared, and in which pieces. All routes give
-    /// the same bits.
+    /// Describes in words how a whole set would be evaluated in f32: whether it is prepared, and in which pieces. All
+    /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolation,
+    /// frames).`[`layout`](Request::layout)`(layout).`[`explain`](Request::explain)`()`, which also knows encodings and
+    /// parts of a set.
     ///
     /// # Errors
     /// When the frames do not fit the set.
@@ -418,11 +431,9 @@ impl Engine {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<String, Error> {
-        let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let interpolation = interpolation.into();
-        let request = SetRequest::whole(set, &interpolation, &timeline);
-        let route = (self.backend).route(&request, layout);
-        Ok(route.to_string())
+        self.request(set, interpolation, frames)
+            .layout(layout)
+            .explain()
     }
 }
 

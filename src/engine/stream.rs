@@ -6,117 +6,68 @@ use glam::Quat;
 use crate::checks::{check_encoding, check_window};
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::pieces::SetPieces;
-use crate::method::interpolation::Interpolation;
-use crate::output::buffer::OutputBuffer;
+use crate::evaluate::pieces::PreparedWindow;
+use crate::evaluate::plan::Chunks;
+use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
-use crate::prepare::clip_data::ClipData;
 use crate::prepare::preparation::SetRequest;
 use crate::stream::{Chunk, run};
-use crate::time::frames::Timeline;
-use crate::tracks::set::TrackSet;
-
-/// The limit of the segments that are prepared before the first chunk, if the engine's options have no limit; more
-/// segments are prepared piece by piece.
-const SEGMENT_BYTES: usize = 256 << 20;
 
 impl Engine {
-    /// Evaluates a window of a set's result in chunks of about `chunk` values.
-    pub(crate) fn stream_window<E: From<Error>>(
+    /// Evaluates a request in chunks of about `chunk` values.
+    pub(crate) fn stream_request<E: From<Error>>(
         &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        timeline: &Timeline,
-        window: &Window,
+        request: &SetRequest<'_>,
+        layout: Layout,
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let is_tracks = window.samples == (0..timeline.len());
-        if window.layout == Layout::TrackMajor && is_tracks && timeline.len() <= chunk {
-            let fill = |window: &Window, output: &mut [Quat]| {
-                let request = SetRequest {
-                    tracks: window.tracks.clone(),
-                    ..SetRequest::whole(set, &interpolation, timeline)
+        let plan = self.plan(request, layout, Encoding::F32, Some(chunk));
+        let whole = Window::of(request.tracks.clone(), request.samples.clone(), layout);
+        let (windows, quantity) = (whole.cut(chunk), request.interpolation.quantity);
+        // Nothing comes before an error that could be known.
+        request.check().map_err(Error::from)?;
+        match plan.chunks {
+            Chunks::PreparedOnce => {
+                let prepared = PreparedWindow::whole(&self.backend, request);
+                let prepared = prepared.map_err(Error::from)?;
+                let fill = |window: &Window, output: &mut [Quat]| {
+                    let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
+                    Ok(prepared.evaluate_into(window, output)?)
                 };
-                Ok((self.backend).evaluate_tracks(&request, window.layout, output)?)
-            };
-            return run(window.cut(chunk), interpolation.quantity, fill, sink);
+                run(windows, quantity, fill, sink)
+            }
+            Chunks::Single | Chunks::Each => {
+                let fill = |window: &Window, output: &mut [Quat]| {
+                    let part = request.part(window.tracks.clone(), window.samples.clone());
+                    let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
+                    Ok(self
+                        .backend
+                        .fill(&part, &plan.of_chunk(request, window), output)?)
+                };
+                run(windows, quantity, fill, sink)
+            }
         }
-        // A chunk has some samples of many tracks, or some of one track: every chunk needs segments that others
-        // need too, so all that the window needs are prepared at once, unless that takes too much.
-        let limit = self.backend.budget().unwrap_or(SEGMENT_BYTES);
-        let pieces = SetPieces {
-            backend: &self.backend,
-            set,
-            interpolation: &interpolation,
-            timeline,
-            encoding: Encoding::F32,
-            limit,
-        };
-        let windows = window.cut(chunk);
-        if pieces.bytes(window) > limit {
-            ClipData::unprepared(set, interpolation).map_err(Error::from)?;
-            let fill = |window: &Window, output: &mut [Quat]| {
-                Ok(pieces.evaluate_into(window, bytemuck::cast_slice_mut(output))?)
-            };
-            return run(windows, interpolation.quantity, fill, sink);
-        }
-        let prepared = pieces.prepared(window).map_err(Error::from)?;
-        let fill = |window: &Window, output: &mut [Quat]| {
-            let output = bytemuck::cast_slice_mut(output);
-            Ok(prepared.evaluate_into(window, Encoding::F32, output)?)
-        };
-        run(windows, interpolation.quantity, fill, sink)
     }
 
-    /// Evaluates a window of a set's result into memory, encoded, if they fit.
-    pub(crate) fn encode_window_into(
+    /// Evaluates a request into memory, in an encoding, if they fit.
+    pub(crate) fn fill_request(
         &self,
-        set: &TrackSet,
-        interpolation: Interpolation,
-        timeline: &Timeline,
-        window: &Window,
-        (encoding, output): (Encoding, &mut [u8]),
+        request: &SetRequest<'_>,
+        layout: Layout,
+        output: EncodedOutput<'_>,
     ) -> Result<(), Error> {
-        check_encoding(encoding, interpolation.quantity)?;
-        check_window(window, set.track_count(), timeline.len(), encoding, output)?;
-        if output.is_empty() {
+        let (encoding, timeline) = (output.encoding, request.timeline);
+        check_encoding(encoding, request.interpolation.quantity)?;
+        let window = Window::of(request.tracks.clone(), request.samples.clone(), layout);
+        let tracks = request.set.track_count();
+        check_window(&window, tracks, timeline.len(), encoding, output.bytes)?;
+        if output.len() == 0 {
             return Ok(());
         }
-        let tracks = window.tracks.clone();
-        if window.samples == (0..timeline.len()) {
-            let request = SetRequest {
-                tracks: tracks.clone(),
-                ..SetRequest::whole(set, &interpolation, timeline)
-            };
-            if encoding == Encoding::F32
-                && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
-            {
-                return Ok((self.backend).evaluate_tracks(&request, window.layout, quats)?);
-            }
-            if self.backend.route(&request, window.layout).is_sparse() {
-                // Few are evaluated, whatever they take when they are encoded.
-                let mut quats = OutputBuffer::new(window.len())?;
-                (self.backend).evaluate_tracks(&request, window.layout, &mut quats)?;
-                encoding.encode_all(bytemuck::cast_slice(&quats), output);
-                return Ok(());
-            }
-        }
-        let pieces = |limit| SetPieces {
-            backend: &self.backend,
-            set,
-            interpolation: &interpolation,
-            timeline,
-            encoding,
-            limit,
-        };
-        if let Some(limit) = self.backend.budget() {
-            ClipData::unprepared(set, interpolation)?;
-            return Ok(pieces(limit).evaluate_into(window, output)?);
-        }
-        let prepared = pieces(usize::MAX).prepared(window)?;
-        Ok(prepared.evaluate_into(window, encoding, output)?)
+        let plan = self.plan(request, layout, encoding, None);
+        Ok(self.backend.fill(request, &plan, output)?)
     }
 }

@@ -1,12 +1,9 @@
 //! Prepared tracks on an engine's device.
 
-pub(crate) mod pieces;
-
-use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::evaluate::Backend;
-use crate::evaluate::uploaded::pieces::{SetPieces, segment_bytes};
+use crate::evaluate::plan::segment_bytes;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::job::{ClipBuffers, Job};
@@ -15,6 +12,7 @@ use crate::gpu::recovery::Opened;
 use crate::memory::{OutOfMemoryError, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
@@ -34,9 +32,8 @@ pub(crate) struct Uploaded {
     uploading: Exclusive<()>,
     /// The lists that a device reads for samples that were requested before.
     lists: ListCache,
-    /// The set and the size of its segments, if they exceed the engine's memory limit; then nothing is prepared
-    /// before the evaluation.
-    in_pieces: Option<(TrackSet, usize)>,
+    /// The set, if its segments exceed the engine's memory limit; then nothing is prepared before the evaluation.
+    pub(crate) unprepared: Option<TrackSet>,
 }
 
 impl Uploaded {
@@ -49,8 +46,9 @@ impl Uploaded {
         mut to_prepare: PrepareRequest<'_>,
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
-        to_prepare.group_bytes = backend.group_bytes();
-        to_prepare.lists_arcs = backend.prepares_arcs(to_prepare.batch.keys(set));
+        let limits = backend.limits();
+        to_prepare.group_bytes = limits.group_bytes;
+        to_prepare.lists_arcs = limits.prepares_arcs(to_prepare.batch.keys(set));
         let data = ClipData::new(set, interpolation, to_prepare)?;
         Self::of_data(backend, data, spare)
     }
@@ -69,60 +67,29 @@ impl Uploaded {
             buffers: Mutex::new(buffers),
             uploading: Exclusive::default(),
             lists: ListCache::default(),
-            in_pieces: None,
+            unprepared: None,
         })
     }
 
-    /// Prepares a whole set, for any timeline; in pieces if its segments exceed the engine's memory limit.
+    /// Prepares a whole set, for any timeline; nothing if its segments exceed the engine's memory limit.
     pub(crate) fn whole(
         backend: &Arc<Backend>,
         set: &TrackSet,
         interpolation: Interpolation,
     ) -> Result<Self, EvaluateError> {
         let needed = segment_bytes(set, &interpolation);
-        let Some(limit) = backend.budget().filter(|&limit| needed > limit) else {
+        if backend.limits().memory.is_none_or(|limit| needed <= limit) {
             refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
             return Self::new(backend, set, interpolation, PrepareRequest::all(set), None);
-        };
+        }
         Ok(Self {
             backend: Arc::clone(backend),
             data: ClipData::unprepared(set, interpolation)?,
             buffers: Mutex::default(),
             uploading: Exclusive::default(),
             lists: ListCache::default(),
-            in_pieces: Some((set.clone(), limit)),
+            unprepared: Some(set.clone()),
         })
-    }
-
-    /// The timeline in the form that [`Uploaded::evaluate_into`] requires.
-    pub(crate) fn folded<'t>(
-        &self,
-        timeline: &'t Timeline,
-    ) -> Result<Cow<'t, Timeline>, OutOfMemoryError> {
-        match self.in_pieces {
-            Some(_) => Ok(Cow::Borrowed(timeline)), // each piece folds its samples
-            None => self.data.folded(timeline),
-        }
-    }
-
-    /// A window of the result, in pieces.
-    fn evaluate_pieces(
-        &self,
-        (set, limit): &(TrackSet, usize),
-        timeline: &Timeline,
-        window: &Window,
-        encoding: Encoding,
-        output: &mut [u8],
-    ) -> Result<(), EvaluateError> {
-        let pieces = SetPieces {
-            backend: &self.backend,
-            set,
-            interpolation: &self.data.interpolation,
-            timeline,
-            encoding,
-            limit: *limit,
-        };
-        pieces.evaluate_into(window, output)
     }
 
     /// The memory that the next clip can reuse: that of the segments, and their buffers on a device.
@@ -132,52 +99,48 @@ impl Uploaded {
         (self.data.groups, buffers.and_then(Arc::into_inner))
     }
 
-    /// Evaluates all tracks; the result stays in memory of the device where that saves a copy.
+    /// Evaluates all tracks; the result stays in memory of the device where that saves a copy. Explicit times must have
+    /// been folded into the time range of the keys by the wrap mode ([`ClipData::folded`]).
     pub(crate) fn evaluate(
         &self,
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let timeline = self.folded(timeline)?;
         match &*self.backend {
-            Backend::Vulkan(opened) if self.in_pieces.is_none() => {
-                self.on_device(opened, &timeline, Encoding::F32, |engine, job| {
+            Backend::Vulkan(opened) => {
+                self.on_device(opened, timeline, Encoding::F32, |engine, job| {
                     engine.evaluate(job, layout)
                 })
             }
-            _ => {
+            Backend::Cpu(engine) => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
                 let mut quats = OutputBuffer::new(whole.len())?;
                 let output = bytemuck::cast_slice_mut(&mut quats);
-                self.evaluate_into(&timeline, &whole, Encoding::F32, output)?;
+                engine.evaluate(&self.data, timeline, &whole, output)?;
                 Ok(Box::new(quats))
             }
         }
     }
 
-    /// Evaluates a window of the result into `output`, in an encoding, with the same length. Explicit times must have
-    /// been folded into the time range of the keys by the wrap mode.
+    /// Evaluates a window of the result into `output`, which is exactly as long. The timeline is as in
+    /// [`Uploaded::evaluate`].
     pub(crate) fn evaluate_into(
         &self,
         timeline: &Timeline,
         window: &Window,
-        encoding: Encoding,
-        output: &mut [u8],
+        output: EncodedOutput<'_>,
     ) -> Result<(), EvaluateError> {
-        if let Some(set) = &self.in_pieces {
-            return self.evaluate_pieces(set, timeline, window, encoding, output);
-        }
-        let data = &self.data;
         match &*self.backend {
-            Backend::Cpu(engine) => Ok(match bytemuck::try_cast_slice_mut(&mut *output) {
-                Ok(quats) if encoding == Encoding::F32 => {
-                    engine.evaluate(data, timeline, window, quats)
-                }
-                _ => engine.evaluate_encoded(data, timeline, window, encoding, output),
+            Backend::Cpu(engine) => Ok(match output.into_values() {
+                Ok(values) => engine.evaluate(&self.data, timeline, window, values),
+                Err(encoded) => engine.evaluate_encoded(&self.data, timeline, window, encoded),
             }?),
-            Backend::Vulkan(opened) => self.on_device(opened, timeline, encoding, |engine, job| {
-                engine.evaluate_into(job, window, output)
-            }),
+            Backend::Vulkan(opened) => {
+                let EncodedOutput { encoding, bytes } = output;
+                self.on_device(opened, timeline, encoding, |engine, job| {
+                    engine.evaluate_into(job, window, bytes)
+                })
+            }
         }
     }
 
@@ -189,7 +152,7 @@ impl Uploaded {
         encoding: Encoding,
         mut work: impl FnMut(&VulkanEngine, Job<'_>) -> Result<T, EvaluateError>,
     ) -> Result<T, EvaluateError> {
-        if let Some((set, _)) = &self.in_pieces {
+        if let Some(set) = &self.unprepared {
             let needed = segment_bytes(set, &self.data.interpolation);
             return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
         }

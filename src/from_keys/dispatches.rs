@@ -88,7 +88,7 @@ impl<'a> KeyJob<'a> {
         let in_frames = matches!(timeline.ticks, Ticks::Frames { .. });
         let size = BatchSize {
             keys: limit,
-            tracks: limit / timeline.len().max(1),
+            tracks: limit / self.request.samples.len().max(1),
             cut: in_frames.then_some(TASK_KEYS.min(limit)),
         };
         let task_size = BatchSize {
@@ -97,10 +97,10 @@ impl<'a> KeyJob<'a> {
             cut: None,
         };
         let mut tasks = Vec::new();
-        for batch in batches(set, Batch::Tracks(self.request.tracks.clone()), size) {
+        for batch in batches(set, self.request.batch_of_keys(), size) {
             let parts = match batch {
-                Batch::Tracks(_) => batches(set, batch, task_size),
-                Batch::Intervals { .. } | Batch::Span { .. } => vec![batch],
+                Batch::Tracks(_) | Batch::Span { .. } => batches(set, batch, task_size),
+                Batch::Intervals { .. } => vec![batch],
             };
             for batch in parts {
                 let keys = match &batch {
@@ -109,7 +109,7 @@ impl<'a> KeyJob<'a> {
                         self.keys_of(&batch).map(|track| track.keys.len()).sum()
                     }
                 };
-                let all = batch.samples(set, timeline, false);
+                let all = self.request.samples_of(&batch);
                 tasks.extend(all.clone().step_by(limit).map(|first| KeyTask {
                     batch: batch.clone(),
                     samples: first..all.end.min(first + limit),
@@ -177,7 +177,7 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
         }
         let tracks = tasks.first()?.batch.tracks().start..tasks.last()?.batch.tracks().end;
         let is_whole = |task: &KeyTask| {
-            matches!(task.batch, Batch::Tracks(_)) && task.samples.len() == timeline.len()
+            matches!(task.batch, Batch::Tracks(_)) && task.samples == self.job.request.samples
         };
         let times = |track| set.times_and_keys(track).0;
         let are_alike = matches!(timeline.ticks, Ticks::Frames { .. })

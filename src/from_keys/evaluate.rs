@@ -73,7 +73,7 @@ impl<'a> KeyEvaluator<'a> {
                     self.block.push(keys, left.iter().copied(), &mut output);
                 }
                 Ticks::Times { times, stride } => {
-                    let track_times = &times[index * stride..][..timeline.len()];
+                    let track_times = &times[index * stride..][window.clone()];
                     let mut near = 0;
                     let samples = track_times.iter().map(|&time| {
                         let sample = key_sample(whole.times, time, near);

@@ -8,9 +8,8 @@ pub(crate) mod evaluate;
 
 use crate::curve::options::KeySigns;
 use crate::fit::tangent_weights::WeightRule;
-use crate::method::interpolation::Interpolation;
+use crate::prepare::preparation::SetRequest;
 use crate::shader::{Form, LONGEST_STEP};
-use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
 /// The value of a sample whose curve rotates too far for the small-angle series; no rotation is 0. Such samples are
@@ -34,14 +33,11 @@ impl KeyCurve {
         usize::from(matches!(self, Self::Cubics(_)))
     }
 
-    /// The curves of a set that can be evaluated from keys: it has fewer samples than keys, and its curves are arcs,
-    /// or cubics most of which have small angles. `None` for any other set.
-    pub(crate) fn of_set(
-        set: &TrackSet,
-        interpolation: &Interpolation,
-        timeline: &Timeline,
-    ) -> Option<Self> {
-        let are_fewer = timeline.len() * set.track_count() < set.key_count();
+    /// The curves of a request that can be evaluated from keys: it has fewer samples than keys, and its curves are
+    /// arcs, or cubics most of which have small angles. `None` for any other request.
+    pub(crate) fn of(request: &SetRequest<'_>) -> Option<Self> {
+        let (set, interpolation) = (request.set, request.interpolation);
+        let are_fewer = request.len() < set.keys_of(request.tracks.clone());
         // On the path as authored an arc may exceed half a turn; it is then two segments.
         let arcs_are_short = interpolation.signs == KeySigns::Shortest || set.arcs_are_short();
         if !are_fewer || !arcs_are_short || !interpolation.wrap().are_held() {

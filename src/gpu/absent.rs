@@ -80,6 +80,7 @@ pub(crate) mod engine {
     pub(crate) struct VulkanEngine {
         pub(crate) never: Never,
         pub(crate) group_bytes: usize,
+        pub(crate) prepares_arcs_from: usize,
         pub(crate) clip_bytes: Option<usize>,
         pub(crate) timings: Mutex<Timings>,
         pub(crate) device: Arc<LogicalDevice>,
@@ -109,10 +110,6 @@ pub(crate) mod engine {
         }
 
         pub(crate) fn owns(&self, _buffers: &ClipBuffers) -> bool {
-            match self.never {}
-        }
-
-        pub(crate) fn prepares_arcs(&self, _keys: usize) -> bool {
             match self.never {}
         }
 
@@ -251,13 +248,11 @@ pub(crate) mod crowd {
     use crate::gpu::engine::VulkanEngine;
     use crate::gpu::error::VulkanError;
     use crate::output::crowd::{CrowdFrame, CrowdOutput};
-    use crate::shader::CrowdDispatch;
+    use crate::work::crowd::CrowdShape;
 
     pub(crate) struct CrowdTables {
         pub(crate) instances: u32,
-        pub(crate) levels: Vec<u32>,
-        pub(crate) only_arcs: bool,
-        pub(crate) arguments: CrowdDispatch,
+        pub(crate) shape: CrowdShape,
         pub(crate) clips: Never,
         pub(crate) bases: Never,
         pub(crate) spans: Never,

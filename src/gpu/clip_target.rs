@@ -1,6 +1,6 @@
 //! Recording of a clip's samples into an application's commands, with all resources prepared once.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
@@ -9,11 +9,11 @@ use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kept_lists::KeptLists;
-use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::DescriptorPool;
-use crate::gpu::submission::{Access, Binding, Commands};
+use crate::gpu::recorded::{Binding, Commands, Recorded};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
+use crate::threads::lock;
+use crate::work::recording::Resource;
 
 /// Samples of a clip, prepared for recording into an application's commands, and the buffer for the result
 /// ([`Request::target`](crate::engine::clip::request::Request::target)). The work lists are on the device already:
@@ -21,18 +21,17 @@ use crate::output::window::Window;
 pub struct ClipTarget {
     engine: Arc<VulkanEngine>,
     lists: KeptLists,
-    pipelines: Vec<Arc<Pipeline>>,
-    /// The descriptor set of each window and group that has work.
-    sets: Vec<vk::DescriptorSet>,
+    /// The recording, whose steps depend on the offset and are recorded again each time.
+    work: Mutex<Recorded>,
+    result: Resource,
     encoding: Encoding,
     buffer: VulkanBuffer,
     /// The offset at which the buffer is bound, bytes.
     bound: u64,
     /// The length of the result, bytes.
     bytes: u64,
-    // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
-    // flight when the target is dropped.
-    _pool: DescriptorPool,
+    // The sets lead to it. Whoever records promises that no work that uses it is in flight when the target is
+    // dropped.
     _segments: Arc<ClipBuffers>,
 }
 
@@ -50,35 +49,39 @@ impl ClipTarget {
         let values_per_window = engine
             .at_once()
             .unwrap_or_else(|| engine.window_of(job.encoding));
-        let lists = KeptLists::new(engine.list_request(job), whole, values_per_window)?;
-        let mut pool = DescriptorPool::new(&engine.device);
-        let sets = lists
-            .windows
-            .iter()
-            .map(|kept| kept.work.dispatched().count());
-        pool.make_room(sets.sum::<usize>() as u32)?;
-        let (mut pipelines, mut sets) = (Vec::new(), Vec::new());
-        let result = Binding::range(buffer.buffer, bound, range);
-        for kept in &lists.windows {
-            let pipeline = engine.pipeline(job.kernel(kept.work.list))?;
-            let listed = kept.bindings();
-            for group in kept.work.dispatched() {
-                sets.push(pool.set(&pipeline, &job.bindings(group, &listed, result))?);
-            }
-            pipelines.push(pipeline);
-        }
-        Ok(Self {
+        let lists = KeptLists::new(
+            &engine.device,
+            engine.list_request(job),
+            whole,
+            values_per_window,
+        )?;
+        let mut work = Recorded::new(&engine.device);
+        let result = work.resource(Binding::range(buffer.buffer, bound, range));
+        job.add_kept_sets(&lists, &mut work, result);
+        work.bind(|kernel| engine.pipeline(kernel))?;
+        let target = Self {
             engine: Arc::clone(engine),
             lists,
-            pipelines,
-            sets,
+            work: Mutex::new(work),
+            result,
             encoding: job.encoding,
             buffer,
             bound,
             bytes: whole.len() as u64 * each,
-            _pool: pool,
             _segments: Arc::clone(job.buffers),
-        })
+        };
+        // Later recordings have memory for their steps.
+        target.fill(&mut lock(&target.work), 0);
+        Ok(target)
+    }
+
+    /// Records the steps for a result that starts at this value of the buffer's binding.
+    fn fill(&self, work: &mut Recorded, first: u32) {
+        let recording = &mut work.recording;
+        recording.clear_steps();
+        recording.wait_for_all();
+        let stored = self.engine.stored(self.encoding, 0, first);
+        self.lists.record(recording, self.result, stored);
     }
 
     /// The length of the result, bytes.
@@ -121,27 +124,10 @@ impl ClipTarget {
         }
         // SAFETY: promised by the caller.
         let commands = unsafe { Commands::new(&self.engine.device, commands) };
-        commands.barrier(Access::Any, Access::Kernel);
-        let start = self.buffer.offset + offset;
-        let shift = ((start - self.bound) / each) as u32;
-        let mut sets = self.sets.iter();
-        for (kept, pipeline) in self.lists.windows.iter().zip(&self.pipelines) {
-            let behind = shift + kept.window.start as u32;
-            let like = [
-                kept.window.stride() as u32,
-                self.encoding.row().detail,
-                behind,
-            ];
-            for (group, &set) in kept.work.dispatched().zip(&mut sets) {
-                let (arguments, groups) = self.engine.dispatch_of(&kept.work, group, like);
-                commands.dispatch(pipeline, set, arguments.bytes(), groups);
-            }
-        }
-        for kept in &self.lists.windows {
-            let start = start + kept.window.start as u64 * each;
-            (kept.work).patch(commands, self.buffer.buffer, start, self.encoding);
-        }
-        commands.barrier(Access::Kernel, Access::Any);
+        let first = (self.buffer.offset + offset - self.bound) / each;
+        let mut work = lock(&self.work);
+        self.fill(&mut work, first as u32);
+        work.record(commands, &[]);
         Ok(())
     }
 }

@@ -9,8 +9,8 @@ use ash::vk;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VulkanError {
-    /// The crate was compiled without the feature `vulkan`.
-    #[cfg(not(feature = "vulkan"))]
+    /// The crate was compiled without the feature `vulkan`. The variant is in every build, so that enabling the feature
+    /// takes nothing away.
     #[error(
         "this was built without Vulkan; build it with the feature `vulkan` of the crate `tumble`"
     )]

@@ -17,10 +17,12 @@ use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::job::ClipBuffers;
 use crate::gpu::options::Timings;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::{Access, Semaphore, Spent, Submission};
-use crate::gpu::work_list::Patch;
+use crate::gpu::recorded::{Binding, Recorded};
+use crate::gpu::submission::{Semaphore, Spent, Submission};
 use crate::output::encoding::Encoding;
 use crate::threads::copy;
+use crate::work::lists::Patch;
+use crate::work::recording::Resource;
 
 /// The resources of one piece of work in flight; `U` are its uploads.
 pub(crate) struct InFlight<U> {
@@ -243,38 +245,38 @@ impl KernelResults {
         Ok(())
     }
 
-    /// Submits the recorded kernels and the copy of the first `size` bytes of the results to the host. With `None`,
-    /// the kernels write other memory, which the host can access.
-    pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
-        self.submit_to(size, None)
-    }
-
-    /// As [`KernelResults::submit`]; the results are copied to another host-visible buffer, from an offset on, if one
-    /// is specified.
-    pub(crate) fn submit_to(
+    /// Submits the work of the kernels, which write `result`, and the copy of its first `size` bytes to the host, or to
+    /// another host-visible buffer, from an offset on, if one is specified. Without a size, the kernels write memory
+    /// that the host can access.
+    pub(crate) fn submit(
         &mut self,
+        result: Resource,
         size: Option<u64>,
         destination: Option<(&Buffer, u64)>,
     ) -> Result<(), VulkanError> {
         let kernels = &mut self.kernels;
         let destination = destination.or(self.host.as_ref().map(|host| (host, 0)));
-        let (Some(size), Some(output), Some(destination)) = (size, &self.output, destination)
+        let (Some(size), Some(output), Some((host, offset))) = (size, &self.output, destination)
         else {
-            (kernels.commands()).barrier(Access::Kernel, Access::Host);
+            kernels.work.recording.read_by_host(result);
             return kernels.submit();
         };
         let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
+        let host = Binding::range(host.raw, offset, size.min(host.size - offset));
+        let copy_back = |work: &mut Recorded, result: Resource| {
+            let host = work.resource(host);
+            work.recording.copy(result.slice(0, size), host);
+            work.recording.read_by_host(host);
+        };
         let Some(CopyApart { submission, done }) = &mut self.apart else {
-            (kernels.commands()).barrier(Access::Kernel, Access::Copy);
-            (kernels.commands()).copy_to(output, destination, size);
-            (kernels.commands()).barrier(Access::Copy, Access::Host);
+            copy_back(&mut kernels.work, result);
             return kernels.submit();
         };
         // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
         // barrier in between, and none that the next kernels would wait for.
-        submission.begin(0)?;
-        (submission.commands()).copy_to(output, destination, size);
-        (submission.commands()).barrier(Access::Copy, Access::Host);
+        submission.begin()?;
+        let result = submission.work.whole(output);
+        copy_back(&mut submission.work, result);
         let point = done.advance();
         kernels.submit_between(None, Some(point))?;
         submission.submit_between(Some(point), None)

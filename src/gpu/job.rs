@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::kept_lists::ListCache;
-use crate::gpu::submission::Binding;
-use crate::gpu::work_list::GroupItems;
+use crate::gpu::kept_lists::{KeptLists, ListCache};
+use crate::gpu::recorded::Recorded;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Kernel, List};
 use crate::time::frames::Timeline;
+use crate::work::lists::Work;
+use crate::work::recording::Resource;
 
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
@@ -39,18 +40,30 @@ impl Job<'_> {
         Kernel::over_segments(form, list, self.encoding.row().store)
     }
 
-    /// The buffers that the kernel binds for a group.
-    pub(crate) fn bindings(
+    /// Adds the kernel of each group of a window that has work for the device, with the lists of the window and the
+    /// result.
+    pub(crate) fn add_sets(
         &self,
-        group: &GroupItems,
-        listed: &[Binding],
-        result: Binding,
-    ) -> Vec<Binding> {
-        let (segments, constants) = &self.buffers.groups[group.group];
-        let mut all = vec![Binding::whole(segments), Binding::whole(constants)];
-        all.extend(listed);
-        all.push(result);
-        all
+        work: &mut Recorded,
+        listed: &Work,
+        lists: &[Resource],
+        result: Resource,
+    ) {
+        for group in listed.dispatched() {
+            let (segments, constants) = &self.buffers.groups[group.group];
+            let read = [segments, constants].map(|buffer| work.whole(buffer));
+            let all = read.iter().chain(lists).chain([&result]);
+            let bindings = all.map(|&resource| resource.into());
+            work.recording.set(self.kernel(listed.list), bindings);
+        }
+    }
+
+    /// Adds the kernels of all windows of kept lists.
+    pub(crate) fn add_kept_sets(&self, kept: &KeptLists, work: &mut Recorded, result: Resource) {
+        for window in &kept.windows {
+            let lists = window.resources(work);
+            self.add_sets(work, &window.work, &lists, result);
+        }
     }
 
     /// The window of the whole result.

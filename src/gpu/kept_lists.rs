@@ -1,16 +1,96 @@
-//! Work lists that stay on the device. They depend only on the clip, the samples and the layout, so a repeated
+//! Work lists in memory that kernels read. They depend only on the clip, the samples and the layout, so a repeated
 //! request uses them again.
 
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::submission::{Binding, Submission};
+use crate::gpu::physical::upload_memory::KernelReads;
+use crate::gpu::recorded::Recorded;
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
-use crate::gpu::work_list::{ListRequest, Work, WorkLists};
 use crate::output::window::Window;
+use crate::shader::List;
 use crate::threads::{lock, on_threads};
 use crate::time::frames::{Ticks, Timeline};
+use crate::work::lists::{ListRequest, ListRoom, Lister, Stored, Work};
+use crate::work::recording::{Recording, Resource};
+
+/// The lists of a window for upload to the device, in memory that is kept for the next window.
+#[derive(Default)]
+pub(crate) struct WorkLists {
+    uploads: ListUploads,
+    lister: Lister,
+}
+
+#[derive(Default)]
+struct ListUploads {
+    /// Items, or the samples of a sample list.
+    items: Upload,
+    distances: Upload,
+    /// The blocks of a grid.
+    blocks: Upload,
+}
+
+impl<'r> ListRoom<'r> for (&'r mut ListUploads, &Arc<LogicalDevice>) {
+    type Error = EvaluateError;
+
+    fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], EvaluateError> {
+        let (uploads, device) = self;
+        let mut room: [&mut [u8]; 3] = Default::default();
+        let all = [
+            ("tumble items", &mut uploads.items),
+            ("tumble distances", &mut uploads.distances),
+            ("tumble blocks", &mut uploads.blocks),
+        ];
+        for (((name, upload), bytes), room) in all.into_iter().zip(bytes).zip(&mut room) {
+            if let Some(bytes) = bytes {
+                *room = upload.room(device, name, KernelReads::Often, bytes)?;
+            }
+        }
+        Ok(room)
+    }
+}
+
+impl WorkLists {
+    /// Lists the work of a window. Must be called on one of the engine's threads.
+    pub(crate) fn list(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        request: ListRequest<'_>,
+        window: &Window,
+    ) -> Result<Work, EvaluateError> {
+        let memory = (&mut self.uploads, device);
+        self.lister.list(request, window, memory)
+    }
+
+    /// Frees the buffers that the device has copied.
+    fn forget_written(&mut self) {
+        let ListUploads {
+            items,
+            distances,
+            blocks,
+        } = &mut self.uploads;
+        for upload in [items, distances, blocks] {
+            upload.forget_written();
+        }
+    }
+
+    /// The uploads of a list that kernels read, in the order of their bindings.
+    pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
+        let ListUploads {
+            items,
+            distances,
+            blocks,
+        } = &self.uploads;
+        match list {
+            List::Samples | List::Frames => vec![items],
+            List::Times => vec![items, distances],
+            List::FramesCoalesced => vec![items, blocks],
+            List::TimesCoalesced => vec![items, blocks, distances],
+        }
+    }
+}
 
 /// The lists of a result, window by window, in device memory.
 pub(crate) struct KeptLists {
@@ -27,16 +107,19 @@ pub(crate) struct KeptWindow {
 }
 
 impl KeptWindow {
-    /// The bindings of the lists, in the kernels' order.
-    pub(crate) fn bindings(&self) -> Vec<Binding> {
+    /// The lists as resources of this work, in the order of the kernels' bindings.
+    pub(crate) fn resources(&self, work: &mut Recorded) -> Vec<Resource> {
         let uploads = self.lists.uploads(self.work.list).into_iter();
-        uploads.filter_map(Upload::binding).collect()
+        uploads
+            .filter_map(|upload| upload.resource_of(work))
+            .collect()
     }
 }
 
 impl KeptLists {
     /// Makes the lists of the whole result, in windows of at most this number of values, and uploads them.
     pub(crate) fn new(
+        device: &Arc<LogicalDevice>,
         request: ListRequest<'_>,
         whole: &Window,
         values_per_window: usize,
@@ -44,16 +127,15 @@ impl KeptLists {
         let mut windows = Vec::new();
         for window in whole.cut(values_per_window) {
             let mut lists = WorkLists::default();
-            let list = || lists.list(request, &window);
+            let list = || lists.list(device, request, &window);
             let work = on_threads(list)??;
-            lists.forget_spare();
+            lists.lister = Lister::default(); // only the next list would use it
             windows.push(KeptWindow {
                 window,
                 work,
                 lists,
             });
         }
-        let device = request.device;
         let uploads = || {
             windows
                 .iter()
@@ -61,10 +143,13 @@ impl KeptLists {
         };
         if uploads().any(Upload::is_copied) {
             let mut submission = Submission::new(device, QueueLane::Kernels)?;
-            submission.begin(0)?;
-            Upload::record(uploads(), &mut submission);
-            submission.submit()?;
-            submission.wait()?;
+            submission.begin()?;
+            let work = &mut submission.work;
+            for upload in uploads() {
+                upload.copied_in(work);
+            }
+            work.recording.publish();
+            submission.run()?;
         }
         for window in &mut windows {
             window.lists.forget_written();
@@ -84,6 +169,23 @@ impl KeptLists {
         self.windows
             .get(index)
             .filter(|kept| kept.window == *window)
+    }
+
+    /// Records all windows, with the sets of `Job::add_kept_sets`. `stored` is where the whole result is stored.
+    pub(crate) fn record(&self, recording: &mut Recording, result: Resource, stored: Stored) {
+        let of_window = |window: &Window| Stored {
+            first: stored.first + window.start as u32,
+            stride: window.stride() as u32,
+            ..stored
+        };
+        let mut sets = recording.all_sets();
+        for kept in &self.windows {
+            (kept.work).record(recording, &mut sets, of_window(&kept.window));
+        }
+        for kept in &self.windows {
+            (kept.work).patch(recording, result, of_window(&kept.window));
+        }
+        recording.publish();
     }
 
     /// The size in device memory, bytes.
@@ -122,6 +224,7 @@ impl ListCache {
     /// The lists of a result in windows of this number of values, if they are kept or are to be kept from now on.
     pub(crate) fn lists(
         &self,
+        device: &Arc<LogicalDevice>,
         request: ListRequest<'_>,
         whole: &Window,
         values_per_window: usize,
@@ -133,7 +236,7 @@ impl ListCache {
         {
             let mut kept = lock(&self.0);
             // Those of a device that was lost are of no use.
-            (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, request.device));
+            (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, device));
             if let Some(index) = kept.lists.iter().position(|(known, _)| *known == asked) {
                 kept.lists[..=index].rotate_right(1);
                 return Ok(Some(Arc::clone(&kept.lists[0].1)));
@@ -144,7 +247,7 @@ impl ListCache {
             }
         }
         // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
-        let made = match KeptLists::new(request, whole, values_per_window) {
+        let made = match KeptLists::new(device, request, whole, values_per_window) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
             made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MAX_BYTES),
         };

@@ -11,7 +11,7 @@
 //! * [`Instance`](instance::Instance), [`PhysicalDevice`](physical::PhysicalDevice) with its queue families and memory
 //!   types, [`LogicalDevice`](device::LogicalDevice) with a queue for kernels and, on cards, one for copies;
 //! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands,
-//!   a fence and descriptor sets that are reused;
+//!   a fence and a recording that are reused;
 //! * [`VulkanEngine`](engine::VulkanEngine): a device with its pipelines, and buffers kept for the next call;
 //! * [`Opened`](recovery::Opened): the device for the rest of the crate. It has the current `VulkanEngine`, opens a
 //!   lost device again, and repeats work that ran out of memory in smaller windows.
@@ -22,14 +22,16 @@
 //!    ([`ClipBuffers`](job::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
-//! 3. [`work_list`] lists which samples of a window belong to which segment, as runs, single samples, or a grid;
+//! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples, or a grid;
 //!    [`kept_lists`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
-//! 4. [`submission`] records the copies of the lists, barriers, and a dispatch for each group of segments.
+//! 4. The copies of the lists and a dispatch for each group of segments become a
+//!    [`Recording`](crate::work::recording::Recording), which [`recorded`] writes into commands with the barriers that
+//!    it needs; [`submission`] submits them.
 //! 5. `InFlight::finish` waits for the fence, copies the bytes to the caller if necessary, and overwrites the
 //!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
-//! tables and targets ([`crowd`]), and on cards kernels that do all steps of a frame ([`whole_instances`]).
+//! tables and targets ([`crowd`]).
 //! [`clip_target`] records a clip into an application's commands, and [`pass_target`] records passes over poses from
 //! buffer to buffer.
 //!
@@ -74,6 +76,7 @@ pub(crate) mod pass_target;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
 pub(crate) mod pipeline_cache;
+pub(crate) mod recorded;
 pub(crate) mod recovery;
 pub(crate) mod reports;
 pub(crate) mod run_once;
@@ -81,5 +84,3 @@ pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;
-pub(crate) mod whole_instances;
-pub(crate) mod work_list;

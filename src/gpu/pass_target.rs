@@ -11,12 +11,13 @@ use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::{Access, Binding, Commands, DescriptorPool, Submission};
+use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::gpu::submission::Submission;
 use crate::memory::reserved;
 use crate::output::pose_error::{OFFSET_STEP, PoseError, check_fraction, check_weights};
 use crate::output::rotations::Layout;
 use crate::shader::{Kernel, Link, PoseDispatch};
+use crate::work::recording::{Resource, Slice, workgroups};
 
 /// Bytes of a rotation, and of every other value that passes read or write.
 pub(crate) const VALUE: u64 = size_of::<[f32; 4]>() as u64;
@@ -41,72 +42,78 @@ pub(crate) enum PassJob<'a> {
 /// The shape of a pass: tracks, samples, and their layout.
 pub(crate) type PassShape = (usize, usize, Layout);
 
-/// A layer of a blend that is copied next to the others: its location, and the offset that it is copied to.
-struct GatheredLayer {
-    from: vk::Buffer,
-    from_offset: u64,
-    to_offset: u64,
-}
-
-/// Layers that are copied into one buffer before they are blended.
-struct Gathered {
-    buffer: Buffer,
-    layers: Vec<GatheredLayer>,
-    /// Bytes of a layer.
-    size: u64,
-}
-
 /// A pass over poses, prepared for recording into an application's commands, and the buffers that it reads and writes
 /// ([`PassRequest::target`](crate::pose::pass::PassRequest::target)). Recording does not allocate.
 pub struct PassTarget {
     engine: Arc<VulkanEngine>,
-    pipeline: Arc<Pipeline>,
-    gathered: Option<Gathered>,
-    /// The weights, and where kernels read them.
+    kernel: Kernel,
+    /// All steps of the pass; its input are the weights.
+    work: Recorded,
     weights: Vec<f32>,
-    weights_at: Vec<(vk::Buffer, u64)>,
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
-    dispatches: Vec<(vk::DescriptorSet, PoseDispatch)>,
     bytes: u64,
-    // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
-    // flight when the target is dropped.
-    _pool: DescriptorPool,
+    // The sets lead to them. Whoever records promises that no work that uses them is in flight when the target is
+    // dropped.
     _buffers: Vec<Buffer>,
 }
+
+/// The only input of a pass's recording.
+const WEIGHTS: usize = 0;
 
 /// The resources of a target while it is made.
 struct Parts<'a> {
     engine: &'a VulkanEngine,
+    work: Recorded,
     buffers: Vec<Buffer>,
-    weights_at: Vec<(vk::Buffer, u64)>,
-    /// The buffers and the arguments of each dispatch.
-    dispatches: Vec<(Vec<Binding>, PoseDispatch)>,
 }
 
 impl Parts<'_> {
-    /// A range of `size` bytes that starts `start` bytes after the start of the range `of`.
-    fn range(
-        &self,
-        subject: &'static str,
-        of: VulkanBuffer,
-        start: u64,
-        size: u64,
-    ) -> Result<Binding, VulkanError> {
-        (self.engine.device.physical).check_range(subject, size)?;
-        Ok(Binding::range(of.buffer, of.offset + start, size))
+    /// A range of an application's buffer, of `size` bytes.
+    fn range(&mut self, of: VulkanBuffer, size: u64) -> Resource {
+        self.work
+            .resource(Binding::range(of.buffer, of.offset, size))
+    }
+
+    /// Refuses a binding of more bytes than kernels can bind.
+    fn check(&self, subject: &'static str, size: u64) -> Result<(), VulkanError> {
+        (self.engine.device.physical).check_range(subject, size)
+    }
+
+    /// A buffer of the target.
+    fn owned(&mut self, buffer: Buffer) -> Resource {
+        let resource = self.work.whole(&buffer);
+        self.buffers.push(buffer);
+        resource
     }
 
     /// Memory of the device for `count` weights, which every recording writes.
-    fn weights(&mut self, count: usize) -> Result<Binding, VulkanError> {
+    fn weights(&mut self, count: usize) -> Result<Resource, VulkanError> {
         let size = (count * size_of::<f32>()) as u64;
-        (self.engine.device.physical).check_range("the weights of a blend", size)?;
+        self.check("the weights of a blend", size)?;
         let device = &self.engine.device;
         let buffer = Buffer::new(device, "tumble pass weights", size, Residence::Device)?;
-        let binding = Binding::whole(&buffer);
-        self.weights_at.push((buffer.raw, 0));
-        self.buffers.push(buffer);
-        Ok(binding)
+        let weights = self.owned(buffer);
+        self.work.recording.write_input(weights, WEIGHTS);
+        Ok(weights)
+    }
+
+    /// The layers of a blend one after another: where they are, or copied into a buffer.
+    fn layers(&mut self, layers: &[VulkanBuffer], size: u64) -> Result<Slice, VulkanError> {
+        let all = size.saturating_mul(layers.len() as u64);
+        self.check("the layers of a blend", all)?;
+        if are_bound_together(layers, size) {
+            return Ok(self.range(layers[0], all).into());
+        }
+        let device = &self.engine.device;
+        let buffer = Buffer::new(device, "tumble pass layers", all, Residence::Device)?;
+        let together = self.owned(buffer);
+        for (&layer, index) in layers.iter().zip(0..) {
+            let from = self.range(layer, size);
+            let to = together.slice(index * size, size);
+            self.work.recording.copy(from, to);
+        }
+        Ok(together.slice(0, all))
     }
 
     /// A buffer of `count` reference rotations, followed by room for the weight.
@@ -114,24 +121,18 @@ impl Parts<'_> {
         &mut self,
         count: usize,
         values: impl Iterator<Item = Quat>,
-    ) -> Result<Binding, EvaluateError> {
+    ) -> Result<Resource, EvaluateError> {
         let size = (count as u64 + 1) * VALUE;
-        (self.engine.device.physical).check_range("the reference rotations", size)?;
+        self.check("the reference rotations", size)?;
         let mut references: Vec<[f32; 4]> = reserved(count + 1, "reference rotations")?;
         references.extend(values.take(count).map(|value| value.to_array()));
         references.push([0.0; 4]);
         let bytes = bytemuck::cast_slice(&references);
         let buffer = (self.engine).resident("tumble pass references", bytes, &mut Vec::new())?;
-        let binding = Binding::whole(&buffer);
-        self.weights_at.push((buffer.raw, count as u64 * VALUE));
-        self.buffers.push(buffer);
-        Ok(binding)
-    }
-
-    fn dispatch(&mut self, bindings: Vec<Binding>, count: usize, detail: usize) {
-        let [count, detail] = [count as u32, detail as u32];
-        let arguments = PoseDispatch { count, detail };
-        self.dispatches.push((bindings, arguments));
+        let references = self.owned(buffer);
+        let weight = references.slice(count as u64 * VALUE, VALUE);
+        self.work.recording.write_input(weight, WEIGHTS);
+        Ok(references)
     }
 }
 
@@ -164,44 +165,36 @@ impl PassTarget {
             PassJob::Add(..) => Kernel::PosesAdd,
             PassJob::World(..) => Kernel::PosesWorld,
         };
-        let pipeline = engine.pipeline(kernel)?;
         let mut parts = Parts {
             engine,
+            work: Recorded::new(&engine.device),
             buffers: Vec::new(),
-            weights_at: Vec::new(),
-            dispatches: Vec::new(),
         };
-        let (mut gathered, mut bytes) = (None, size);
+        let mut bytes = size;
+        if count > 0 {
+            // The inputs may just have been written, the result and the weights may still be read.
+            parts.work.recording.wait_for_all();
+        }
         const POSES: &str = "poses";
+        let mut dispatches: Vec<([Option<Slice>; 4], [usize; 2])> = Vec::new();
         match job {
             // Kernels are not dispatched over nothing.
             _ if count == 0 => bytes = 0,
             PassJob::Blend(layers) => {
-                let all = size.saturating_mul(layers.len() as u64);
-                (engine.device.physical).check_range("the layers of a blend", all)?;
-                let input = if are_bound_together(layers, size) {
-                    Binding::range(layers[0].buffer, layers[0].offset, all)
-                } else {
-                    let together = gather(engine, layers, size)?;
-                    let input = Binding::range(together.buffer.raw, 0, all);
-                    gathered = Some(together);
-                    input
-                };
-                let bindings = vec![
-                    input,
-                    parts.weights(layers.len())?,
-                    parts.range(POSES, result, 0, size)?,
-                ];
-                parts.dispatch(bindings, count, layers.len());
+                let input = parts.layers(layers, size)?;
+                let weights = parts.weights(layers.len())?;
+                parts.check(POSES, size)?;
+                let result = parts.range(result, size);
+                let bindings = [input, weights.into(), result.into()];
+                let [input, weights, result] = bindings.map(Some);
+                dispatches.push(([input, weights, result, None], [count, layers.len()]));
             }
             &PassJob::Mix([from, to]) => {
-                let bindings = vec![
-                    parts.range(POSES, from, 0, size)?,
-                    parts.range(POSES, to, 0, size)?,
-                    parts.weights(1)?,
-                    parts.range(POSES, result, 0, size)?,
-                ];
-                parts.dispatch(bindings, count, 0);
+                parts.check(POSES, size)?;
+                let [from, to, result] = [from, to, result].map(|range| parts.range(range, size));
+                let weights = parts.weights(1)?;
+                let bindings = [from, to, weights, result];
+                dispatches.push((bindings.map(|range| Some(range.into())), [count, 0]));
             }
             &PassJob::Add([base, layer], reference) => {
                 // Frame by frame all windows share the references; track by track each value has its track's.
@@ -209,11 +202,12 @@ impl PassTarget {
                     Layout::FrameMajor => count.min(window_of_frames(tracks) * tracks),
                     Layout::TrackMajor => count,
                 };
-                let mut shared: Option<(usize, Binding)> = None;
+                let ranges = [base, layer, result].map(|range| parts.range(range, size));
+                let mut shared: Option<(usize, Resource)> = None;
                 for start in (0..count).step_by(at_once) {
                     let values = at_once.min(count - start);
                     let references = match (shared, layout) {
-                        (Some((length, binding)), _) if length == values => binding,
+                        (Some((length, references)), _) if length == values => references,
                         (_, Layout::FrameMajor) => {
                             parts.references(values, reference.iter().copied().cycle())?
                         }
@@ -224,45 +218,45 @@ impl PassTarget {
                     };
                     shared = Some((values, references));
                     let (start, size) = (start as u64 * VALUE, values as u64 * VALUE);
-                    let bindings = vec![
-                        parts.range(POSES, base, start, size)?,
-                        parts.range(POSES, layer, start, size)?,
-                        references,
-                        parts.range(POSES, result, start, size)?,
-                    ];
-                    parts.dispatch(bindings, values, 0);
+                    parts.check(POSES, size)?;
+                    let [base, layer, result] = ranges.map(|range| range.slice(start, size));
+                    let bindings = [base, layer, references.into(), result];
+                    dispatches.push((bindings.map(Some), [values, 0]));
                 }
             }
             &PassJob::World(local, links) => {
                 bytes = size.saturating_mul(2);
                 let table = bytemuck::cast_slice(links);
                 engine.check_size("a skeleton", table)?;
+                parts.check(POSES, size)?;
+                parts.check("poses in the world", bytes)?;
                 let links = engine.resident("tumble pass skeleton", table, &mut Vec::new())?;
-                let bindings = vec![
-                    parts.range(POSES, local, 0, size)?,
-                    Binding::whole(&links),
-                    parts.range("poses in the world", result, 0, bytes)?,
-                ];
-                parts.buffers.push(links);
-                parts.dispatch(bindings, samples, tracks);
+                let links = parts.owned(links);
+                let [local, result] = [(local, size), (result, bytes)]
+                    .map(|(range, size)| Some(parts.range(range, size).into()));
+                dispatches.push(([local, Some(links.into()), result, None], [samples, tracks]));
             }
         }
-        let mut pool = DescriptorPool::new(&engine.device);
-        pool.make_room(parts.dispatches.len() as u32)?;
-        let dispatches = (parts.dispatches.iter())
-            .map(|(bindings, arguments)| Ok((pool.set(&pipeline, bindings)?, *arguments)))
-            .collect::<Result<_, VulkanError>>()?;
+        let Parts {
+            mut work, buffers, ..
+        } = parts;
+        let recording = &mut work.recording;
+        for (bindings, [count, detail]) in dispatches {
+            let set = recording.set(kernel, bindings.into_iter().flatten());
+            let [count, detail] = [count as u32, detail as u32];
+            let push = PoseDispatch { count, detail };
+            recording.dispatch(set, &push, workgroups(count));
+        }
+        recording.publish();
+        work.bind(|kernel| engine.pipeline(kernel))?;
         Ok(Self {
             engine: Arc::clone(engine),
-            pipeline,
-            gathered,
+            kernel,
+            work,
             weights,
-            weights_at: parts.weights_at,
             are_fractions: !matches!(job, PassJob::Blend(_)),
-            dispatches,
             bytes,
-            _pool: pool,
-            _buffers: parts.buffers,
+            _buffers: buffers,
         })
     }
 
@@ -312,61 +306,17 @@ impl PassTarget {
     }
 
     fn record_into(&self, commands: Commands<'_>) {
-        if self.dispatches.is_empty() {
-            return;
-        }
-        // The inputs may just have been written, the result and the weights may still be read.
-        commands.barrier(Access::Any, Access::KernelAndCopy);
-        if let Some(gathered) = &self.gathered {
-            for layer in &gathered.layers {
-                let from = (layer.from, layer.from_offset);
-                let to = (gathered.buffer.raw, layer.to_offset);
-                commands.copy_range(from, to, gathered.size);
-            }
-        }
-        for &(buffer, offset) in &self.weights_at {
-            commands.update(buffer, offset, bytemuck::cast_slice(&self.weights));
-        }
-        if self.gathered.is_some() || !self.weights_at.is_empty() {
-            commands.barrier(Access::Copy, Access::Kernel);
-        }
-        for (set, arguments) in &self.dispatches {
-            let groups = self.engine.workgroups(arguments.count);
-            let arguments = bytemuck::bytes_of(arguments);
-            commands.dispatch(&self.pipeline, *set, arguments, groups);
-        }
-        commands.barrier(Access::Kernel, Access::Any);
+        (self.work).record(commands, &[bytemuck::cast_slice(&self.weights)]);
     }
 
     /// Runs the pass and waits for its end.
     pub(crate) fn run(&self) -> Result<(), VulkanError> {
         let mut submission = Submission::new(&self.engine.device, QueueLane::Kernels)?;
-        submission.begin(0)?;
+        submission.begin()?;
         self.record_into(submission.commands());
-        submission.submit()?;
-        submission.wait()?;
+        submission.run()?;
         Ok(())
     }
-}
-
-/// Memory for a contiguous copy of the layers of a blend.
-fn gather(
-    engine: &VulkanEngine,
-    layers: &[VulkanBuffer],
-    size: u64,
-) -> Result<Gathered, VulkanError> {
-    let all = size * layers.len() as u64;
-    let device = &engine.device;
-    let layers = (layers.iter().zip(0..)).map(|(layer, index)| GatheredLayer {
-        from: layer.buffer,
-        from_offset: layer.offset,
-        to_offset: index * size,
-    });
-    Ok(Gathered {
-        buffer: Buffer::new(device, "tumble pass layers", all, Residence::Device)?,
-        layers: layers.collect(),
-        size,
-    })
 }
 
 /// The number of frames in a window of poses that are added: a multiple with which every window starts at an offset
@@ -380,7 +330,7 @@ fn window_of_frames(tracks: usize) -> usize {
 impl std::fmt::Debug for PassTarget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PassTarget")
-            .field("pass", &self.pipeline.name)
+            .field("pass", &self.kernel.code(false).0)
             .field("weights", &self.weights)
             .field("bytes", &self.bytes)
             .finish_non_exhaustive()

@@ -7,7 +7,9 @@ use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
-use crate::shader::{CrowdWholeDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
+use crate::shader::{
+    Access, CrowdWholeDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv,
+};
 
 /// The maximum size of push constants, bytes; Vulkan guarantees at least 128.
 const PUSHED: u32 = {
@@ -24,9 +26,7 @@ pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
     pub(crate) set_layout: vk::DescriptorSetLayout,
-    /// The number of buffers that it binds; it writes the last one. (Kernels over whole instances write the last but one
-    /// or the last, which are the same buffer.)
-    pub(crate) bindings: u32,
+    pub(crate) kernel: Kernel,
     /// Whether its input buffers are texel buffers, not storage buffers.
     reads_texels: bool,
     /// The kernel's name, as in [`kernels`](crate::shader::kernels).
@@ -52,7 +52,7 @@ impl Pipeline {
         let (.., reads_texels) = kernel.code(device.reads_texels);
         match reads_texels {
             true => 1,
-            false => kernel.compiled().bindings,
+            false => kernel.compiled().bindings.len() as u32,
         }
     }
 
@@ -68,13 +68,12 @@ impl Pipeline {
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
         let (name, code, reads_texels) = kernel.code(device.reads_texels);
-        let bindings = kernel.compiled().bindings;
         let mut pipeline = Self {
             device: Arc::clone(device),
             raw: vk::Pipeline::null(),
             layout: vk::PipelineLayout::null(),
             set_layout: vk::DescriptorSetLayout::null(),
-            bindings,
+            kernel,
             reads_texels,
             name,
             code_hash: 0,
@@ -92,7 +91,7 @@ impl Pipeline {
                 limit,
             });
         }
-        let list: Vec<_> = (0..bindings)
+        let list: Vec<_> = (0..kernel.compiled().bindings.len() as u32)
             .map(|binding| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(binding)
@@ -144,7 +143,8 @@ impl Pipeline {
     }
 
     pub(crate) fn kind(&self, binding: u32) -> vk::DescriptorType {
-        match self.reads_texels && binding + 1 < self.bindings {
+        let access = self.kernel.compiled().bindings[binding as usize];
+        match self.reads_texels && access == Access::Read {
             true => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
             false => vk::DescriptorType::STORAGE_BUFFER,
         }

@@ -5,8 +5,9 @@ use crate::gpu::device::QueueLane;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
+use crate::work::recording::Slice;
 
 /// Runs a kernel once: copies inputs to the device, and its output back.
 pub(crate) fn run_once(
@@ -52,17 +53,21 @@ fn run_over(
         found.bytes_mut(0..output.len()).copy_from_slice(output);
         found.flush(&(0..output.len()))?;
     }
-    let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
-    // Kernels that store in one of two precisions have a binding for each.
-    bindings.resize(pipeline.bindings as usize, Binding::whole(&found));
     // Made last: dropped first, it waits for its work before the buffers are freed.
     let mut submission = Submission::new(&pipeline.device, QueueLane::Kernels)?;
-    submission.begin(1)?;
-    Upload::record(uploads.iter(), &mut submission);
-    submission.dispatch(pipeline, &bindings, constants, groups)?;
-    (submission.commands()).barrier(Access::Kernel, Access::Host);
-    submission.submit()?;
-    submission.wait()?;
+    submission.begin()?;
+    let work = &mut submission.work;
+    let mut bindings: Vec<Slice> = (uploads.iter())
+        .filter_map(|upload| Some(upload.copied_in(work)?.into()))
+        .collect();
+    let result = work.whole(&found);
+    // Kernels that store in one of two precisions have a binding for each.
+    bindings.resize(pipeline.kernel.compiled().bindings.len(), result.into());
+    let set = work.recording.set(pipeline.kernel, bindings);
+    work.recording.dispatch_with(set, constants, groups);
+    work.recording.read_by_host(result);
+    work.bind(|_| Ok(pipeline))?;
+    submission.run()?;
     found.invalidate(&(0..output.len()))?;
     output.copy_from_slice(found.bytes(0..output.len()));
     Ok(())

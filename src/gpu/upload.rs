@@ -6,7 +6,8 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::upload_memory::{KernelReads, UploadMemory};
-use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::recorded::Recorded;
+use crate::work::recording::Resource;
 
 /// Bytes for kernels, in memory that is kept for the next ones.
 #[derive(Default)]
@@ -48,21 +49,24 @@ impl Upload {
         Ok(written.map_or(&mut [], |buffer| buffer.bytes_mut(0..bytes)))
     }
 
-    /// Records the copies of some uploads, if they are copied, and the barrier for kernels.
-    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
-        let mut any = false;
-        for upload in uploads {
-            if let (Some(from), Some(to)) = (&upload.written, &upload.copied)
-                && upload.used > 0
-            {
-                let size = (upload.used as u64).next_multiple_of(4);
-                submission.commands().copy(from, to, size);
-                any = true;
-            }
+    /// The memory that kernels read, as a resource of this work, which copies it there if it is staged; `None` if
+    /// nothing was uploaded yet.
+    pub(crate) fn copied_in(&self, work: &mut Recorded) -> Option<Resource> {
+        let resource = self.resource_of(work)?;
+        if let (Some(from), Some(_)) = (&self.written, &self.copied)
+            && self.used > 0
+        {
+            let size = (self.used as u64).next_multiple_of(4);
+            let from = work.whole(from);
+            work.recording.copy(from, resource.slice(0, size));
         }
-        if any {
-            (submission.commands()).barrier(Access::Copy, Access::Kernel);
-        }
+        Some(resource)
+    }
+
+    /// As [`Upload::copied_in`], of an upload that the device has copied already.
+    pub(crate) fn resource_of(&self, work: &mut Recorded) -> Option<Resource> {
+        let buffer = self.copied.as_ref().or(self.written.as_ref());
+        buffer.map(|buffer| work.whole(buffer))
     }
 
     /// Whether the device reads a copy.
@@ -81,12 +85,6 @@ impl Upload {
     pub(crate) fn bytes(&self) -> u64 {
         let read = self.copied.as_ref().or(self.written.as_ref());
         read.map_or(0, |buffer| buffer.size)
-    }
-
-    /// The binding for kernels; `None` if nothing was uploaded yet.
-    pub(crate) fn binding(&self) -> Option<Binding> {
-        let buffer = self.copied.as_ref().or(self.written.as_ref());
-        buffer.map(Binding::whole)
     }
 }
 

@@ -84,6 +84,18 @@ impl Interpolation {
         }
     }
 
+    /// As [`Interpolation::check`], and whether the quantity is defined outside the keys: a mirrored velocity is not.
+    pub(crate) fn check_wraps(&self) -> Result<(), InterpolationError> {
+        self.check()?;
+        let wraps = [self.before, self.after];
+        match self.quantity {
+            Quantity::Velocity(_) if wraps.contains(&WrapMode::Mirror) => {
+                Err(InterpolationError::MirroredVelocity)
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// As [`Interpolation::check`], and whether the track `index` of a set fits the ends.
     pub(crate) fn check_track(
         &self,

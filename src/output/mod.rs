@@ -4,6 +4,7 @@
 pub(crate) mod buffer;
 pub(crate) mod component_type;
 pub(crate) mod crowd;
+pub(crate) mod encoded;
 pub(crate) mod encoding;
 pub(crate) mod euler;
 pub(crate) mod pose_error;

@@ -9,3 +9,4 @@ pub(crate) mod poses;
 pub(crate) mod skeleton;
 pub(crate) mod smooth;
 pub(crate) mod transforms;
+pub(crate) mod tree;

@@ -85,7 +85,7 @@ impl Engine {
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
         interpolation.check()?;
-        let group_bytes = self.backend.group_bytes();
+        let group_bytes = self.backend.limits().group_bytes;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
         let only_for = Some(&timeline);
         let data =

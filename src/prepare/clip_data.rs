@@ -12,7 +12,9 @@ use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::error::SetError;
-use crate::prepare::preparation::{Batch, BatchSize, PART_INTERVALS, Preparation, batches};
+use crate::prepare::preparation::{
+    Batch, BatchSize, PART_INTERVALS, Preparation, SetRequest, batches,
+};
 use crate::prepare::prepared::{Prepared, segment_size};
 use crate::prepare::vectors;
 use crate::shader::Form;
@@ -20,7 +22,6 @@ use crate::threads::{self, OutOfThreadsError, on_threads, stop};
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::TrackPart;
-use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::{Channel, VectorTrack};
 
@@ -139,24 +140,13 @@ fn prepare(
 }
 
 impl ClipData {
-    fn check(interpolation: &Interpolation) -> Result<(), InterpolationError> {
-        interpolation.check()?;
-        let wraps = [interpolation.before, interpolation.after];
-        match interpolation.quantity {
-            Quantity::Velocity(_) if wraps.contains(&WrapMode::Mirror) => {
-                Err(InterpolationError::MirroredVelocity)
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// The data of a set that can be interpolated as requested, with nothing prepared: its tracks have no parts.
     pub(crate) fn unprepared(
         set: &TrackSet,
         interpolation: Interpolation,
     ) -> Result<Self, InterpolationError> {
-        Self::check(&interpolation)?;
-        Preparation::check(&interpolation, set)?;
+        let no_samples = Timeline::at(std::sync::Arc::default());
+        SetRequest::whole(set, &interpolation, &no_samples).check()?;
         Ok(Self {
             interpolation,
             groups: Vec::new(),
@@ -172,7 +162,7 @@ impl ClipData {
         interpolation: Interpolation,
         request: PrepareRequest<'_>,
     ) -> Result<Self, SetError> {
-        Self::check(&interpolation)?;
+        interpolation.check_wraps()?;
         let merged_bytes = request.group_bytes.filter(|_| !request.large_groups);
         let groups = prepare(set, &interpolation, request)?;
         Ok(Self::of_groups(groups, set, interpolation, merged_bytes))

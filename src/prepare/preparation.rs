@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use glam::Quat;
 
-use crate::curve::options::{InterpolationError, Quantity};
+use crate::curve::options::{InterpolationError, Quantity, Speed};
 use crate::method::CurveKind;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
@@ -48,17 +48,6 @@ impl Preparation {
             interpolation: *interpolation,
             strategy,
         }
-    }
-
-    /// Refuses a set whose tracks cannot be interpolated as requested.
-    pub(crate) fn check(
-        interpolation: &Interpolation,
-        set: &TrackSet,
-    ) -> Result<(), InterpolationError> {
-        (0..set.track_count()).try_for_each(|track| {
-            let (_, keys) = set.times_and_keys(track);
-            Self::check_track(interpolation, keys, track)
-        })
     }
 
     /// Refuses keys of the track `track` that cannot be interpolated as requested.
@@ -319,17 +308,18 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
     all
 }
 
-/// A request for a set: some of its tracks, by a method, at the samples of a timeline of the whole set.
+/// A request for a set: some samples of some of its tracks, by a method. The timeline is that of the whole set.
 #[derive(Clone)]
 pub(crate) struct SetRequest<'a> {
     pub(crate) set: &'a TrackSet,
     pub(crate) tracks: Range<usize>,
+    pub(crate) samples: Range<usize>,
     pub(crate) interpolation: &'a Interpolation,
     pub(crate) timeline: &'a Timeline,
 }
 
 impl<'a> SetRequest<'a> {
-    /// All tracks.
+    /// All samples of all tracks.
     pub(crate) fn whole(
         set: &'a TrackSet,
         interpolation: &'a Interpolation,
@@ -338,11 +328,105 @@ impl<'a> SetRequest<'a> {
         Self {
             set,
             tracks: 0..set.track_count(),
+            samples: 0..timeline.len(),
             interpolation,
             timeline,
         }
     }
 }
+
+impl SetRequest<'_> {
+    /// The request for other tracks and samples of the same set.
+    pub(crate) fn part(&self, tracks: Range<usize>, samples: Range<usize>) -> Self {
+        Self {
+            tracks,
+            samples,
+            ..self.clone()
+        }
+    }
+
+    /// The number of values of the result.
+    pub(crate) fn len(&self) -> usize {
+        self.tracks.len() * self.samples.len()
+    }
+
+    /// Whether an interval can be prepared without the other intervals of its track: not if tracks continue outside
+    /// their keys, and not if the speed depends on the whole track.
+    pub(crate) fn prepares_apart(&self) -> bool {
+        self.interpolation.wrap().are_held() && self.interpolation.speed == Speed::AsKeyed
+    }
+
+    /// The intervals to prepare: those around the samples, if that leaves out enough of the others, else all.
+    pub(crate) fn batch(&self) -> Batch {
+        let tracks = self.tracks.clone();
+        let span = (self
+            .prepares_apart()
+            .then(|| self.set.time_span())
+            .flatten())
+        .and_then(|of_keys| Some((of_keys, self.time_span()?)));
+        match span {
+            Some(((first, last), (from, to)))
+                if (from - first).max(0.0) + (last - to).max(0.0) >= LEFT_OUT * (last - first) =>
+            {
+                Batch::Span { tracks, from, to }
+            }
+            _ => Batch::Tracks(tracks),
+        }
+    }
+
+    /// The intervals with the keys that the samples are evaluated from: as [`SetRequest::batch`] for frames at a rate;
+    /// listed times are looked up among all keys of a track.
+    pub(crate) fn batch_of_keys(&self) -> Batch {
+        match self.timeline.ticks {
+            Ticks::Frames { .. } => self.batch(),
+            Ticks::Times { .. } => Batch::Tracks(self.tracks.clone()),
+        }
+    }
+
+    /// The first and the last time of the samples.
+    fn time_span(&self) -> Option<(f64, f64)> {
+        let (first, last) = (self.samples.start, self.samples.end.checked_sub(1)?);
+        let (timeline, track) = (self.timeline, self.tracks.start);
+        let tracks = match timeline.ticks {
+            Ticks::Frames { .. } => {
+                return Some((
+                    timeline.time_at(track, first),
+                    timeline.time_at(track, last),
+                ));
+            }
+            Ticks::Times { stride: 0, .. } => track..track + 1,
+            Ticks::Times { .. } => self.tracks.clone(),
+        };
+        let all = tracks.flat_map(|track| {
+            let samples = self.samples.clone();
+            samples.map(move |sample| timeline.time_at(track, sample))
+        });
+        all.fold(None, |span, time| {
+            let (from, to): (f64, f64) = span.unwrap_or((time, time));
+            Some((from.min(time), to.max(time)))
+        })
+    }
+
+    /// The samples of the request that a batch of its tracks has.
+    pub(crate) fn samples_of(&self, batch: &Batch) -> Range<usize> {
+        let of_batch = batch.samples(self.set, self.timeline, self.interpolation.steps());
+        let end = of_batch.end.min(self.samples.end);
+        of_batch.start.max(self.samples.start).min(end)..end
+    }
+
+    /// Refuses what cannot be interpolated as requested, also where no sample needs it.
+    pub(crate) fn check(&self) -> Result<(), InterpolationError> {
+        self.interpolation.check_wraps()?;
+        self.tracks.clone().try_for_each(|track| {
+            let (_, keys) = self.set.times_and_keys(track);
+            Preparation::check_track(self.interpolation, keys, track)
+        })
+    }
+}
+
+/// The part of a set's time that samples must leave out for the intervals in it not to be prepared: finding the others
+/// takes a search in the key times of every track.
+const LEFT_OUT: f64 = 0.25;
 
 #[cfg(test)]
 mod tests {

@@ -70,14 +70,14 @@ impl Prepared {
     }
 
     /// Reserves memory for this number of keys, so that the lists are not copied as they grow, and do not use twice
-    /// the memory.
+    /// the memory; lists that are reused do not grow to twice their length for a few keys more.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
         let refused = |_| OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
         let segments = keys.saturating_add(SPARE_SEGMENTS);
-        self.segments.try_reserve(segments).map_err(refused)?;
-        self.constants.try_reserve(keys).map_err(refused)?;
-        self.spans.try_reserve(keys).map_err(refused)
+        self.segments.try_reserve_exact(segments).map_err(refused)?;
+        self.constants.try_reserve_exact(keys).map_err(refused)?;
+        self.spans.try_reserve_exact(keys).map_err(refused)
     }
 
     /// Removes everything and keeps the memory.
@@ -374,11 +374,11 @@ impl Segments {
         }
     }
 
-    pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
+    pub(crate) fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError> {
         match self.form {
-            Form::Arc if self.are_arcs_listed => self.intervals.try_reserve(count),
-            Form::Arc => self.arcs.try_reserve(count),
-            Form::Polynomial => self.polynomials.try_reserve(count),
+            Form::Arc if self.are_arcs_listed => self.intervals.try_reserve_exact(count),
+            Form::Arc => self.arcs.try_reserve_exact(count),
+            Form::Polynomial => self.polynomials.try_reserve_exact(count),
         }
     }
 

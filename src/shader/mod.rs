@@ -9,6 +9,7 @@ mod generated {
     // The shaders write pi in two parts, and use constants that Rust has no use for.
     #![allow(dead_code, clippy::approx_constant)]
 
+    use super::Access::{Read, ReadWrite, Write};
     use super::{Form, KernelCode};
 
     include!("../../shaders/compiled/kernels.rs");
@@ -35,6 +36,15 @@ struct Aligned<Bytes: ?Sized>(Bytes);
 /// The SPIR-V of all kernels, one after another, as little-endian words.
 static SPIRV: &Aligned<[u8]> = &Aligned(*include_bytes!("../../shaders/compiled/kernels.spv"));
 
+/// How a kernel uses a buffer that it binds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Access {
+    Read,
+    /// Each dispatch writes elements of its own, and reads none.
+    Write,
+    ReadWrite,
+}
+
 /// A compiled kernel: the name of each variant, and its number of words in [`SPIRV`].
 pub(crate) struct KernelCode {
     pub(crate) kernel: Kernel,
@@ -42,8 +52,8 @@ pub(crate) struct KernelCode {
     storage: (&'static str, usize),
     /// The variant that reads texel buffers, for all bindings but the last.
     texels: Option<(&'static str, usize)>,
-    /// The number of buffers that it binds.
-    pub(crate) bindings: u32,
+    /// How it uses the buffers that it binds, in the order of the bindings.
+    pub(crate) bindings: &'static [Access],
     /// For kernels that evaluate segments: the form, the kind of work list, and the stored encoding.
     pub(crate) segments: Option<(Form, List, Store)>,
 }

@@ -207,16 +207,6 @@ impl Timeline {
         }
     }
 
-    /// The same sample times for a set that has only some of the tracks.
-    pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
-        let mut timeline = self.clone();
-        if let Ticks::Times { times, stride: 1.. } = &mut timeline.ticks {
-            let range = tracks.start * self.count..tracks.end * self.count;
-            *times = Arc::new(times[range].to_vec());
-        }
-        timeline
-    }
-
     /// The times for some samples of some tracks, and the index of the first of these samples in it. Explicit times
     /// are only those of the part; frames have the same start as before.
     pub(crate) fn part(

@@ -127,10 +127,10 @@ impl Spans {
         self.keys.reserve_exact(count);
     }
 
-    pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
-        self.starts.try_reserve(count)?;
-        self.sources.try_reserve(count)?;
-        self.keys.try_reserve(count)
+    pub(crate) fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError> {
+        self.starts.try_reserve_exact(count)?;
+        self.sources.try_reserve_exact(count)?;
+        self.keys.try_reserve_exact(count)
     }
 
     pub(crate) fn clear(&mut self) {

@@ -69,7 +69,7 @@ impl Clip {
         };
         check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.folded(&timeline)?;
+        let timeline = self.uploaded.data.folded(&timeline)?;
         let engine = opened.engine();
         let count = (self.track_count() * timeline.len()) as u64;
         let bytes = count.saturating_mul(encoding.bytes() as u64);

@@ -6,7 +6,6 @@ use glam::{Affine3A, Vec3};
 
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
-use crate::gpu::whole_instances::WholeInstances;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::slerp::SLERP;
@@ -16,6 +15,7 @@ use crate::pose::skeleton::Skeleton;
 use crate::shader::{CrowdDispatch, Kernel};
 use crate::tracks::set::TrackSet;
 use crate::twin::machine::Memory;
+use crate::work::whole_instances::WholeInstances;
 use crate::{Device, Engine};
 
 use super::lines::{CARDS, Count, Lane, walk};

@@ -14,9 +14,6 @@ use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::KeyJob;
-use crate::gpu::work_list::grid::{GridRows, write_blocks};
-use crate::gpu::work_list::sample_list::SampleList;
-use crate::gpu::work_list::{Cut, GroupWork, work, write};
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -33,6 +30,9 @@ use crate::time::frames::{SampleTimes, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 use crate::twin::entries::Global;
 use crate::twin::machine::{Memory, UNTOUCHED, Watch};
+use crate::work::lists::grid::{GridRows, write_blocks};
+use crate::work::lists::sample_list::SampleList;
+use crate::work::lists::{Cut, GroupWork, work, write};
 use crate::{Device, Engine};
 
 /// Workgroups of a dispatch that are run, of all that it has.
@@ -443,7 +443,7 @@ fn of_clip(
     };
     Launch {
         kernel: Kernel::over_segments(form, list, Store::F32),
-        groups: grids[0].workgroups(65_535),
+        groups: grids[0].workgroups(),
         inputs,
         arguments: bytes(&[grids[0].arguments]),
     }
@@ -464,8 +464,8 @@ fn dispatch_of(count: usize, stride: usize) -> Dispatch {
 fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     let interpolation = Interpolation::from(method);
     let timeline: Timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
-    let curve = KeyCurve::of_set(set, &interpolation, &timeline).expect("fewer samples than keys");
     let request = SetRequest::whole(set, &interpolation, &timeline);
+    let curve = KeyCurve::of(&request).expect("fewer samples than keys");
     let job = KeyJob {
         request: &request,
         curve,

@@ -21,6 +21,14 @@ use crate::messages::words;
 /// Rotations evaluated at once: 16 MB.
 const CHUNK: usize = 1 << 20;
 
+/// The number of values of a chunk of a result: at least a row.
+pub(crate) fn stream_chunk(layout: Layout, tracks: usize) -> usize {
+    match layout {
+        Layout::TrackMajor => CHUNK,
+        Layout::FrameMajor => CHUNK.max(tracks),
+    }
+}
+
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviceArguments {
     /// The device: auto (the CPU for fewer than 2^20 rotations, else the CPU or a graphics card, whichever is
@@ -286,14 +294,10 @@ impl OpenedDevice {
         layout: Layout,
         sink: &mut ChunkSink<'_>,
     ) -> Result<(), ResultError> {
-        let row = match layout {
-            Layout::TrackMajor => 1,
-            Layout::FrameMajor => set.track_count(),
-        };
         let timeline = frames.resolve(set.track_count(), set.time_span());
         let samples = timeline.map_err(Error::from)?.len();
         self.choose(set.track_count() * samples)?;
-        let chunk = CHUNK.max(row);
+        let chunk = stream_chunk(layout, set.track_count());
         let mut done = 0;
         let result = self
             .engine

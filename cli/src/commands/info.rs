@@ -1,4 +1,6 @@
-//! `tumble info`: what is in a keyframe file.
+//! `tumble info`: what is in a keyframe file, or in a file with a robot.
+
+mod robot;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,23 +14,26 @@ use tumble::reference::angle_between;
 use tumble::{Channel, Interpolation, TrackSet};
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
+use tumble_formats::robot::Robot;
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::curve_warning;
 use crate::batch::entry::InputEntry;
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::{listing, names, words};
+use robot::RobotSummary;
 
 /// Steps that differ by less than this (relative) are even: decimal times are
 /// rarely even to the last bit.
 const EVEN: f64 = 1e-6;
 
-/// Show what keyframe files contain: tracks, keys, times, the largest rotation
+/// Show what files contain: tracks, keys, times, the largest rotation; of robots (MJCF, URDF) bodies and joints
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   tumble info data/pendulum.dat
-  tumble info --json *.dat | jq '.[].tracks'")]
+  tumble info --json *.dat | jq '.[].tracks'
+  tumble info arm.xml")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
@@ -37,7 +42,24 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The report of one input; also the form of the JSON.
+/// The report of one input.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Report {
+    Clip(Box<Summary>),
+    Robot(RobotSummary),
+}
+
+impl Report {
+    fn text(&self) -> String {
+        match self {
+            Self::Clip(summary) => summary.text(),
+            Self::Robot(summary) => summary.text(),
+        }
+    }
+}
+
+/// The report of one clip; also the form of the JSON.
 #[derive(Serialize)]
 struct Summary {
     input: String,
@@ -100,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.json {
         listing::records(&summaries, &failed)?;
     } else {
-        let texts: Vec<String> = summaries.iter().map(Summary::text).collect();
+        let texts: Vec<String> = summaries.iter().map(Report::text).collect();
         listing::text(&texts.join("\n"))?;
     }
     outcome
@@ -110,8 +132,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn summarise(
     arguments: &Arguments,
     path: &Path,
-    summaries: &mut Vec<Summary>,
+    summaries: &mut Vec<Report>,
 ) -> Result<(), Failure> {
+    if Robot::has_extension(path) {
+        summaries.push(Report::Robot(RobotSummary::read(path)?));
+        return Ok(());
+    }
     let loaded = arguments.inputs.load_quietly(path)?;
     let name = names::input(path);
     let several = loaded.clips.len() + loaded.refused.len() > 1;
@@ -132,7 +158,7 @@ fn summarise(
         summary
             .warnings
             .extend(of_curves.map(|warning| warning.to_string()));
-        summaries.push(summary);
+        summaries.push(Report::Clip(Box::new(summary)));
     }
     for refused in &loaded.refused {
         words::note(&refused.to_string());

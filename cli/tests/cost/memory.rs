@@ -4,7 +4,10 @@
 use std::io::{BufReader, Read};
 
 use glam::Quat;
-use tumble::{Chunk, Device, Engine, EngineOptions, Error, Layout, SampleTimes, TrackSet, method};
+use tumble::{
+    Chunk, Device, Encoding, Engine, EngineOptions, Error, Interpolation, Layout, Request,
+    SampleTimes, TrackSet, WrapMode, method,
+};
 use tumble_formats::Loaded;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::read_dat;
@@ -14,9 +17,8 @@ use crate::{one_at_a_time, peak_of};
 
 const MIB: usize = 1 << 20;
 
-/// What reading cost at most, beside what was there before; one at a time.
+/// What reading cost at most, beside what was there before; for one test at a time.
 fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
-    let _one = one_at_a_time();
     let reader = BufReader::with_capacity(1 << 18, input);
     peak_of(|| read_dat("t", reader, &ReadOptions::default()))
 }
@@ -63,6 +65,7 @@ impl<F: FnMut(usize, &mut Vec<u8>)> Read for Lines<F> {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_large_file_is_read_in_bounded_extra_memory() {
+    let _one = one_at_a_time();
     use std::io::Write;
 
     let length = std::env::var("LARGE_FILE").map_or(100_000_000, |text| text.parse().unwrap());
@@ -200,9 +203,63 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
     }
 }
 
+/// Sets evaluated without a limit: in batches, whatever a value is stored as and whichever samples it is of, and in
+/// pieces of 256 MiB where batches cannot be. Each of these once prepared all segments at once.
+#[test]
+fn no_request_prepares_all_segments_at_once() {
+    let _one = one_at_a_time();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let set_of = |tracks: usize, keys: usize| {
+        let times: Vec<f64> = (0..keys).map(|key| key as f64 * 0.01).collect();
+        let key = |key: usize| Quat::from_rotation_y((key % 511) as f32 * 0.01);
+        let keys = (0..tracks * keys).map(key).collect();
+        TrackSet::from_shared_times(times, keys).unwrap()
+    };
+    let peak = |request: &Request<'_>| {
+        let (count, each) = request.size().unwrap();
+        let mut output = vec![0_u64; (count * each).div_ceil(8)];
+        let output = &mut bytemuck::cast_slice_mut::<_, u8>(&mut output)[..count * each];
+        peak_of(|| request.evaluate_into(output).unwrap()).1
+    };
+
+    let (set, method) = (set_of(100, 3000), method::BESSEL_OVERHAUSER);
+    let (segments, limit) = (set.key_count() * 176, 8 * MIB);
+    assert!(segments > 6 * limit);
+    let frames = SampleTimes::fps(120);
+    let request = engine.request(&set, method, &frames);
+    let encodings = Encoding::ALL
+        .into_iter()
+        .map(|it| request.clone().encoding(it));
+    let parts = [0..1200, 300..3400].map(|samples| request.clone().samples(samples));
+    for request in encodings.chain(parts) {
+        let peak = peak(&request);
+        assert!(peak < limit, "{}: {peak}", request.explain().unwrap());
+    }
+
+    let (set, limit) = (set_of(3000, 1500), 256 * MIB);
+    let segments = set.key_count() * 212;
+    assert!(segments > 3 * limit);
+    let frames = SampleTimes::fps(25);
+    let mut looped = Interpolation::from(method);
+    looped.after = WrapMode::Loop;
+    let requests = [
+        engine
+            .request(&set, method, &frames)
+            .layout(Layout::FrameMajor),
+        engine.request(&set, looped, &frames),
+    ];
+    for request in requests {
+        let peak = peak(&request);
+        let explained = request.explain().unwrap();
+        // A piece uses the memory of the one before, and is in two places at most.
+        assert!(peak > limit / 4 && peak < 2 * limit, "{explained}: {peak}");
+    }
+}
+
 /// What is refused costs no more than was read of it and 64 MiB, whatever it claims.
 #[test]
 fn a_refusal_costs_no_more_than_was_read() {
+    let _one = one_at_a_time();
     let wide = |number: usize, line: &mut Vec<u8>| match number {
         0 => line.extend_from_slice(b"# 65536 1\n"),
         1..4 => {

@@ -2,13 +2,12 @@
 //! of each of many tracks, such as the poses of a crowd, each lane evaluates one sample, and no runs are listed.
 
 use bytemuck::Zeroable;
-use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, one};
 use crate::cpu::streaming::{RowOutput, Stage};
-use crate::output::encoding::Encoding;
+use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PartRef};
@@ -37,9 +36,8 @@ impl CpuEngine {
         clip: &ClipData,
         timeline: &Timeline,
         window: &Window,
-        output: &mut [Quat],
+        output: &mut [[f32; 4]],
     ) -> Result<(), SetError> {
-        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         if output.is_empty() {
             return Ok(());
         }
@@ -74,9 +72,9 @@ impl CpuEngine {
         clip: &ClipData,
         timeline: &Timeline,
         window: &Window,
-        encoding: Encoding,
-        output: &mut [u8],
+        output: EncodedOutput<'_>,
     ) -> Result<(), SetError> {
+        let EncodedOutput { encoding, bytes } = output;
         let stop = stop::current();
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
             stop::check_of(stop.as_ref())?;
@@ -86,13 +84,13 @@ impl CpuEngine {
             Ok::<_, SetError>(())
         };
         if window.len() <= TASK {
-            return match output {
+            return match bytes {
                 [] => Ok(()),
-                _ => Ok(task(&mut Vec::new(), window, output)?),
+                _ => Ok(task(&mut Vec::new(), window, bytes)?),
             };
         }
         self.on_threads(|| {
-            let tasks = tasks(window, encoding.bytes(), output).into_par_iter();
+            let tasks = tasks(window, encoding.bytes(), bytes).into_par_iter();
             tasks.try_for_each_init(Vec::new, |rotations, (window, output)| {
                 task(rotations, &window, output)
             })

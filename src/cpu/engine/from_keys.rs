@@ -2,7 +2,6 @@
 //! small-angle series is marked as `UNRESOLVED`; then only the intervals of such samples are prepared, and the
 //! samples are overwritten.
 
-use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::sparse_samples::{Group, intervals_of_frames};
@@ -10,6 +9,7 @@ use crate::cpu::engine::{CpuEngine, TASK, tasks};
 use crate::cpu::streaming::RowOutput;
 use crate::from_keys::evaluate::KeyEvaluator;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
+use crate::output::encoded::EncodedOutput;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::{Batch, BatchSize, PART_INTERVALS, SetRequest, batches};
 use crate::threads::stop;
@@ -25,21 +25,20 @@ impl CpuEngine {
         &self,
         request: &'a SetRequest<'a>,
         curve: KeyCurve,
-        output: &mut [Quat],
+        output: EncodedOutput<'_>,
     ) -> Result<(), SetError> {
         let (set, timeline) = (request.set, request.timeline);
-        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let size = BatchSize {
             keys: TASK_KEYS,
-            tracks: TASK / timeline.len(),
+            tracks: TASK / request.samples.len(),
             cut: in_order.then_some(TASK_KEYS),
         };
         let stop = stop::current();
         let new = || KeyEvaluator::new(request.interpolation, curve);
-        let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
+        let values = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
             stop::check_of(stop.as_ref())?;
-            let window = batch.samples(set, timeline, false);
+            let window = request.samples_of(batch);
             let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
             if is_resolved || window.is_empty() {
                 return Ok(());
@@ -52,11 +51,14 @@ impl CpuEngine {
                     self.resolve(request, track, (window.start, intervals.start), output)
                 })
         };
-        let batches: Vec<Batch> = batches(set, Batch::Tracks(request.tracks.clone()), size);
+        let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: EncodedOutput<'_>| {
+            output.fill(|output| values(evaluator, batch, output))
+        };
+        let batches: Vec<Batch> = batches(set, request.batch_of_keys(), size);
         if let [batch] = &*batches {
             return task(&mut new(), batch, output);
         }
-        let tasks = tasks(set, timeline, &batches, 1, false, output);
+        let tasks = tasks(request, &batches, 1, output);
         self.on_threads(|| {
             (tasks.into_par_iter()).try_for_each_init(new, |evaluator, (batch, output)| {
                 task(evaluator, &batch[0], output)
@@ -87,7 +89,7 @@ impl CpuEngine {
                     tracks,
                     ..request.clone()
                 };
-                self.evaluate_sparse(&request, output)?;
+                self.evaluate_sparse(&request, EncodedOutput::of_values(output))?;
             }
             return Ok(());
         }

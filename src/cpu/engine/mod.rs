@@ -5,12 +5,12 @@ pub(crate) mod clip;
 pub(crate) mod from_keys;
 pub(crate) mod sparse_samples;
 
-use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::row::Row;
 use crate::cpu::scratch::ScratchPool;
-use crate::cpu::streaming::{RowOutput, Stage};
+use crate::cpu::streaming::{EncodedStage, RowOutput, RowStage, Stage};
+use crate::output::encoded::EncodedOutput;
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::{Batch, BatchSize, PART_INTERVALS, SetRequest, batches};
@@ -20,7 +20,6 @@ use crate::threads::{self, OutOfThreadsError, Threads, stop};
 use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::Timeline;
-use crate::tracks::set::TrackSet;
 
 /// The number of rotations of one task: enough to make its overhead small, and few enough to divide a short result
 /// among all threads.
@@ -115,17 +114,16 @@ const BATCH_ROTATIONS: usize = 3 * TASK;
 const BATCH_KEYS: usize = 1024;
 
 impl CpuEngine {
-    /// Evaluates some tracks into `output`, `[track][sample]`. With `cuts_tracks` a long track may be divided into
-    /// parts for several threads.
+    /// Evaluates a request into `output`, `[track][sample]`. With `cuts_tracks` a long track may be divided into parts
+    /// for several threads.
     pub(crate) fn evaluate_batches(
         &self,
         request: &SetRequest<'_>,
         cuts_tracks: bool,
-        output: &mut [Quat],
+        output: EncodedOutput<'_>,
     ) -> Result<(), SetError> {
-        let (set, tracks, timeline) = (request.set, request.tracks.clone(), request.timeline);
-        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
-        let (samples, rotations) = (timeline.len(), output.len());
+        let (set, tracks, timeline) = (request.set, &request.tracks, request.timeline);
+        let (samples, rotations) = (request.samples.len(), output.len());
         let threads = self.thread_count();
         // The more tracks a batch has, the better they fill the blocks that are prepared in lanes;
         // but about eight batches are left for each thread, so that all are busy to the end.
@@ -135,23 +133,27 @@ impl CpuEngine {
             tracks: shared.clamp(TASK / samples, BATCH_ROTATIONS / samples),
             cut: cuts_tracks.then_some(PART_INTERVALS),
         };
-        let keys = set.keys_of(tracks.clone());
-        let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
+        let whole = request.batch();
+        let keys = whole.keys(set);
+        let batches: Vec<Batch> = batches(set, whole, size);
         let samples_of_a_run = || rotations / keys.max(1);
         let stop = stop::current();
-        let work = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
-            let mut stage = Stage::new(
-                self.width,
-                self.streaming_stores,
-                rotations,
-                samples,
-                samples_of_a_run,
-                output,
-            );
+        let work = |(batches, output): (&[Batch], EncodedOutput<'_>)| {
+            let mut stage = match output.into_values() {
+                Ok(values) => RowStage::Values(Stage::new(
+                    self.width,
+                    self.streaming_stores,
+                    rotations,
+                    samples,
+                    samples_of_a_run,
+                    values,
+                )),
+                Err(encoded) => RowStage::Encoded(EncodedStage::new(encoded)),
+            };
             let mut memory = self.scratch_pool.take(request);
             for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
-                let batch_samples = batch.samples(set, timeline, request.interpolation.steps());
+                let batch_samples = request.samples_of(batch);
                 for part in memory.parts() {
                     stage.row(batch_samples.len(), |row, output| {
                         let copy = TrackCopy::of_track(
@@ -171,26 +173,22 @@ impl CpuEngine {
         }
         // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
-        let steps = request.interpolation.steps();
-        let tasks = tasks(set, timeline, &batches, each, steps, output);
+        let tasks = tasks(request, &batches, each, output);
         self.on_threads(|| tasks.into_par_iter().try_for_each(task))?
     }
 }
 
-/// Divides `output` among tasks of `each` consecutive batches; `steps` is the argument of [`Batch::samples`].
+/// Divides `output` among tasks of `each` consecutive batches of a request.
 pub(crate) fn tasks<'b, 'o>(
-    set: &TrackSet,
-    timeline: &Timeline,
+    request: &SetRequest<'_>,
     batches: &'b [Batch],
     each: usize,
-    steps: bool,
-    mut output: &'o mut [[f32; 4]],
-) -> Vec<(&'b [Batch], &'o mut [[f32; 4]])> {
+    mut output: EncodedOutput<'o>,
+) -> Vec<(&'b [Batch], EncodedOutput<'o>)> {
     let with_output = |batches: &'b [Batch]| {
-        let rotations = (batches.iter())
-            .map(|batch| batch.tracks().len() * batch.samples(set, timeline, steps).len());
-        let values = output.split_off_mut(..rotations.sum());
-        (batches, values.unwrap_or_default())
+        let rotations =
+            (batches.iter()).map(|batch| batch.tracks().len() * request.samples_of(batch).len());
+        (batches, output.split_off(rotations.sum()))
     };
     batches.chunks(each).map(with_output).collect()
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::cpu::streaming::RowOutput;
+use crate::output::encoded::EncodedOutput;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::{PART_INTERVALS, Preparation, SetRequest};
 use crate::threads::stop;
@@ -29,7 +30,9 @@ pub(crate) struct Group {
 /// The samples of a track in order of time, and the groups that they form.
 struct Sorted {
     timeline: Timeline,
-    /// The index in the request of each sample; `None` if the samples are in the request's order.
+    /// The index in the timeline of the row's first sample.
+    first: usize,
+    /// The index in the row of each sample; `None` if the samples are in the request's order.
     request_indices: Option<Vec<u32>>,
     groups: Vec<Group>,
 }
@@ -39,39 +42,38 @@ impl CpuEngine {
     pub(crate) fn evaluate_sparse(
         &self,
         request: &SetRequest<'_>,
-        output: &mut [[f32; 4]],
+        mut output: EncodedOutput<'_>,
     ) -> Result<(), SetError> {
-        let samples = request.timeline.len();
-        if output.is_empty() {
+        let samples = request.samples.len();
+        if output.len() == 0 {
             return Ok(());
         }
         let each = (TASK_SAMPLES / samples).max(1);
-        let first = request.tracks.start;
         let stop = stop::current();
-        let task = |(chunk, output): (usize, &mut [[f32; 4]])| {
+        let task = |(tracks, output): (Range<usize>, EncodedOutput<'_>)| {
             stop::during(stop.clone(), || {
-                self.evaluate_sparse_tracks(request, first + chunk * each, output)
+                output.fill(|output| self.evaluate_sparse_tracks(request, tracks, output))
             })
         };
-        if output.len() <= each * samples {
-            return task((0, output));
+        if request.tracks.len() <= each {
+            return task((request.tracks.clone(), output));
         }
-        self.on_threads(|| {
-            let tasks = output.par_chunks_mut(each * samples).enumerate();
-            tasks.try_for_each(task)
-        })?
+        let tasks: Vec<_> = (request.tracks.clone().step_by(each))
+            .map(|first| first..(first + each).min(request.tracks.end))
+            .map(|tracks| (tracks.clone(), output.split_off(tracks.len() * samples)))
+            .collect();
+        self.on_threads(|| tasks.into_par_iter().try_for_each(task))?
     }
 
-    /// Evaluates the samples of consecutive tracks from `first` on.
+    /// Evaluates the samples of some of the request's tracks.
     fn evaluate_sparse_tracks(
         &self,
         request: &SetRequest<'_>,
-        first: usize,
+        tracks: Range<usize>,
         output: &mut [[f32; 4]],
     ) -> Result<(), SetError> {
         stop::check()?;
-        let samples = request.timeline.len();
-        let tracks = first..first + output.len() / samples;
+        let samples = request.samples.len();
         // Tracks that share key times and sample times share their groups too.
         let mut sorted: Vec<(usize, Sorted)> = Vec::new();
         let shares = !matches!(request.timeline.ticks, Ticks::Times { stride: 1.., .. });
@@ -105,7 +107,8 @@ impl CpuEngine {
             };
             for (group, part) in sorted.groups.iter().zip(parts.by_ref()) {
                 let copy = TrackCopy::of_track(group.samples.clone());
-                let values = &mut RowOutput::Here(&mut row[group.samples.clone()]);
+                let in_row = group.samples.start - sorted.first..group.samples.end - sorted.first;
+                let values = &mut RowOutput::Here(&mut row[in_row]);
                 self.part(part, &sorted.timeline, &copy, values)?;
             }
             if let Some(indices) = &sorted.request_indices {
@@ -123,11 +126,12 @@ impl CpuEngine {
 impl Sorted {
     fn new(request: &SetRequest<'_>, track: usize) -> Result<Self, SetError> {
         let timeline = request.timeline;
-        let samples = 0..timeline.len();
+        let samples = request.samples.clone();
         let Ticks::Times { .. } = timeline.ticks else {
             return Ok(Self {
                 groups: intervals_of_frames(request, track, 0, samples),
                 timeline: timeline.clone(),
+                first: request.samples.start,
                 request_indices: None,
             });
         };
@@ -142,7 +146,8 @@ impl Sorted {
             }
         };
         let mut order: Vec<(f64, u32)> = samples
-            .map(|sample| (time_of(sample), sample as u32))
+            .zip(0..)
+            .map(|(sample, index)| (time_of(sample), index))
             .collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let mut groups: Vec<Group> = Vec::new();
@@ -155,6 +160,7 @@ impl Sorted {
         let sorted = Arc::new(order.iter().map(|&(time, _)| time).collect());
         Ok(Self {
             timeline: Timeline::at(sorted),
+            first: 0,
             request_indices: Some(order.into_iter().map(|(_, sample)| sample).collect()),
             groups,
         })

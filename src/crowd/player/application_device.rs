@@ -10,7 +10,7 @@ use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
 use crate::gpu::crowd::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::submission::Commands;
+use crate::gpu::recorded::Commands;
 use crate::output::crowd::CrowdOutput;
 use crate::output::pose_error::OFFSET_STEP;
 

@@ -43,7 +43,7 @@ fn crowd(mapping: Mapping, joints: usize, layers: usize, has_many_bases: bool) -
 /// The kernels of an output, by their names.
 fn kernels(crowd: &Crowd, output: CrowdOutput) -> Vec<&'static str> {
     let device = crowd.device.as_ref().expect("a Vulkan device");
-    let kernels = device.kernels(output).into_iter();
+    let kernels = device.kernels(output).kernels.into_iter();
     kernels.map(|kernel: Kernel| kernel.code(false).0).collect()
 }
 

@@ -25,6 +25,7 @@ use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
 use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
+use crate::work::crowd::CrowdShape;
 
 /// The clock's limit, ticks: below it, f64 represents all whole numbers.
 const FARTHEST: f64 = (1u64 << 52) as f64;
@@ -128,9 +129,11 @@ impl Crowd {
         }));
         let tables = CrowdTables {
             instances: self.instance_count() as u32,
-            levels: library.levels.clone(),
-            only_arcs: clip_tables.has_only_arcs(),
-            arguments: self.arguments,
+            shape: CrowdShape {
+                levels: library.levels.clone(),
+                only_arcs: clip_tables.has_only_arcs(),
+                arguments: self.arguments,
+            },
             clips: engine.crowd_table("tumble crowd clips", &clip_tables.clips)?,
             bases: engine.crowd_table("tumble crowd time bases", &clip_tables.bases)?,
             spans: engine.crowd_table("tumble crowd spans", &clip_tables.spans)?,

@@ -10,7 +10,7 @@ use crate::engine::Engine;
 use crate::engine::clip::request::Request;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
-use crate::output::encoding::Encoding;
+use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
@@ -77,7 +77,8 @@ impl Clip {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let storage = (self.uploaded).evaluate(timeline, layout)?;
+        let timeline = self.uploaded.data.folded(timeline)?;
+        let storage = (self.uploaded).evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -101,20 +102,21 @@ impl Clip {
     }
 
     /// Evaluates a window of the result into `output`, in an encoding; refuses windows and outputs that do not fit.
-    pub(crate) fn encode_window_into(
+    pub(crate) fn fill_window(
         &self,
         timeline: &Timeline,
         window: &Window,
-        encoding: Encoding,
-        output: &mut [u8],
+        output: EncodedOutput<'_>,
     ) -> Result<(), Error> {
+        let encoding = output.encoding;
         check_encoding(encoding, self.quantity())?;
-        check_window(window, self.track_count(), timeline.len(), encoding, output)?;
-        if output.is_empty() {
+        let tracks = self.track_count();
+        check_window(window, tracks, timeline.len(), encoding, output.bytes)?;
+        if output.len() == 0 {
             return Ok(());
         }
-        let timeline = self.uploaded.folded(timeline)?;
-        Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
+        let timeline = self.uploaded.data.folded(timeline)?;
+        Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
     }
 
     /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
@@ -131,10 +133,10 @@ impl Clip {
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let timeline = self.uploaded.folded(timeline).map_err(Error::from)?;
+        let timeline = self.uploaded.data.folded(timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
-            let bytes = bytemuck::cast_slice_mut(output);
-            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
+            let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
+            Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
         };
         run(window.cut(chunk), self.quantity(), fill, sink)
     }

@@ -8,10 +8,11 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::options::PrepareArcs;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::reports::DeviceKind;
-use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{ArcsDispatch, Kernel};
+use crate::work::recording::{Slice, workgroups};
 
 /// Keys whose arcs a card prepares: 1 MiB of arcs. To copy fewer takes no longer than to wait for a dispatch.
 const MANY_KEYS: usize = (1 << 20) / 32;
@@ -56,7 +57,6 @@ impl VulkanEngine {
         if listed.is_empty() {
             return Ok(());
         }
-        let pipeline = self.pipeline(Kernel::PrepareArcs)?;
         let mut uploads = Vec::with_capacity(listed.len());
         for &(intervals, _) in &listed {
             let (mut upload, reads) = (Upload::default(), KernelReads::Once);
@@ -67,23 +67,23 @@ impl VulkanEngine {
         }
         // Made last: dropped first, it waits for its work before the buffers are freed.
         let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
-        submission.begin(listed.len() as u32)?;
-        Upload::record(uploads.iter(), &mut submission);
-        for ((intervals, (segments, constants)), upload) in listed.iter().zip(&uploads) {
-            let bindings: Vec<Binding> = ([Some(Binding::whole(constants)), upload.binding()])
-                .into_iter()
-                .flatten()
-                .chain([Binding::whole(segments)])
-                .collect();
+        submission.begin()?;
+        let work = &mut submission.work;
+        let lists: Vec<_> = (uploads.iter())
+            .filter_map(|upload| upload.copied_in(work))
+            .collect();
+        for ((intervals, (segments, constants)), list) in listed.iter().zip(lists) {
+            let [constants, segments] = [constants, segments].map(|buffer| work.whole(buffer));
+            let bindings = [constants, list, segments].map(Slice::from);
+            let set = work.recording.set(Kernel::PrepareArcs, bindings);
             let count = intervals.len() as u32;
-            let arguments = ArcsDispatch { count };
-            let arguments = bytemuck::bytes_of(&arguments);
-            submission.dispatch(&pipeline, &bindings, arguments, self.workgroups(count))?;
+            let push = ArcsDispatch { count };
+            work.recording.dispatch(set, &push, workgroups(count));
         }
         // Whatever is submitted later, an application's work too, sees the arcs.
-        (submission.commands()).barrier(Access::Kernel, Access::Any);
-        submission.submit()?;
-        submission.wait()?;
+        work.recording.publish();
+        work.bind(|kernel| self.pipeline(kernel))?;
+        submission.run()?;
         Ok(())
     }
 }
@@ -136,11 +136,12 @@ mod tests {
         let size = bytes as u64;
         let host = Buffer::new(&engine.device, "test", size, Residence::Readback).unwrap();
         let mut submission = Submission::new(&engine.device, QueueLane::Kernels).unwrap();
-        submission.begin(0).unwrap();
-        submission.commands().copy(buffer, &host, size);
-        (submission.commands()).barrier(Access::Copy, Access::Host);
-        submission.submit().unwrap();
-        submission.wait().unwrap();
+        submission.begin().unwrap();
+        let work = &mut submission.work;
+        let [from, to] = [buffer, &host].map(|buffer| work.whole(buffer));
+        work.recording.copy(from.slice(0, size), to);
+        work.recording.read_by_host(to);
+        submission.run().unwrap();
         host.invalidate(&(0..bytes)).unwrap();
         host.bytes(0..bytes).to_vec()
     }

@@ -15,10 +15,11 @@ use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::in_flight::{Finish, InFlight, Target};
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::Binding;
+use crate::gpu::recorded::Binding;
 use crate::gpu::upload::Upload;
 use crate::output::encoding::Encoding;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
+use crate::work::recording::Slice;
 
 /// The data that the host writes for one dispatch.
 #[derive(Default)]
@@ -108,16 +109,7 @@ impl VulkanEngine {
             bytemuck::cast_slice_mut(samples),
             bytemuck::cast_slice_mut(weights),
         )?;
-        let keys = in_place.is_none().then_some(&uploads.keys);
         let weights = (weight_bytes > 0).then_some(&uploads.weights);
-        let written = [keys, Some(&uploads.samples), weights]
-            .into_iter()
-            .flatten();
-        let keys_in_place = in_place.map(|keys| Binding::whole(&keys.buffer));
-        let bindings: Vec<Binding> = (keys_in_place.into_iter())
-            .chain(written.clone().filter_map(Upload::binding))
-            .chain([rotations])
-            .collect();
         let rows = dispatch.rows(self.maps_samples);
         let groups = [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
@@ -126,12 +118,22 @@ impl VulkanEngine {
         ];
         flight.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let kernels = &mut flight.results.kernels;
-        kernels.begin(1)?;
-        Upload::record(written, kernels);
-        kernels.dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
-        flight
-            .results
-            .submit(destination.is_none().then_some(size))?;
+        kernels.begin()?;
+        let work = &mut kernels.work;
+        let keys = match in_place {
+            Some(keys) => Some(work.whole(&keys.buffer)),
+            None => uploads.keys.copied_in(work),
+        };
+        let samples = uploads.samples.copied_in(work);
+        let weights = weights.and_then(|weights| weights.copied_in(work));
+        let result = work.resource(rotations);
+        let bindings = [keys, samples, weights, Some(result)];
+        let bindings = bindings.into_iter().flatten().map(Slice::from);
+        let set = work.recording.set(pipeline.kernel, bindings);
+        work.recording.dispatch(set, &rows, groups);
+        work.bind(|_| Ok(pipeline))?;
+        let size = destination.is_none().then_some(size);
+        flight.results.submit(result, size, None)?;
         flight.done = Some(Finish {
             output,
             encoding: Encoding::F32,

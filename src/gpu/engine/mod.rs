@@ -25,6 +25,7 @@ use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
 use crate::gpu::job::{ClipBuffers, Job};
+use crate::gpu::kept_lists::WorkLists;
 use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
@@ -33,9 +34,8 @@ use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::run_once::run_once;
-use crate::gpu::submission::{Access, Submission};
+use crate::gpu::submission::Submission;
 use crate::gpu::upload::writable;
-use crate::gpu::work_list::{ListRequest, WorkLists};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -45,6 +45,8 @@ use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
+use crate::work::lists::ListRequest;
+use crate::work::recording::workgroups;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
 /// require fewer.
@@ -71,7 +73,7 @@ pub(crate) struct VulkanEngine {
     /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
     /// The number of keys from which on the arcs between them are prepared on the device.
-    prepares_arcs_from: usize,
+    pub(crate) prepares_arcs_from: usize,
     /// Whether the caller's memory is imported if the device can.
     pub(crate) imports: bool,
     /// Rotations of one window.
@@ -335,7 +337,6 @@ impl VulkanEngine {
     /// The request for the work lists of a job.
     pub(crate) fn list_request<'a>(&'a self, job: Job<'a>) -> ListRequest<'a> {
         ListRequest {
-            device: &self.device,
             maps_samples: self.maps_samples,
             clip: job.clip,
             timeline: job.timeline,
@@ -399,11 +400,12 @@ impl VulkanEngine {
         }
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
-        submission.begin(0)?;
-        (submission.commands()).copy(&upload, &resident, upload.size);
-        (submission.commands()).barrier(Access::Copy, Access::Kernel);
-        submission.submit()?;
-        submission.wait()?;
+        submission.begin()?;
+        let work = &mut submission.work;
+        let [from, to] = [&upload, &resident].map(|buffer| work.whole(buffer));
+        work.recording.copy(from, to);
+        work.recording.publish();
+        submission.run()?;
         Ok(resident)
     }
 
@@ -496,7 +498,7 @@ impl VulkanEngine {
             self.check_size("poses", bytes)?;
         }
         let [count, detail] = [count as u32, detail as u32];
-        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
+        let (pipeline, groups) = (self.pipeline(kernel)?, workgroups(count));
         let pass = PoseDispatch { count, detail };
         run_once(&pipeline, inputs, bytemuck::bytes_of(&pass), groups, output)
     }

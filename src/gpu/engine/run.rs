@@ -6,22 +6,21 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
 use crate::gpu::job::Job;
-use crate::gpu::kept_lists::KeptLists;
-use crate::gpu::submission::{Access, Binding, Submission};
-use crate::gpu::upload::Upload;
-use crate::gpu::work_list::{GroupItems, Work, WorkLists};
+use crate::gpu::kept_lists::{KeptLists, WorkLists};
+use crate::gpu::recorded::Binding;
+use crate::gpu::submission::Submission;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
-use crate::shader::{Dispatch, Grid, Item, LINE, List, WORKGROUP};
+use crate::shader::Item;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
+use crate::work::lists::Stored;
 
 /// The maximum size of the lines in which a card's memory is written, bytes.
 const LINE_BYTES: u64 = 128;
@@ -33,24 +32,6 @@ fn aligned_before(start: u64, rotation: u64, alignment: u64) -> Option<u64> {
         aligned = aligned.checked_sub(alignment)?;
     }
     Some(aligned)
-}
-
-/// The push constants of one dispatch over segments.
-#[derive(Clone, Copy)]
-pub(crate) enum Arguments {
-    /// For a grid, in which neighbouring invocations evaluate neighbouring samples.
-    Grid(Grid),
-    /// For items, or for listed samples.
-    Listed(Dispatch),
-}
-
-impl Arguments {
-    pub(crate) fn bytes(&self) -> &[u8] {
-        match self {
-            Self::Grid(grid) => bytemuck::bytes_of(grid),
-            Self::Listed(dispatch) => bytemuck::bytes_of(dispatch),
-        }
-    }
 }
 
 impl VulkanEngine {
@@ -96,7 +77,8 @@ impl VulkanEngine {
         if self.clip_bytes.is_some() {
             return Ok(None);
         }
-        (job.lists).lists(self.list_request(job), whole, values_per_window)
+        let request = self.list_request(job);
+        (job.lists).lists(&self.device, request, whole, values_per_window)
     }
 
     /// Evaluates a window of a result, divided into smaller windows that suit the device.
@@ -146,59 +128,50 @@ impl VulkanEngine {
             }
             None => (flight.results.room(&self.device, size, staged)?).raw,
         };
-        let rotations = Binding::range(buffer, aligned, size);
         let kernels = &mut flight.results.kernels;
-        let (listed, fresh);
-        let work = match kept.and_then(|kept| kept.of(window)) {
+        let (lists, fresh);
+        let listed = match kept.and_then(|kept| kept.of(window)) {
             Some(kept) => {
-                kernels.begin(kept.work.groups.len() as u32)?;
-                listed = kept.bindings();
+                kernels.begin()?;
+                lists = kept.resources(&mut kernels.work);
                 &kept.work
             }
             None => {
-                let lists = &mut flight.uploads;
-                let list = || lists.list(self.list_request(job), window);
+                let uploads = &mut flight.uploads;
+                let list = || uploads.list(&self.device, self.list_request(job), window);
                 fresh = on_threads(list)??;
-                kernels.begin(fresh.groups.len() as u32)?;
-                let uploads = lists.uploads(fresh.list);
-                Upload::record(uploads.iter().copied(), kernels);
-                listed = uploads.into_iter().filter_map(Upload::binding).collect();
+                kernels.begin()?;
+                let uploads = uploads.uploads(fresh.list).into_iter();
+                let copied = uploads.filter_map(|upload| upload.copied_in(&mut kernels.work));
+                lists = copied.collect();
                 &fresh
             }
         };
-        let pipeline = self.pipeline(job.kernel(work.list))?;
+        let pipeline = self.pipeline(job.kernel(listed.list))?;
         flight.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
-        let stride = window.stride() as u32;
-        for group in work.dispatched() {
-            let bindings = job.bindings(group, &listed, rotations);
-            let like = [stride, encoding.row().detail, shift as u32];
-            let (arguments, groups) = self.dispatch_of(work, group, like);
-            kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
-        }
-        let external = match target {
-            Target::External(range) => Some(range.buffer),
-            Target::Exported(result) => Some(result.buffer.raw),
-            _ => None,
-        };
-        if let Some(external) = external {
-            let commands = kernels.commands();
-            work.patch(commands, external, start, encoding);
-            commands.barrier(Access::Kernel, Access::Any);
-            let Target::Exported(result) = target else {
-                kernels.submit()?;
-                flight.done = None;
-                return Ok(());
+        let work = &mut kernels.work;
+        let result = work.resource(Binding::range(buffer, aligned, size));
+        job.add_sets(work, listed, &lists, result);
+        let stored = self.stored(encoding, window.stride() as u32, shift as u32);
+        let mut sets = work.recording.all_sets();
+        listed.record(&mut work.recording, &mut sets, stored);
+        work.bind(|_| Ok(&*pipeline))?;
+        if matches!(target, Target::External(_) | Target::Exported(_)) {
+            listed.patch(&mut work.recording, result, stored);
+            work.recording.publish();
+            flight.done = None; // nothing is left for the host to do
+            let Target::Exported(exported) = target else {
+                return Ok(kernels.submit()?);
             };
-            let written = Binding::range(external, start, window.len() as u64 * rotation);
-            commands.release(written, self.device.family(QueueLane::Kernels));
+            let written = result.slice(shift * rotation, window.len() as u64 * rotation);
+            work.recording.release(written);
             flight.kept = Some(KeptAlive {
                 _segments: Arc::clone(job.buffers),
                 _pipeline: pipeline,
             });
-            let point = result.next_point();
+            let point = exported.next_point();
             kernels.submit_between(None, point)?;
-            result.has_submitted(point);
-            flight.done = None; // nothing is left for the host to do
+            exported.has_submitted(point);
             return Ok(());
         }
         let apart = match target {
@@ -206,13 +179,23 @@ impl VulkanEngine {
             _ => None,
         };
         let size = destination.is_none().then_some(size);
-        flight.results.submit_to(size, apart)?;
+        flight.results.submit(result, size, apart)?;
         flight.done = Some(Finish {
             output: bytes,
             encoding,
-            patches: work.patches.clone(),
+            patches: listed.patches.clone(),
         });
         Ok(())
+    }
+
+    /// Where values are stored: the first one has this index in the result.
+    pub(crate) fn stored(&self, encoding: Encoding, stride: u32, first: u32) -> Stored {
+        Stored {
+            encoding,
+            stride,
+            first,
+            begins_lines: self.maps_samples,
+        }
     }
 
     /// The start of a binding for a value at `start`: on cards the start of a memory line, and a whole number of
@@ -224,44 +207,6 @@ impl VulkanEngine {
         (lines.into_iter().chain([least]))
             .find_map(|alignment| aligned_before(start, rotation, alignment))
             .unwrap_or(0)
-    }
-
-    /// The dispatch of a group of a window. `like` is the stride of its samples, the parameter of the store, and the
-    /// index of the window's first value in the binding.
-    pub(crate) fn dispatch_of(
-        &self,
-        work: &Work,
-        group: &GroupItems,
-        [stride, detail, shift]: [u32; 3],
-    ) -> (Arguments, [u32; 3]) {
-        let max_x = self.device.physical.info.max_compute_work_group_count[0];
-        if let Some(of_group) = group.grid {
-            let mut grid = Grid {
-                detail,
-                ..of_group.arguments
-            };
-            match grid.stride {
-                1 => grid.shift = shift,
-                _ => grid.first_output += shift,
-            }
-            return (Arguments::Grid(grid), of_group.workgroups(max_x));
-        }
-        let first_output = group.first_output + shift;
-        // Only samples lie one after another.
-        let idle = match self.maps_samples && work.list == List::Samples {
-            true => first_output % LINE,
-            false => 0,
-        };
-        let dispatch = Dispatch {
-            first_item: group.first_item.wrapping_sub(idle),
-            item_count: group.items,
-            stride,
-            detail,
-            first_output: first_output - idle,
-            idle,
-        };
-        let groups = self.workgroups(group.items + idle);
-        (Arguments::Listed(dispatch), groups)
     }
 
     /// The number of values of a window whose results stay on a card, which is too fast for long windows to be a
@@ -314,39 +259,19 @@ impl VulkanEngine {
         kept: &KeptLists,
         target: &VulkanBuffer,
     ) -> Result<(), VulkanError> {
-        let sets = kept.windows.iter().map(|part| part.work.groups.len());
-        kernels.begin(sets.sum::<usize>() as u32)?;
-        let encoding = job.encoding;
+        kernels.begin()?;
+        let (work, encoding) = (&mut kernels.work, job.encoding);
         let rotation = encoding.bytes() as u64;
         let aligned = self.binding_before(target.offset, rotation);
         let shift = (target.offset - aligned) / rotation;
         let end = (kept.windows.last()).map_or(0, |part| part.window.start + part.window.len());
-        let range = Binding::range(target.buffer, aligned, (end as u64 + shift) * rotation);
-        for part in &kept.windows {
-            let pipeline = self.pipeline(job.kernel(part.work.list))?;
-            let listed = part.bindings();
-            for group in part.work.dispatched() {
-                let bindings = job.bindings(group, &listed, range);
-                let shift = shift as u32 + part.window.start as u32;
-                let like = [part.window.stride() as u32, encoding.row().detail, shift];
-                let (arguments, groups) = self.dispatch_of(&part.work, group, like);
-                kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
-            }
-        }
-        let commands = kernels.commands();
-        for part in &kept.windows {
-            let start = target.offset + part.window.start as u64 * rotation;
-            part.work.patch(commands, target.buffer, start, encoding);
-        }
-        commands.barrier(Access::Kernel, Access::Any);
+        let size = (end as u64 + shift) * rotation;
+        let result = work.resource(Binding::range(target.buffer, aligned, size));
+        job.add_kept_sets(kept, work, result);
+        let stored = self.stored(encoding, 0, shift as u32);
+        kept.record(&mut work.recording, result, stored);
+        work.bind(|kernel| self.pipeline(kernel))?;
         kernels.submit()
-    }
-
-    /// The number of workgroups for `items`, within the limit along x.
-    pub(crate) fn workgroups(&self, items: u32) -> [u32; 3] {
-        let groups = items.div_ceil(WORKGROUP);
-        let x = groups.min(self.device.physical.info.max_compute_work_group_count[0]);
-        [x, groups.div_ceil(x), 1]
     }
 
     /// Starts pieces of work one after another, and finishes all that are in flight, also after an error, because

@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-use bytemuck::Zeroable as _;
+use bytemuck::{NoUninit, Zeroable as _};
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::DeviceKind;
-use crate::gpu::submission::{Binding, Submission};
+use crate::gpu::submission::Submission;
 use crate::shader::{
     BLOCK_SAMPLES, Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SAMPLES_EACH,
-    WORKGROUP,
 };
+use crate::work::recording::workgroups;
 
 /// Rates at which a device writes its memory, bytes per second: medians of several runs, by the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -94,11 +94,16 @@ impl VulkanEngine {
                 ..Dispatch::zeroed()
             };
             let items = upload(bytemuck::cast_slice(&items))?;
-            let bindings = [&constants, &constants, &items, buffer].map(Binding::whole);
-            let pipeline = self.pipeline(Kernel::ArcFramesF32)?;
-            let groups = self.workgroups(dispatch.item_count);
+            let buffers = [&constants, &constants, &items, buffer];
+            let groups = workgroups(dispatch.item_count);
             return self.rate(bytes, |submission| {
-                submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&dispatch), groups)
+                self.dispatch_once(
+                    submission,
+                    Kernel::ArcFramesF32,
+                    &buffers,
+                    &dispatch,
+                    groups,
+                )
             });
         }
         let item = Item {
@@ -114,14 +119,30 @@ impl VulkanEngine {
         let blocks = vec![Block::zeroed(); samples.div_ceil(BLOCK_SAMPLES) as usize];
         let items = upload(bytemuck::bytes_of(&item))?;
         let blocks = upload(bytemuck::cast_slice(&blocks))?;
-        let bindings = [&constants, &constants, &items, &blocks, buffer].map(Binding::whole);
-        let pipeline = self.pipeline(Kernel::ArcFramesCoalescedF32)?;
-        let tiles = samples.div_ceil(WORKGROUP * SAMPLES_EACH);
-        let x = tiles.min(self.device.physical.info.max_compute_work_group_count[0]);
-        let groups = [x, tiles.div_ceil(x), 1];
+        let buffers = [&constants, &constants, &items, &blocks, buffer];
+        let groups = workgroups(samples.div_ceil(SAMPLES_EACH));
         self.rate(bytes, |submission| {
-            submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&grid), groups)
+            let kernel = Kernel::ArcFramesCoalescedF32;
+            self.dispatch_once(submission, kernel, &buffers, &grid, groups)
         })
+    }
+
+    /// Records a dispatch over whole buffers.
+    fn dispatch_once(
+        &self,
+        submission: &mut Submission,
+        kernel: Kernel,
+        buffers: &[&Buffer],
+        push: &impl NoUninit,
+        groups: [u32; 3],
+    ) -> Result<(), VulkanError> {
+        let work = &mut submission.work;
+        let bindings: Vec<_> = (buffers.iter())
+            .map(|buffer| work.whole(buffer).into())
+            .collect();
+        let set = work.recording.set(kernel, bindings);
+        work.recording.dispatch(set, push, groups);
+        work.bind(|kernel| self.pipeline(kernel))
     }
 
     /// The rate of recorded commands, bytes per second: the median of some runs.
@@ -133,10 +154,9 @@ impl VulkanEngine {
         let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
         let mut times: Vec<Duration> = Vec::new();
         for run in 0..=RUNS {
-            submission.begin(1)?;
+            submission.begin()?;
             record(&mut submission)?;
-            submission.submit()?;
-            let spent = submission.wait()?;
+            let spent = submission.run()?;
             times.extend(spent.filter(|_| run > 0).map(|spent| spent.on_device));
         }
         times.sort_unstable();

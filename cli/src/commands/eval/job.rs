@@ -17,7 +17,7 @@ use tumble_formats::sample::Samples;
 use tumble_formats::world::{HierarchyError, world};
 use tumble_formats::{Code, Diagnostic};
 
-use crate::arguments::device::OpenedDevice;
+use crate::arguments::device::{OpenedDevice, stream_chunk};
 use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
@@ -29,6 +29,13 @@ use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::commands::eval::arguments::Arguments;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
+
+/// How a clip's rotations come to where they are written.
+#[derive(Debug, Clone, Copy)]
+enum Delivery {
+    InMemory,
+    InChunks,
+}
 
 /// The report of one result with `--json`.
 #[derive(Debug, Clone, Serialize)]
@@ -177,13 +184,15 @@ impl EvaluationJob<'_> {
             .of_clip(clip, &self.arguments.gaps, outside, end_frame, name)
     }
 
-    /// With `--explain-route`, prints the route by which a clip's rotations are evaluated.
+    /// With `--explain-route`, prints the route by which a clip's rotations are evaluated: as a stream where they
+    /// are written chunk by chunk.
     fn explain(
         &mut self,
         name: &str,
         clip: &Motion,
         frames: &SampleTimes,
         layout: Layout,
+        delivery: Delivery,
     ) -> Result<(), Failure> {
         if !self.arguments.explain_route {
             return Ok(());
@@ -195,7 +204,14 @@ impl EvaluationJob<'_> {
             let set = (clip.set.select(tracks.iter().copied()))
                 .map_err(|error| Failure::evaluating(name, &error.into()))?;
             let explain = |engine: &Engine| {
-                engine.explain_route(&set, curve.interpolation(method), frames, layout)
+                let request = engine.request(&set, curve.interpolation(method), frames);
+                let request = request.layout(layout);
+                match delivery {
+                    Delivery::InMemory => request.explain(),
+                    Delivery::InChunks => {
+                        request.explain_stream(stream_chunk(layout, set.track_count()))
+                    }
+                }
             };
             let samples = frames.resolve(set.track_count(), clip.set.time_span());
             let route = samples
@@ -421,7 +437,7 @@ impl EvaluationJob<'_> {
             self.check_scale(name, clip, boxes)?;
             // Rotations, translations, scales, and the same as written.
             room::in_memory(name, &clip.set, frames, 6)?;
-            self.explain(name, clip, frames, Layout::FrameMajor)?;
+            self.explain(name, clip, frames, Layout::FrameMajor, Delivery::InMemory)?;
             let mut found = self.sample(name, clip, samples)?;
             if samples.is_held() {
                 found.times = samples.written_times(clip, name)?.times(0).collect();
@@ -509,8 +525,12 @@ impl EvaluationJob<'_> {
             encoding,
             notes: &notes,
         };
-        self.explain(name, clip, frames, result.layout)?;
         let curve = self.curve();
+        let delivery = match curve.with_methods(|methods| methods.method_of(clip)) {
+            Some(_) => Delivery::InChunks,
+            None => Delivery::InMemory,
+        };
+        self.explain(name, clip, frames, result.layout, delivery)?;
         let size = (set.track_count(), timeline.len());
         let extent = (size.0, size.1, span(&timeline));
         let quantity = arguments.output.quantity();
@@ -570,7 +590,7 @@ impl EvaluationJob<'_> {
         // The rotations, and twice what becomes of them.
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
-        self.explain(name, clip, frames, Layout::FrameMajor)?;
+        self.explain(name, clip, frames, Layout::FrameMajor, Delivery::InMemory)?;
         let (mut numbers, mut origins) = if clip.is_chain() {
             let mut numbers = self.chain(name, clip, frames, kind)?;
             if let Some(end) = samples.end {

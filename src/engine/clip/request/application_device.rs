@@ -2,7 +2,7 @@
 //! check the application's promises about its buffers.
 #![allow(unsafe_code)]
 
-use crate::engine::clip::request::Request;
+use crate::engine::clip::request::{Request, RequestPart};
 use crate::error::Error;
 use crate::evaluate::Backend;
 use crate::gpu::clip_target::ClipTarget;
@@ -11,8 +11,6 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::job::Job;
 use crate::gpu::recovery::Opened;
-use crate::output::window::Window;
-use crate::time::frames::Timeline;
 
 impl Request<'_> {
     /// Evaluates into a buffer of the application, on the device that the engine was made from
@@ -30,8 +28,8 @@ impl Request<'_> {
     /// The buffer must belong to the engine's device, be bound to memory, have the usages `STORAGE_BUFFER` and
     /// `TRANSFER_DST`, and contain the range. Nothing else may use the range until this returns.
     pub unsafe fn to_buffer(&self, buffer: VulkanBuffer) -> Result<(), Error> {
-        let (opened, timeline, window) = self.for_buffer(buffer)?;
-        (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
+        let (opened, part) = self.for_buffer(buffer)?;
+        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
             let to_buffer =
                 |engine: &VulkanEngine, job: Job<'_>| engine.run_into(job, window, buffer);
             uploaded.on_device(opened, timeline, self.encoding, to_buffer)
@@ -50,17 +48,17 @@ impl Request<'_> {
     /// As [`Request::to_buffer`]; the buffer must live as long as the target, and the target must be dropped after
     /// all work that was recorded with it has ended, and before the device is destroyed.
     pub unsafe fn target(&self, buffer: VulkanBuffer) -> Result<ClipTarget, Error> {
-        let (opened, timeline, window) = self.for_buffer(buffer)?;
+        let (opened, part) = self.for_buffer(buffer)?;
         let engine = opened.engine();
-        (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
+        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
             let target =
                 |_: &VulkanEngine, job: Job<'_>| ClipTarget::new(&engine, job, window, buffer);
             uploaded.on_device(opened, timeline, self.encoding, target)
         })
     }
 
-    /// The device, the sample times and the window of the result, if the result fits the range of the buffer.
-    fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(&Opened, Timeline, Window), Error> {
+    /// The device and the part of the result, if the result fits the range of the buffer.
+    fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(&Opened, RequestPart), Error> {
         let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::BufferOnCpu);
         };
@@ -69,9 +67,9 @@ impl Request<'_> {
             return Err(Error::BufferOfOther);
         }
         buffer.check(&engine.device.raw)?;
-        let (timeline, window) = self.window()?;
+        let part = self.part()?;
         let rotation = self.encoding.bytes() as u64;
-        let needed = (window.len() as u64).saturating_mul(rotation);
+        let needed = (part.window.len() as u64).saturating_mul(rotation);
         if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {
             return Err(Error::Vulkan(VulkanError::BufferRange {
                 offset: buffer.offset,
@@ -80,6 +78,6 @@ impl Request<'_> {
                 needed,
             }));
         }
-        Ok((opened, timeline, window))
+        Ok((opened, part))
     }
 }

@@ -24,8 +24,8 @@ impl Request<'_> {
         let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::ExportOnCpu);
         };
-        let (timeline, window) = self.window()?;
-        let bytes = (window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
+        let part = self.part()?;
+        let bytes = (part.window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
         let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
         let export = |engine: &VulkanEngine, job: Job<'_>, window: &Window| {
             // Smaller windows would not make room for it.
@@ -45,7 +45,7 @@ impl Request<'_> {
             engine.run(job, window, target, None)?;
             Ok(ExportedResult::new(exported, bytes))
         };
-        (self.source).with_uploaded((&timeline, &window), |uploaded, timeline, window| {
+        (self.source).with_uploaded(&part, |uploaded, timeline, window| {
             let export = |engine: &VulkanEngine, job: Job<'_>| export(engine, job, window);
             uploaded.on_device(opened, timeline, self.encoding, export)
         })

@@ -16,9 +16,12 @@ use crate::engine::Engine;
 use crate::engine::clip::Clip;
 use crate::error::Error;
 #[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::Uploaded;
+use crate::evaluate::pieces::PreparedWindow;
+use crate::evaluate::plan::PREPARED;
 #[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::pieces::SetPieces;
+use crate::evaluate::plan::bytes_of;
+#[cfg(feature = "vulkan")]
+use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "vulkan")]
 use crate::gpu::error::EvaluateError;
 #[cfg(feature = "vulkan")]
@@ -26,10 +29,12 @@ use crate::memory::OutOfMemoryError;
 use crate::memory::zeroed;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
+use crate::prepare::preparation::SetRequest;
 #[cfg(feature = "vulkan")]
 use crate::prepare::prepared::SEGMENTS;
 use crate::stream::Chunk;
@@ -113,41 +118,61 @@ impl RequestSource<'_> {
         }
     }
 
+    /// The clip if its segments are prepared, else what is evaluated of a set.
+    fn prepared_or_set<'r>(&'r self, part: &'r RequestPart) -> Result<&'r Clip, SetWork<'r>> {
+        let (engine, set, interpolation) = match self {
+            Self::Clip(clip) => match &clip.uploaded.unprepared {
+                Some(set) => (clip.engine(), set, &clip.uploaded.data.interpolation),
+                None => return Ok(clip),
+            },
+            Self::Set {
+                engine,
+                set,
+                interpolation,
+            } => (*engine, *set, interpolation),
+        };
+        let request = SetRequest::whole(set, interpolation, &part.timeline);
+        let (tracks, samples) = (part.window.tracks.clone(), part.window.samples.clone());
+        Err(SetWork {
+            engine,
+            request: request.part(tracks, samples),
+        })
+    }
+
     /// Calls `work` for a window of the clip, or for the segments of the set that the window needs, with the samples
     /// and the window relative to them.
     #[cfg(feature = "vulkan")]
     fn with_uploaded<T>(
         &self,
-        (timeline, window): (&Timeline, &Window),
+        part: &RequestPart,
         work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
     ) -> Result<T, Error> {
-        Ok(match *self {
-            Self::Clip(clip) => {
-                let folded = clip.uploaded.folded(timeline)?;
-                work(&clip.uploaded, &folded, window)
+        let SetWork { engine, request } = match self.prepared_or_set(part) {
+            Ok(clip) => {
+                let folded = clip.uploaded.data.folded(&part.timeline)?;
+                return Ok(work(&clip.uploaded, &folded, &part.window)?);
             }
-            Self::Set {
-                engine,
-                set,
-                interpolation,
-            } => {
-                let limit = engine.backend.budget().unwrap_or(usize::MAX);
-                let pieces = SetPieces {
-                    backend: &engine.backend,
-                    set,
-                    interpolation: &interpolation,
-                    timeline,
-                    encoding: Encoding::F32,
-                    limit,
-                };
-                let needed = pieces.bytes(window);
-                if needed > limit {
-                    return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
-                }
-                pieces.prepared(window)?.with(window, work)
-            }
-        }?)
+            Err(of_set) => of_set,
+        };
+        let needed = bytes_of(&request);
+        if (engine.backend.limits().memory).is_some_and(|limit| needed > limit) {
+            return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
+        }
+        let prepared = PreparedWindow::whole(&engine.backend, &request)?;
+        Ok(prepared.with(&part.window, work)?)
     }
+}
+
+/// Samples of a set, and the engine that evaluates them.
+struct SetWork<'r> {
+    engine: &'r Engine,
+    request: SetRequest<'r>,
+}
+
+/// The sample times of a request, and the part of them that the result has.
+pub(crate) struct RequestPart {
+    pub(crate) timeline: Timeline,
+    pub(crate) window: Window,
 }
 
 impl<'a> Request<'a> {
@@ -214,7 +239,7 @@ impl Request<'_> {
     /// When the frames do not fit the clip, the tracks or samples are out of range, or the encoding is for rotations
     /// and the quantity is a velocity or an acceleration.
     pub fn size(&self) -> Result<(usize, usize), Error> {
-        let (_, window) = self.window()?;
+        let RequestPart { window, .. } = self.part()?;
         Ok((window.len(), self.encoding.bytes()))
     }
 
@@ -244,10 +269,10 @@ impl Request<'_> {
     /// # Errors
     /// As [`Request::size`]; also when there is not enough memory for the result, or the device fails.
     pub fn evaluate_bytes(&self) -> Result<Vec<u8>, Error> {
-        let (timeline, window) = self.window()?;
-        let bytes = window.len().saturating_mul(self.encoding.bytes());
+        let part = self.part()?;
+        let bytes = part.window.len().saturating_mul(self.encoding.bytes());
         let mut output = zeroed(bytes, "a result")?;
-        self.fill(&timeline, &window, &mut output)?;
+        self.fill(&part, &mut output)?;
         Ok(output)
     }
 
@@ -258,8 +283,7 @@ impl Request<'_> {
     /// As [`Request::size`]; also when `output` is not exactly as many bytes as the result, there is not enough
     /// memory, or the device fails.
     pub fn evaluate_into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
-        let (timeline, window) = self.window()?;
-        self.fill(&timeline, &window, bytemuck::cast_slice_mut(output))
+        self.fill(&self.part()?, bytemuck::cast_slice_mut(output))
     }
 
     /// As [`Request::evaluate_into`], for values of the result's type only.
@@ -268,9 +292,9 @@ impl Request<'_> {
         output: &mut [R],
     ) -> Result<(), Error> {
         check_rows::<R>(self.source.quantity())?;
-        let (timeline, window) = self.window()?;
-        in_quats(output, window.len(), |quats| {
-            self.fill(&timeline, &window, bytemuck::cast_slice_mut(quats))
+        let part = self.part()?;
+        in_quats(output, part.window.len(), |quats| {
+            self.fill(&part, bytemuck::cast_slice_mut(quats))
         })
     }
 
@@ -308,51 +332,83 @@ impl Request<'_> {
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         self.check_f32()?;
-        let (timeline, window) = self.window()?;
-        match self.source {
-            RequestSource::Clip(clip) => clip.stream_window(&timeline, &window, chunk, sink),
-            RequestSource::Set {
-                engine,
-                set,
-                interpolation,
-            } => engine.stream_window(set, interpolation, &timeline, &window, chunk, sink),
+        let part = self.part()?;
+        match self.source.prepared_or_set(&part) {
+            Ok(clip) => clip.stream_window(&part.timeline, &part.window, chunk, sink),
+            Err(of_set) => {
+                (of_set.engine).stream_request(&of_set.request, self.layout, chunk, sink)
+            }
         }
+    }
+
+    /// Describes in words how this request would be evaluated: what is prepared, in which pieces, and what is done
+    /// with the values. All routes give the same bits.
+    ///
+    /// ```
+    /// # use tumble::{Device, Encoding, Engine, SampleTimes, TrackSet, method};
+    /// # use glam::Quat;
+    /// # let mut set = TrackSet::new();
+    /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let frames = SampleTimes::fps(60);
+    /// let request = engine.request(&set, method::SLERP, &frames).encoding(Encoding::F16);
+    /// assert!(request.explain()?.starts_with("in batches"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Request::size`].
+    pub fn explain(&self) -> Result<String, Error> {
+        self.explained(None)
+    }
+
+    /// As [`Request::explain`], for [`Request::stream`] with chunks of this size.
+    ///
+    /// # Errors
+    /// As [`Request::size`].
+    pub fn explain_stream(&self, chunk: usize) -> Result<String, Error> {
+        self.explained(Some(chunk))
+    }
+
+    fn explained(&self, chunk: Option<usize>) -> Result<String, Error> {
+        let part = self.part()?;
+        Ok(match self.source.prepared_or_set(&part) {
+            Ok(_) => PREPARED.to_owned(),
+            Err(SetWork { engine, request }) => {
+                let plan = engine.plan(&request, self.layout, self.encoding, chunk);
+                plan.to_string()
+            }
+        })
     }
 
     /// The values of any quantity.
     fn values<T>(&self) -> Result<Samples<T>, Error> {
         self.check_f32()?;
-        let (timeline, window) = self.window()?;
-        if window == Window::whole(self.source.track_count(), timeline.len(), self.layout) {
-            return match self.source {
-                RequestSource::Clip(clip) => clip.samples(&timeline, self.layout),
-                RequestSource::Set {
-                    engine,
-                    set,
-                    interpolation,
-                } => engine.samples(set, interpolation, &timeline, self.layout),
-            };
+        let part = self.part()?;
+        let window = &part.window;
+        match self.source.prepared_or_set(&part) {
+            Err(SetWork { engine, request }) => return engine.samples(&request, self.layout),
+            Ok(clip)
+                if *window
+                    == Window::whole(clip.track_count(), part.timeline.len(), self.layout) =>
+            {
+                return clip.samples(&part.timeline, self.layout);
+            }
+            Ok(_) => {}
         }
         let mut quats = OutputBuffer::new(window.len())?;
-        self.fill(&timeline, &window, bytemuck::cast_slice_mut(&mut quats))?;
+        self.fill(&part, bytemuck::cast_slice_mut(&mut quats))?;
         let (tracks, samples) = (window.tracks.len(), window.samples.len());
         Ok(Samples::new(Box::new(quats), tracks, samples, self.layout))
     }
 
-    /// Evaluates a window of the result into `output`, in the request's encoding; refuses what does not fit.
-    fn fill(&self, timeline: &Timeline, window: &Window, output: &mut [u8]) -> Result<(), Error> {
-        match self.source {
-            RequestSource::Clip(clip) => {
-                clip.encode_window_into(timeline, window, self.encoding, output)
-            }
-            RequestSource::Set {
-                engine,
-                set,
-                interpolation,
-            } => {
-                let destination = (self.encoding, output);
-                engine.encode_window_into(set, interpolation, timeline, window, destination)
-            }
+    /// Evaluates a part of the result into `bytes`, in the request's encoding; refuses what does not fit.
+    fn fill(&self, part: &RequestPart, bytes: &mut [u8]) -> Result<(), Error> {
+        let encoding = self.encoding;
+        let output = EncodedOutput { encoding, bytes };
+        match self.source.prepared_or_set(part) {
+            Ok(clip) => clip.fill_window(&part.timeline, &part.window, output),
+            Err(SetWork { engine, request }) => engine.fill_request(&request, self.layout, output),
         }
     }
 
@@ -365,7 +421,7 @@ impl Request<'_> {
     }
 
     /// The sample times of the request, and the part of them that the result has.
-    pub(crate) fn window(&self) -> Result<(Timeline, Window), Error> {
+    pub(crate) fn part(&self) -> Result<RequestPart, Error> {
         check_encoding(self.encoding, self.source.quantity())?;
         let timeline = self.source.timeline(self.frames)?;
         let (tracks, samples) = (self.source.track_count(), timeline.len());
@@ -374,6 +430,6 @@ impl Request<'_> {
             (part(&self.tracks, tracks), part(&self.samples, samples));
         let window = Window::of(window_tracks, window_samples, self.layout);
         check_within(&window, tracks, samples)?;
-        Ok((timeline, window))
+        Ok(RequestPart { timeline, window })
     }
 }

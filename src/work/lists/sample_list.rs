@@ -5,7 +5,6 @@
 use rayon::prelude::*;
 
 use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
-use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
@@ -18,6 +17,7 @@ use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
+use crate::work::lists::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
 
 /// A window whose samples are listed separately.
 pub(crate) struct SampleList<'a> {

@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use crate::gpu::work_list::GroupWork;
 use crate::output::window::Window;
 use crate::shader::{
     BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY, SAMPLES_EACH, WORKGROUP,
 };
+use crate::work::lists::GroupWork;
 
 /// The rows of a window: one for a track-major window, otherwise one for each track.
 #[derive(Debug, Clone, Copy)]
@@ -172,8 +172,8 @@ impl GroupGrid {
         (block * self.arguments.rows + row) as usize
     }
 
-    /// The workgroups of its dispatch; `max_x` is the limit along x.
-    pub(crate) fn workgroups(&self, max_x: u32) -> [u32; 3] {
+    /// The workgroups of its dispatch.
+    pub(crate) fn workgroups(&self) -> [u32; 3] {
         let samples = WORKGROUP * SAMPLES_EACH;
         let (tiles, z) = match self.all.stride {
             1 => (self.arguments.samples.div_ceil(samples), 1),
@@ -183,8 +183,7 @@ impl GroupGrid {
                 (tiles, self.arguments.samples.div_ceil(samples / LINE))
             }
         };
-        let x = tiles.clamp(1, max_x);
-        [x, tiles.div_ceil(x), z]
+        [tiles.max(1), 1, z]
     }
 }
 
@@ -193,8 +192,8 @@ mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
-    use crate::gpu::work_list::WorkChunk;
     use crate::output::rotations::Layout;
+    use crate::work::lists::WorkChunk;
 
     /// Items with gaps between them, in two chunks, as (row, position, samples).
     fn listed(rows: GridRows, tracks: u32) -> GroupWork {

@@ -3,24 +3,16 @@
 pub(crate) mod grid;
 pub(crate) mod sample_list;
 
-use std::sync::Arc;
-
-use ash::vk;
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
-use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::EvaluateError;
-use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::submission::{Access, Commands};
-use crate::gpu::upload::Upload;
-use crate::gpu::work_list::grid::{GridRows, GroupGrid, write_blocks};
-use crate::gpu::work_list::sample_list::SampleList;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::{Block, IS_CONSTANT, ITEM_SAMPLES, Item, List, ListedSample, MAY_BE_TINY};
+use crate::shader::{
+    Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, LINE, List, ListedSample, MAY_BE_TINY,
+};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::threads::copy;
@@ -28,6 +20,9 @@ use crate::time::error::SampleTimesError;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
+use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
+use crate::work::lists::sample_list::SampleList;
+use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
 pub(crate) struct Work {
@@ -44,18 +39,50 @@ impl Work {
         self.groups.iter().filter(|group| group.items > 0)
     }
 
-    /// Records the writing of the host's rotations after the kernels, to a window that starts at `start` of a buffer.
-    pub(crate) fn patch(
+    /// Records the dispatches of the window, with the next sets.
+    pub(crate) fn record(
         &self,
-        commands: Commands<'_>,
-        buffer: vk::Buffer,
-        start: u64,
-        encoding: Encoding,
+        recording: &mut Recording,
+        sets: &mut impl Iterator<Item = Set>,
+        stored: Stored,
     ) {
-        if self.patches.is_empty() {
-            return;
+        for (group, set) in self.dispatched().zip(sets) {
+            let detail = stored.encoding.row().detail;
+            if let Some(of_group) = group.grid {
+                let mut grid = Grid {
+                    detail,
+                    ..of_group.arguments
+                };
+                match grid.stride {
+                    1 => grid.shift = stored.first,
+                    _ => grid.first_output += stored.first,
+                }
+                recording.dispatch(set, &grid, of_group.workgroups());
+                continue;
+            }
+            let first_output = group.first_output + stored.first;
+            // Only samples lie one after another.
+            let idle = match stored.begins_lines && self.list == List::Samples {
+                true => first_output % LINE,
+                false => 0,
+            };
+            let dispatch = Dispatch {
+                first_item: group.first_item.wrapping_sub(idle),
+                item_count: group.items,
+                stride: stored.stride,
+                detail,
+                first_output: first_output - idle,
+                idle,
+            };
+            recording.dispatch(set, &dispatch, workgroups(group.items + idle));
         }
-        commands.barrier(Access::Kernel, Access::Copy);
+    }
+
+    /// Records the writing of the host's rotations after the kernels.
+    pub(crate) fn patch(&self, recording: &mut Recording, result: Resource, stored: Stored) {
+        let Stored {
+            encoding, first, ..
+        } = stored;
         let bytes = encoding.bytes();
         let mut encoded = [0; PATCHED_BYTES];
         // Neighbours go together.
@@ -67,11 +94,23 @@ impl Work {
             for ((_, value), into) in patches.iter().zip(values.chunks_exact_mut(bytes)) {
                 encoding.encode_all(&[*value], into);
             }
-            let offset = start + (patches[0].0 * bytes) as u64;
-            commands.update(buffer, offset, values);
+            let offset = (first as usize + patches[0].0) * bytes;
+            let to = result.slice(offset as u64, values.len() as u64);
+            recording.write(to, values);
         }
-        commands.barrier(Access::Copy, Access::Any);
     }
+}
+
+/// Where and how the values of a window are stored.
+#[derive(Clone, Copy)]
+pub(crate) struct Stored {
+    pub(crate) encoding: Encoding,
+    /// The distance between neighbouring samples of a track.
+    pub(crate) stride: u32,
+    /// The index of the window's first value in the result.
+    pub(crate) first: u32,
+    /// Whether neighbouring invocations store neighbouring values, from the start of a memory line on.
+    pub(crate) begins_lines: bool,
 }
 
 /// The maximum number of bytes that one command patches. It is a whole number of values in every encoding, and Vulkan
@@ -115,10 +154,9 @@ impl GroupWork {
     }
 }
 
-/// The samples to list, and properties of the device.
+/// The samples to list.
 #[derive(Clone, Copy)]
 pub(crate) struct ListRequest<'a> {
-    pub(crate) device: &'a Arc<LogicalDevice>,
     /// Whether neighbouring invocations evaluate neighbouring samples, if possible; otherwise each evaluates a run of
     /// samples.
     pub(crate) maps_samples: bool,
@@ -126,40 +164,43 @@ pub(crate) struct ListRequest<'a> {
     pub(crate) timeline: &'a Timeline,
 }
 
-/// The lists of a window for upload to the device, in memory that is kept for the next window.
+/// Memory of a device for the lists of a window.
+pub(crate) trait ListRoom<'r> {
+    type Error: From<SampleTimesError>;
+
+    /// Room for lists of so many bytes: items or listed samples, distances, and blocks; none for those that kernels do
+    /// not bind. It may be slow to read.
+    fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], Self::Error>;
+}
+
+/// Memory that is kept for the lists of the next window.
 #[derive(Default)]
-pub(crate) struct WorkLists {
-    /// Items, or the samples of a sample list.
-    items: Upload,
-    distances: Upload,
-    /// The blocks of a grid.
-    blocks: Upload,
+pub(crate) struct Lister {
     /// Emptied work lists.
     spare: Vec<WorkChunk>,
-    /// Blocks before they are uploaded.
+    /// Blocks before they are written to the device's memory.
     listed_blocks: Vec<Block>,
 }
 
-impl WorkLists {
-    /// Writes the work list of a window to its buffers, one group after another. If the request maps samples,
+impl Lister {
+    /// Writes the work list of a window into a device's memory, one group after another. If the request maps samples,
     /// neighbouring invocations evaluate neighbouring samples if possible. Must be called on one of the engine's
     /// threads.
-    pub(crate) fn list(
+    pub(crate) fn list<'r, R: ListRoom<'r>>(
         &mut self,
         request: ListRequest<'_>,
         window: &Window,
-    ) -> Result<Work, EvaluateError> {
+        memory: R,
+    ) -> Result<Work, R::Error> {
         let ListRequest {
-            device,
             maps_samples,
             clip,
             timeline,
         } = request;
-        let often = KernelReads::Often;
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = window.len() * size_of::<ListedSample>();
-            let room = self.items.room(device, "tumble items", often, bytes)?;
-            return Ok(list.write(bytemuck::cast_slice_mut(room))?);
+            let [samples, ..] = memory.room([Some(bytes), None, None])?;
+            return Ok(list.write(bytemuck::cast_slice_mut(samples))?);
         }
         let mut rows = GridRows::new(window).filter(|_| maps_samples);
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
@@ -178,20 +219,19 @@ impl WorkLists {
         let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
         // A grid has one item without samples after all others.
         let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
-        let items = (self.items).room(device, "tumble items", often, item_bytes)?;
-        let bytes = distance_count * size_of::<f32>();
-        let distances = (self.distances).room(device, "tumble distances", often, bytes)?;
+        let distance_bytes = distance_count * size_of::<f32>();
+        let block_count = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
+        let block_bytes = rows.map(|_| block_count * size_of::<Block>());
+        let sizes = [Some(item_bytes), Some(distance_bytes), block_bytes];
+        let [items, distances, blocks] = memory.room(sizes)?;
         let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
         nothing.fill(Item::zeroed());
         write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
         if rows.is_some() {
-            let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
             // They are written out of order, and read meanwhile.
-            self.listed_blocks.resize(blocks, Block::zeroed());
+            self.listed_blocks.resize(block_count, Block::zeroed());
             write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
-            let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
-            let room = (self.blocks).room(device, "tumble blocks", often, bytes.len())?;
-            copy(room, bytes);
+            copy(blocks, bytemuck::cast_slice(&self.listed_blocks));
         }
 
         let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
@@ -230,30 +270,6 @@ impl WorkLists {
             self.spare.push(chunk);
         }
         patches
-    }
-
-    /// Frees memory that only the next list would use.
-    pub(crate) fn forget_spare(&mut self) {
-        self.spare = Vec::new();
-        self.listed_blocks = Vec::new();
-    }
-
-    /// Frees the buffers that the device has copied.
-    pub(crate) fn forget_written(&mut self) {
-        for upload in [&mut self.items, &mut self.distances, &mut self.blocks] {
-            upload.forget_written();
-        }
-    }
-
-    /// The uploads of a list that kernels read, in the order of their bindings.
-    pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
-        let (items, blocks, distances) = (&self.items, &self.blocks, &self.distances);
-        match list {
-            List::Samples | List::Frames => vec![items],
-            List::Times => vec![items, distances],
-            List::FramesCoalesced => vec![items, blocks],
-            List::TimesCoalesced => vec![items, blocks, distances],
-        }
     }
 }
 

@@ -1,0 +1,99 @@
+//! Robots: kinematic trees in MJCF (MuJoCo) and URDF (ROS).
+//!
+//! [`Robot::open`] reads the bodies and joints of a file. Meshes, masses but their centres, sensors and actuators are
+//! not read, and no file but those that an MJCF includes is opened. The rules were compared with MuJoCo and pinocchio;
+//! [docs/robots.md](https://github.com/tumble-rs/tumble/blob/main/docs/robots.md) has them.
+
+mod mjcf;
+mod urdf;
+mod xml;
+
+use std::path::Path;
+
+use tumble::names;
+use tumble::trees::{Configuration, Tree};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::limits::Limits;
+use crate::robot::xml::Files;
+
+/// A robot as a file describes it.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    /// Its name; empty if the file does not say it.
+    pub name: String,
+    /// The kind of file.
+    pub format: RobotFormat,
+    /// Its bodies and joints. The bodies are in the order of MuJoCo: depth first, children as in the file.
+    pub tree: Tree,
+    /// The configurations that the file names, such as `home`.
+    pub poses: Vec<(String, Configuration)>,
+    /// How many relations between joints the file has that are not applied (`equality/joint` of MJCF), as MuJoCo's
+    /// kinematics do not apply them.
+    pub couplings: usize,
+    /// Warnings about the file.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// A kind of file with a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RobotFormat {
+    /// MuJoCo's XML.
+    Mjcf,
+    /// The Unified Robot Description Format of ROS.
+    Urdf,
+}
+
+names! {
+    RobotFormat, "kind of robot",
+    Mjcf => "mjcf",
+    Urdf => "urdf",
+}
+
+/// Extensions of files with robots.
+pub const EXTENSIONS: [&str; 3] = ["xml", "mjcf", "urdf"];
+
+/// The largest length of a robot's files together, bytes.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// The largest number of bodies.
+const MAX_BODIES: usize = 65_536;
+
+/// How deep bodies and frames may be nested.
+const MAX_DEPTH: usize = 512;
+
+impl Robot {
+    /// Whether a path has an extension of files with robots.
+    #[must_use]
+    pub fn has_extension(path: &Path) -> bool {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        extension.is_some_and(|extension| {
+            (EXTENSIONS.iter()).any(|known| known.eq_ignore_ascii_case(extension))
+        })
+    }
+
+    /// Reads a robot; the root element says whether it is MJCF (`mujoco`) or URDF (`robot`).
+    ///
+    /// # Errors
+    /// When the file cannot be opened, is no robot, is larger than 4 MiB, or its bodies are no tree.
+    pub fn open(path: &Path) -> Result<Self, Diagnostic> {
+        let limits = Limits {
+            file: MAX_BYTES,
+            ..Limits::default()
+        };
+        let files = Files::open(path, limits)?;
+        let documents = files.parse()?;
+        let root = documents.root();
+        match documents.tag(root) {
+            "mujoco" => mjcf::read(&documents),
+            "robot" => urdf::read(&documents),
+            other => Err(documents.refuse(
+                root,
+                Code::OtherFormat,
+                format!(
+                    "the root element is <{other}>; a robot is <mujoco> (MJCF) or <robot> (URDF)"
+                ),
+            )),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The values of a tree's joints, and the bodies that follow from them.
+
+use glam::{DQuat, DVec3};
+
+use crate::math::quaternion::sine_cosine;
+use crate::pose::tree::{JointKind, JointValue, Tree, TreeBody, TreeError, TreeJoint};
+
+/// A value for each joint of a [`Tree`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Configuration {
+    /// Where the tree's world is: it moves all bodies but those of free joints in the world.
+    pub base: BodyPose,
+    /// Each free joint: the pose in the world, or relative to the body's place in its parent, if it has a parent.
+    pub free: Vec<BodyPose>,
+    /// Each ball: its rotation. Quaternions are normalised.
+    pub balls: Vec<DQuat>,
+    /// Each hinge (rad) and slide (metres) that mimics no other joint, as [`Tree::scalar_joints`] lists them.
+    pub scalars: Vec<f64>,
+}
+
+/// How fast the values of a [`Configuration`] change, per second.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConfigurationRates {
+    /// Of the base, in the world's axes.
+    pub base: BodyVelocity,
+    /// Of each free joint: in the world's axes, or in those of the body's place in its parent.
+    pub free: Vec<BodyVelocity>,
+    /// Of each ball: the angular velocity in the body's axes, rad/s.
+    pub balls: Vec<DVec3>,
+    /// Of each hinge (rad/s) and slide (m/s).
+    pub scalars: Vec<f64>,
+}
+
+/// The position and rotation of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyPose {
+    /// The position of its origin, metres.
+    pub position: DVec3,
+    /// Its rotation, a unit quaternion.
+    pub rotation: DQuat,
+}
+
+/// The velocities of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BodyVelocity {
+    /// The velocity of its origin, m/s.
+    pub linear: DVec3,
+    /// Its angular velocity, rad/s.
+    pub angular: DVec3,
+}
+
+/// A body in the world, and its velocities in the world's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyMotion {
+    /// Its pose.
+    pub pose: BodyPose,
+    /// Its velocities.
+    pub velocity: BodyVelocity,
+}
+
+impl BodyPose {
+    /// At the origin, not rotated.
+    pub const IDENTITY: Self = Self {
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+    };
+}
+
+impl BodyMotion {
+    /// The velocity of a point that is fixed to the body, such as its centre of mass; the point is in the body's
+    /// frame.
+    #[must_use]
+    pub fn velocity_at(&self, point: DVec3) -> DVec3 {
+        let BodyVelocity { linear, angular } = self.velocity;
+        linear + angular.cross(self.pose.rotation * point)
+    }
+
+    /// A child of this body before its joints act.
+    pub(super) fn with(self, child: &TreeBody) -> Self {
+        let Self { pose, velocity } = self;
+        Self {
+            velocity: BodyVelocity {
+                linear: self.velocity_at(child.position),
+                ..velocity
+            },
+            pose: BodyPose {
+                position: pose.position + pose.rotation * child.position,
+                rotation: pose.rotation * child.rotation,
+            },
+        }
+    }
+
+    /// After a free joint: in the world, or relative to where the body is.
+    pub(super) fn freely(self, pose: BodyPose, rate: BodyVelocity, is_relative: bool) -> Self {
+        let rotation = pose.rotation.normalize();
+        if !is_relative {
+            let pose = BodyPose { rotation, ..pose };
+            return Self {
+                pose,
+                velocity: rate,
+            };
+        }
+        let axes = self.pose.rotation;
+        Self {
+            velocity: BodyVelocity {
+                linear: self.velocity_at(pose.position) + axes * rate.linear,
+                angular: self.velocity.angular + axes * rate.angular,
+            },
+            pose: BodyPose {
+                position: self.pose.position + axes * pose.position,
+                rotation: axes * rotation,
+            },
+        }
+    }
+
+    /// After a hinge turned by `value` rad, or a slide shifted by `value` metres.
+    pub(super) fn by_scalar(self, joint: &TreeJoint, value: f64, rate: f64) -> Self {
+        let axis = self.pose.rotation * joint.axis;
+        if joint.kind == JointKind::Hinge {
+            let (sine, cosine) = sine_cosine(value * 0.5);
+            let [x, y, z] = (joint.axis * sine).to_array();
+            let rotation = DQuat::from_xyzw(x, y, z, cosine);
+            return self.about(joint.anchor, rotation, axis * rate);
+        }
+        let (shift, mut moved) = (axis * value, self);
+        moved.velocity.linear += self.velocity.angular.cross(shift) + axis * rate;
+        moved.pose.position += shift;
+        moved
+    }
+
+    /// After a rotation about an anchor; `rate` is the angular velocity in the world's axes.
+    pub(super) fn about(self, anchor: DVec3, rotation: DQuat, rate: DVec3) -> Self {
+        let Self { pose, velocity } = self;
+        let rotation = pose.rotation * rotation;
+        let fixed = pose.position + pose.rotation * anchor;
+        let position = fixed - rotation * anchor;
+        let angular = velocity.angular + rate;
+        let linear = self.velocity_at(anchor) + angular.cross(position - fixed);
+        Self {
+            pose: BodyPose { position, rotation },
+            velocity: BodyVelocity { linear, angular },
+        }
+    }
+}
+
+impl Tree {
+    /// The configuration of the file: hinges and slides at their references, balls not turned, free joints where their
+    /// bodies are.
+    #[must_use]
+    pub fn rest(&self) -> Configuration {
+        let free = |body: &TreeBody| match body.parent {
+            None => BodyPose {
+                position: body.position,
+                rotation: body.rotation,
+            },
+            Some(_) => BodyPose::IDENTITY,
+        };
+        let is_free =
+            |body: &&TreeBody| matches!(&body.joints[..], [joint] if joint.kind == JointKind::Free);
+        Configuration {
+            base: BodyPose::IDENTITY,
+            free: self.bodies.iter().filter(is_free).map(free).collect(),
+            balls: vec![DQuat::IDENTITY; self.counts.balls],
+            scalars: self.scalar_joints().map(|joint| joint.reference).collect(),
+        }
+    }
+
+    /// Rates of 0.
+    #[must_use]
+    pub fn no_rates(&self) -> ConfigurationRates {
+        ConfigurationRates {
+            base: BodyVelocity::default(),
+            free: vec![BodyVelocity::default(); self.counts.free],
+            balls: vec![DVec3::ZERO; self.counts.balls],
+            scalars: vec![0.0; self.counts.scalars],
+        }
+    }
+}
+
+impl Configuration {
+    pub(super) fn scalar(&self, value: JointValue) -> f64 {
+        match value {
+            JointValue::Scalar {
+                index,
+                multiplier,
+                offset,
+            } => multiplier * self.scalars[index] + offset,
+            JointValue::Ball(_) | JointValue::Free(_) => 0.0,
+        }
+    }
+
+    /// Refuses values that are not finite, or not one for each joint.
+    pub(super) fn check(&self, tree: &Tree) -> Result<(), TreeError> {
+        let counts = tree.counts;
+        check_counts([
+            ("free joints", self.free.len(), counts.free),
+            ("balls", self.balls.len(), counts.balls),
+            ("scalars", self.scalars.len(), counts.scalars),
+        ])?;
+        let is_pose = |pose: &BodyPose| pose.position.is_finite() && is_rotation(pose.rotation);
+        check_values("base", &[self.base], is_pose)?;
+        check_values("free joint", &self.free, is_pose)?;
+        check_values("ball", &self.balls, |&rotation| is_rotation(rotation))?;
+        check_values("scalar", &self.scalars, |value| {
+            value.abs() <= LARGEST_SCALAR
+        })
+    }
+}
+
+/// The largest value of a hinge or a slide: beyond it, an angle in f64 is less precise than 1e-8 rad.
+const LARGEST_SCALAR: f64 = 1e8;
+
+impl ConfigurationRates {
+    pub(super) fn scalar(&self, value: JointValue) -> f64 {
+        match value {
+            JointValue::Scalar {
+                index, multiplier, ..
+            } => multiplier * self.scalars[index],
+            JointValue::Ball(_) | JointValue::Free(_) => 0.0,
+        }
+    }
+
+    /// Refuses rates that are not finite, or not one for each joint.
+    pub(super) fn check(&self, tree: &Tree) -> Result<(), TreeError> {
+        let counts = tree.counts;
+        check_counts([
+            ("rates of free joints", self.free.len(), counts.free),
+            ("rates of balls", self.balls.len(), counts.balls),
+            ("rates of scalars", self.scalars.len(), counts.scalars),
+        ])?;
+        let is_velocity = |rate: &BodyVelocity| rate.linear.is_finite() && rate.angular.is_finite();
+        check_values("the rate of the base", &[self.base], is_velocity)?;
+        check_values("the rate of free joint", &self.free, is_velocity)?;
+        check_values("the rate of ball", &self.balls, |rate| rate.is_finite())?;
+        check_values("the rate of scalar", &self.scalars, |rate| rate.is_finite())
+    }
+}
+
+fn is_rotation(q: DQuat) -> bool {
+    let square = q.length_squared();
+    square.is_finite() && square > 1e-12
+}
+
+fn check_counts(counts: [(&'static str, usize, usize); 3]) -> Result<(), TreeError> {
+    let other = counts
+        .into_iter()
+        .find(|(_, found, expected)| found != expected);
+    match other {
+        None => Ok(()),
+        Some((kind, found, expected)) => Err(TreeError::Count {
+            kind,
+            found,
+            expected,
+        }),
+    }
+}
+
+fn check_values<T: std::fmt::Debug>(
+    kind: &'static str,
+    values: &[T],
+    is_right: impl Fn(&T) -> bool,
+) -> Result<(), TreeError> {
+    match values.iter().position(|value| !is_right(value)) {
+        None => Ok(()),
+        Some(index) => Err(TreeError::Value {
+            kind,
+            index,
+            value: format!("{:?}", values[index]),
+        }),
+    }
+}

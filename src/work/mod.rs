@@ -1,0 +1,6 @@
+//! Work for a device, as values that know no device.
+
+pub(crate) mod crowd;
+pub(crate) mod lists;
+pub(crate) mod recording;
+pub(crate) mod whole_instances;
