@@ -14,8 +14,9 @@ use std::fmt::Write as _;
 
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
-    AddressSpace, ArraySize, Binding, Block, BuiltIn, Expression, Function, Handle, Literal,
-    LocalVariable, MathFunction, Module, ScalarKind, Statement, Type, TypeInner, UnaryOperator,
+    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, Handle,
+    Literal, LocalVariable, MathFunction, Module, ScalarKind, Statement, Type, TypeInner,
+    UnaryOperator,
 };
 
 use crate::functions::{ATOM, LOOSE, Result, Text, UNARY, atom, binary, docs, field, formatted};
@@ -89,10 +90,10 @@ pub(crate) fn rust(kernels: &[Source<'_>]) -> String {
             }
         }
         for (ty, declared) in kernel.module.types.iter() {
-            if let (Some(name), TypeInner::Struct { .. }) = (&declared.name, &declared.inner) {
-                if let Ok(text) = kernel.types("F").declaration(ty) {
-                    structs.insert(name.clone(), text);
-                }
+            if let (Some(name), TypeInner::Struct { .. }) = (&declared.name, &declared.inner)
+                && let Ok(text) = kernel.types("F").declaration(ty)
+            {
+                structs.insert(name.clone(), text);
             }
         }
     }
@@ -104,7 +105,8 @@ pub(crate) fn rust(kernels: &[Source<'_>]) -> String {
         "//! The kernels, one invocation at a time. Written by `cargo run -p tumble-shaders` from the shaders: change \
          those.\n\n\
          use crate::shader::*;\n\
-         use crate::twin::machine::{Entry, Float, Machine, barrier, both, choose, stored};\n\n",
+         use crate::twin::machine::{\
+         Entry, Float, Machine, barrier, both, choose, quotient, stored};\n\n",
     );
     text += &globals(kernels);
     for (name, declaration) in structs {
@@ -220,6 +222,8 @@ impl Called {
 /// The names of the kernels' variables, and for each kernel those that it binds.
 fn globals(kernels: &[Source<'_>]) -> String {
     let (mut all, mut private, mut entries) = (BTreeSet::new(), BTreeSet::new(), String::new());
+    // Many kernels bind the same.
+    let mut bound = Vec::<String>::new();
     for kernel in kernels {
         let texels = format!("{}_texels", kernel.name);
         let texels = kernels.iter().position(|other| other.name == texels);
@@ -235,13 +239,14 @@ fn globals(kernels: &[Source<'_>]) -> String {
                 (None, _) => {}
             }
         }
-        let bound = Vec::from_iter(bindings.into_values()).join(", ");
+        let list = format!("&[{}]", Vec::from_iter(bindings.into_values()).join(", "));
+        let known = bound.iter().position(|other| *other == list);
+        let index = known.unwrap_or(bound.len());
+        if known.is_none() {
+            bound.push(list);
+        }
         let size = kernel.module.entry_points[0].workgroup_size[0];
-        writeln!(
-            entries,
-            "Entry {{ bound: &[{bound}], pushed: {pushed}, workgroup: {size}, texels: {texels:?} }},"
-        )
-        .unwrap();
+        writeln!(entries, "entry({index}, {pushed}, {size}, {texels:?}),").unwrap();
     }
     let (names, private) = (Vec::from_iter(all), Vec::from_iter(private));
     format!(
@@ -253,6 +258,10 @@ fn globals(kernels: &[Source<'_>]) -> String {
          pub(crate) const GLOBALS: usize = {};\n\n\
          /// Variables of which each invocation has its own.\n\
          pub(crate) const PRIVATE: [Global; {}] = [{}];\n\n\
+         /// What kernels bind, in the order of the bindings.\n\
+         const BOUND: [&[Global]; {}] = [{}];\n\n\
+         const fn entry(bound: usize, pushed: Option<Global>, workgroup: u32, texels: Option<usize>) -> Entry {{\n\
+         Entry {{ bound: BOUND[bound], pushed, workgroup, texels }}\n}}\n\n\
          /// The entry points: those of the kernels in their order, and then those that read texel buffers.\n\
          pub(crate) static ENTRIES: [Entry; {}] = [{entries}];\n\n",
         names.join(", "),
@@ -264,6 +273,8 @@ fn globals(kernels: &[Source<'_>]) -> String {
         names.len(),
         private.len(),
         private.join(", "),
+        bound.len(),
+        bound.join(", "),
         kernels.len(),
     )
 }
@@ -965,10 +976,17 @@ impl<'a> Writer<'a> {
             Expression::Binary { op, left, right } => {
                 let is_float = self.kind(left) == Some(ScalarKind::Float);
                 let operation = |left: Text, right: Text| match op {
-                    naga::BinaryOperator::Divide if !is_float => Ok(Text {
-                        text: format!("{} / {}", left.within(16), right.within(17)),
-                        level: 16,
-                    }),
+                    BinaryOperator::Divide if !is_float => {
+                        Ok(atom(format!("quotient({}, {})", left.text, right.text)))
+                    }
+                    // Each operation on numbers begins in a column of its own: by it tests tell where they plant a
+                    // mistake.
+                    BinaryOperator::Add | BinaryOperator::Subtract if left.level == 15 => {
+                        binary(op, is_float, atom(left.within(16)), right)
+                    }
+                    BinaryOperator::Multiply if is_float && left.level == 16 => {
+                        binary(op, is_float, atom(left.within(17)), right)
+                    }
                     _ => binary(op, is_float, left, right),
                 };
                 match (self.size(left), self.size(right)) {

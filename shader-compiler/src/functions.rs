@@ -22,19 +22,22 @@ use naga::{
 
 /// The functions that are written, each with its cut: the names of `let` after which a pipelined loop interrupts it.
 /// A function `f` with a cut is written as `f_begin` and `f_end`, too.
-const FUNCTIONS: [(&str, &[&str]); 33] = [
+const FUNCTIONS: [(&str, &[&str]); 36] = [
     ("canonical", &[]),
     ("flushed", &[]),
     ("flushed4", &[]),
     ("magnitude", &[]),
     ("reciprocal", &[]),
     ("reciprocal_root", &[]),
+    ("root", &[]),
+    ("arc_tangent", &[]),
     ("sine_cosine", &[]),
     ("sine_cosm1", &[]),
     ("sine_cosm1_quarter", &["zx", "sine_tail", "cosine_tail"]),
     ("norm_squared", &[]),
     ("normalised", &[]),
     ("rotated", &[]),
+    ("slerp", &[]),
     ("over", &[]),
     ("polynomial", &["z", "zz"]),
     ("arc_between", &[]),
@@ -58,20 +61,13 @@ const FUNCTIONS: [(&str, &[&str]); 33] = [
     ("small_angle_cubic", &[]),
 ];
 
-/// Functions that Rust has already, and which those of the list call: the algebra that f64 shares, and those of which
-/// lanes need parts that a cut does not give.
-const BY_HAND: [(&str, Numbers, &str); 7] = [
-    ("product", Numbers::Any, "math::quaternion::product"),
-    ("dot4", Numbers::Any, "math::quaternion::dot as dot4"),
-    ("dot3", Numbers::Any, "math::quaternion::dot3"),
-    ("cross3", Numbers::Any, "math::quaternion::cross3"),
-    ("root", Numbers::Any, "twin::arc_tangent::root"),
-    (
-        "arc_tangent",
-        Numbers::One,
-        "twin::arc_tangent::arc_tangent",
-    ),
-    ("slerp", Numbers::One, "twin::quaternion::slerp"),
+/// Functions that Rust has already, and which those of the list call: the algebra that f64 shares. They take any
+/// numbers.
+const BY_HAND: [(&str, &str); 4] = [
+    ("product", "math::quaternion::product"),
+    ("dot4", "math::quaternion::dot as dot4"),
+    ("dot3", "math::quaternion::dot3"),
+    ("cross3", "math::quaternion::cross3"),
 ];
 
 /// What a function cannot be written as, and why.
@@ -112,9 +108,9 @@ pub(crate) struct Functions {
 
 impl Functions {
     pub(crate) fn new(shared: BTreeSet<String>) -> Self {
-        let by_hand = BY_HAND.map(|(name, numbers, _)| {
+        let by_hand = BY_HAND.map(|(name, _)| {
             let shape = Shape {
-                numbers,
+                numbers: Numbers::Any,
                 vectors: Vectors::Apart,
             };
             (name.to_owned(), (shape, String::new()))
@@ -195,7 +191,7 @@ impl Functions {
                 });
                 if let Ok(fields) = fields {
                     let text = format!(
-                        "#[derive(Clone, Copy)]\npub(crate) struct {name}<N> {{\n{fields}}}\n\n"
+                        "#[derive(Debug, Clone, Copy)]\npub(crate) struct {name}<N> {{\n{fields}}}\n\n"
                     );
                     self.structs.insert(name.clone(), text);
                 }
@@ -217,7 +213,7 @@ impl Functions {
             "//! The shaders' arithmetic. Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n\
              use crate::shader::*;\nuse crate::simd::lanes::Number;\n",
         );
-        for (_, _, path) in BY_HAND {
+        for (_, path) in BY_HAND {
             text += &format!("use crate::{path};\n");
         }
         text.push('\n');

@@ -1,7 +1,7 @@
 //! The kernels, one invocation at a time. Written by `cargo run -p tumble-shaders` from the shaders: change those.
 
 use crate::shader::*;
-use crate::twin::machine::{Entry, Float, Machine, barrier, both, choose, stored};
+use crate::twin::machine::{Entry, Float, Machine, barrier, both, choose, quotient, stored};
 
 /// The variables of the kernels, by their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -115,1813 +115,292 @@ pub(crate) const GLOBALS: usize = 48;
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
+/// What kernels bind, in the order of the bindings.
+const BOUND: [&[Global]; 24] = [
+    &[Global::Probes, Global::Replies],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Distances,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Samples,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Blocks,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Blocks,
+        Global::Distances,
+        Global::Rotations,
+    ],
+    &[Global::Keys, Global::Samples, Global::Rotations],
+    &[
+        Global::Keys,
+        Global::Samples,
+        Global::Weights,
+        Global::Rotations,
+    ],
+    &[
+        Global::Base,
+        Global::Layer,
+        Global::Reference,
+        Global::Added,
+    ],
+    &[Global::Layers, Global::Weights, Global::Blended],
+    &[
+        Global::FromLayer,
+        Global::ToLayer,
+        Global::Weights,
+        Global::Mixed,
+    ],
+    &[
+        Global::Values,
+        Global::Steps,
+        Global::Weights,
+        Global::Smoothed,
+    ],
+    &[Global::Values, Global::Steps],
+    &[Global::Local, Global::Links, Global::World],
+    &[
+        Global::Entries,
+        Global::Channels,
+        Global::Cells,
+        Global::Positions,
+        Global::Rotations,
+    ],
+    &[Global::All, Global::Visible, Global::Gathered],
+    &[Global::Changes, Global::All],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Positions,
+    ],
+    &[Global::Links, Global::Matrices],
+    &[Global::Bind, Global::Matrices],
+    &[Global::Values, Global::Halves],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::Values,
+        Global::Halves,
+    ],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::Links,
+        Global::Bind,
+        Global::Values,
+        Global::Halves,
+    ],
+    &[Global::Keys, Global::Intervals, Global::Rotations],
+];
+
+const fn entry(
+    bound: usize,
+    pushed: Option<Global>,
+    workgroup: u32,
+    texels: Option<usize>,
+) -> Entry {
+    Entry {
+        bound: BOUND[bound],
+        pushed,
+        workgroup,
+        texels,
+    }
+}
+
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
 pub(crate) static ENTRIES: [Entry; 161] = [
-    Entry {
-        bound: &[Global::Probes, Global::Replies],
-        pushed: None,
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(106),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(107),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(108),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(109),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(110),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(111),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(112),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(113),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(114),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(115),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(116),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(117),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(118),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(119),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(120),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(121),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(122),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(123),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(124),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(125),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(126),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(127),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(128),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(129),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(130),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(131),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(132),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(133),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(134),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(135),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(136),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(137),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(138),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(139),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(140),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(141),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(142),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(143),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(144),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(145),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(146),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(147),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(148),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(149),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(150),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(151),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(152),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(153),
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Blocks,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Keys, Global::Samples, Global::Rotations],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: Some(154),
-    },
-    Entry {
-        bound: &[Global::Keys, Global::Samples, Global::Rotations],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: Some(155),
-    },
-    Entry {
-        bound: &[
-            Global::Keys,
-            Global::Samples,
-            Global::Weights,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: Some(156),
-    },
-    Entry {
-        bound: &[
-            Global::Base,
-            Global::Layer,
-            Global::Reference,
-            Global::Added,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Layers, Global::Weights, Global::Blended],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::FromLayer,
-            Global::ToLayer,
-            Global::Weights,
-            Global::Mixed,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Values,
-            Global::Steps,
-            Global::Weights,
-            Global::Smoothed,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Values, Global::Steps],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Local, Global::Links, Global::World],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(157),
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(158),
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(159),
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: Some(160),
-    },
-    Entry {
-        bound: &[Global::All, Global::Visible, Global::Gathered],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Changes, Global::All],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Clips,
-            Global::TimeBases,
-            Global::Spans,
-            Global::Positions,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Links, Global::Matrices],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Links, Global::Matrices],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Bind, Global::Matrices],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Values, Global::Halves],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Clips,
-            Global::TimeBases,
-            Global::Spans,
-            Global::Channels,
-            Global::Cells,
-            Global::Values,
-            Global::Halves,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Clips,
-            Global::TimeBases,
-            Global::Spans,
-            Global::Channels,
-            Global::Cells,
-            Global::Values,
-            Global::Halves,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Clips,
-            Global::TimeBases,
-            Global::Spans,
-            Global::Channels,
-            Global::Cells,
-            Global::Links,
-            Global::Bind,
-            Global::Values,
-            Global::Halves,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Clips,
-            Global::TimeBases,
-            Global::Spans,
-            Global::Channels,
-            Global::Cells,
-            Global::Links,
-            Global::Bind,
-            Global::Values,
-            Global::Halves,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Keys, Global::Intervals, Global::Rotations],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Items,
-            Global::Distances,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Segments,
-            Global::Constants,
-            Global::Samples,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Keys, Global::Samples, Global::Rotations],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[Global::Keys, Global::Samples, Global::Rotations],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Keys,
-            Global::Samples,
-            Global::Weights,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Rows),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
-    Entry {
-        bound: &[
-            Global::Entries,
-            Global::Channels,
-            Global::Cells,
-            Global::Positions,
-            Global::Rotations,
-        ],
-        pushed: Some(Global::Dispatch),
-        workgroup: 64,
-        texels: None,
-    },
+    entry(0, None, 64, None),
+    entry(1, Some(Global::Dispatch), 64, Some(106)),
+    entry(1, Some(Global::Dispatch), 64, Some(107)),
+    entry(1, Some(Global::Dispatch), 64, Some(108)),
+    entry(1, Some(Global::Dispatch), 64, Some(109)),
+    entry(1, Some(Global::Dispatch), 64, Some(110)),
+    entry(1, Some(Global::Dispatch), 64, Some(111)),
+    entry(1, Some(Global::Dispatch), 64, Some(112)),
+    entry(1, Some(Global::Dispatch), 64, Some(113)),
+    entry(2, Some(Global::Dispatch), 64, Some(114)),
+    entry(2, Some(Global::Dispatch), 64, Some(115)),
+    entry(2, Some(Global::Dispatch), 64, Some(116)),
+    entry(2, Some(Global::Dispatch), 64, Some(117)),
+    entry(2, Some(Global::Dispatch), 64, Some(118)),
+    entry(2, Some(Global::Dispatch), 64, Some(119)),
+    entry(2, Some(Global::Dispatch), 64, Some(120)),
+    entry(2, Some(Global::Dispatch), 64, Some(121)),
+    entry(3, Some(Global::Dispatch), 64, Some(122)),
+    entry(3, Some(Global::Dispatch), 64, Some(123)),
+    entry(3, Some(Global::Dispatch), 64, Some(124)),
+    entry(3, Some(Global::Dispatch), 64, Some(125)),
+    entry(3, Some(Global::Dispatch), 64, Some(126)),
+    entry(3, Some(Global::Dispatch), 64, Some(127)),
+    entry(3, Some(Global::Dispatch), 64, Some(128)),
+    entry(3, Some(Global::Dispatch), 64, Some(129)),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, Some(130)),
+    entry(1, Some(Global::Dispatch), 64, Some(131)),
+    entry(1, Some(Global::Dispatch), 64, Some(132)),
+    entry(1, Some(Global::Dispatch), 64, Some(133)),
+    entry(1, Some(Global::Dispatch), 64, Some(134)),
+    entry(1, Some(Global::Dispatch), 64, Some(135)),
+    entry(1, Some(Global::Dispatch), 64, Some(136)),
+    entry(1, Some(Global::Dispatch), 64, Some(137)),
+    entry(2, Some(Global::Dispatch), 64, Some(138)),
+    entry(2, Some(Global::Dispatch), 64, Some(139)),
+    entry(2, Some(Global::Dispatch), 64, Some(140)),
+    entry(2, Some(Global::Dispatch), 64, Some(141)),
+    entry(2, Some(Global::Dispatch), 64, Some(142)),
+    entry(2, Some(Global::Dispatch), 64, Some(143)),
+    entry(2, Some(Global::Dispatch), 64, Some(144)),
+    entry(2, Some(Global::Dispatch), 64, Some(145)),
+    entry(3, Some(Global::Dispatch), 64, Some(146)),
+    entry(3, Some(Global::Dispatch), 64, Some(147)),
+    entry(3, Some(Global::Dispatch), 64, Some(148)),
+    entry(3, Some(Global::Dispatch), 64, Some(149)),
+    entry(3, Some(Global::Dispatch), 64, Some(150)),
+    entry(3, Some(Global::Dispatch), 64, Some(151)),
+    entry(3, Some(Global::Dispatch), 64, Some(152)),
+    entry(3, Some(Global::Dispatch), 64, Some(153)),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(6, Some(Global::Rows), 64, Some(154)),
+    entry(6, Some(Global::Rows), 64, Some(155)),
+    entry(7, Some(Global::Rows), 64, Some(156)),
+    entry(8, Some(Global::Dispatch), 64, None),
+    entry(9, Some(Global::Dispatch), 64, None),
+    entry(10, Some(Global::Dispatch), 64, None),
+    entry(11, Some(Global::Dispatch), 64, None),
+    entry(12, Some(Global::Dispatch), 64, None),
+    entry(13, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, Some(157)),
+    entry(14, Some(Global::Dispatch), 64, Some(158)),
+    entry(14, Some(Global::Dispatch), 64, Some(159)),
+    entry(14, Some(Global::Dispatch), 64, Some(160)),
+    entry(15, Some(Global::Dispatch), 64, None),
+    entry(16, Some(Global::Dispatch), 64, None),
+    entry(17, Some(Global::Dispatch), 64, None),
+    entry(18, Some(Global::Dispatch), 64, None),
+    entry(18, Some(Global::Dispatch), 64, None),
+    entry(19, Some(Global::Dispatch), 64, None),
+    entry(20, Some(Global::Dispatch), 64, None),
+    entry(21, Some(Global::Dispatch), 64, None),
+    entry(21, Some(Global::Dispatch), 64, None),
+    entry(22, Some(Global::Dispatch), 64, None),
+    entry(22, Some(Global::Dispatch), 64, None),
+    entry(23, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(6, Some(Global::Rows), 64, None),
+    entry(6, Some(Global::Rows), 64, None),
+    entry(7, Some(Global::Rows), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
 ];
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -2239,12 +718,12 @@ pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
         + M::F::of(ARC_0);
     let flat = tail * (z * t) + t;
     let acute = if steep {
-        M::F::of(HALF_PI) - flat + M::F::of(HALF_PI_LOW)
+        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
     } else {
         flat
     };
     let obtuse = if x < M::F::of(0.0) {
-        M::F::of(PI) - acute + M::F::of(PI_LOW)
+        (M::F::of(PI) - acute) + M::F::of(PI_LOW)
     } else {
         acute
     };
@@ -2306,7 +785,7 @@ pub(crate) fn axis_angle<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F;
     let x = flushed(machine, rotation[0]);
     let y = flushed(machine, rotation[1]);
     let z = flushed(machine, rotation[2]);
-    let square = x * x + y * y + z * z;
+    let square = (x * x + y * y) + z * z;
     let scale = reciprocal_root(machine, square);
     let result = root(machine, square);
     let result_2 = flushed(machine, rotation[3]);
@@ -2356,10 +835,10 @@ pub(crate) fn canonical_product<M: Machine>(
     let result = canonical(
         machine,
         [
-            m[3] * v[0] + m[0] * w + m[1] * v[2] - m[2] * v[1],
-            m[3] * v[1] - m[0] * v[2] + m[1] * w + m[2] * v[0],
-            m[3] * v[2] + m[0] * v[1] - m[1] * v[0] + m[2] * w,
-            m[3] * w - m[0] * v[0] - m[1] * v[1] - m[2] * v[2],
+            ((m[3] * v[0] + m[0] * w) + m[1] * v[2]) - m[2] * v[1],
+            ((m[3] * v[1] - m[0] * v[2]) + m[1] * w) + m[2] * v[0],
+            ((m[3] * v[2] + m[0] * v[1]) - m[1] * v[0]) + m[2] * w,
+            ((m[3] * w - m[0] * v[0]) - m[1] * v[1]) - m[2] * v[2],
         ],
     );
     result
@@ -2407,7 +886,7 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
         let output = position.wrapping_add(loaded_3);
         let block = corner
             .block
-            .wrapping_add(iteration.wrapping_mul(LINE) / BLOCK_SAMPLES);
+            .wrapping_add(quotient(iteration.wrapping_mul(LINE), BLOCK_SAMPLES));
         let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
         return Cell {
             output,
@@ -2490,7 +969,7 @@ pub(crate) fn composed<M: Machine>(
             result,
             |x, y| x + y,
         ),
-        cosm1: a.cosm1 + b.cosm1 + a.cosm1 * b.cosm1 - result_2,
+        cosm1: ((a.cosm1 + b.cosm1) + a.cosm1 * b.cosm1) - result_2,
     }
 }
 
@@ -2584,7 +1063,7 @@ pub(crate) fn corner_of<M: Machine>(
 ) -> Corner {
     let _block = machine.block(line!(), 17);
     let tile = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let line = lane / LINE;
+    let line = quotient(lane, LINE);
     let within = lane & 7u32;
     let loaded = machine.load::<u32>(Global::Dispatch, 1);
     if loaded == 1u32 {
@@ -2598,7 +1077,7 @@ pub(crate) fn corner_of<M: Machine>(
         return Corner {
             first,
             column: 0u32,
-            block: loaded_2.wrapping_add(first / BLOCK_SAMPLES),
+            block: loaded_2.wrapping_add(quotient(first, BLOCK_SAMPLES)),
         };
     }
     let first_2 = group[2]
@@ -2607,7 +1086,7 @@ pub(crate) fn corner_of<M: Machine>(
         .wrapping_mul(SAMPLES_EACH);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
     let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
-    let block = loaded_3.wrapping_add((first_2 / BLOCK_SAMPLES).wrapping_mul(loaded_4));
+    let block = loaded_3.wrapping_add(quotient(first_2, BLOCK_SAMPLES).wrapping_mul(loaded_4));
     Corner {
         first: first_2,
         column: tile.wrapping_mul(LINE).wrapping_add(within),
@@ -2649,7 +1128,7 @@ pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
 pub(crate) fn crowd_work_of_rotations<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 7);
     let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = index / loaded;
+    let instance = quotient(index, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
     let result = layered(
         machine,
@@ -2664,7 +1143,7 @@ pub(crate) fn crowd_work_of_rotations<M: Machine>(machine: &M, index: u32) {
 pub(crate) fn crowd_work_of_locals<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 18);
     let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = index / loaded;
+    let instance = quotient(index, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
     let joint = index.wrapping_sub(instance.wrapping_mul(loaded_2));
     let result = layered(machine, instance, joint, ROTATION);
@@ -2684,7 +1163,7 @@ pub(crate) fn crowd_work_of_locals<M: Machine>(machine: &M, index: u32) {
 pub(crate) fn crowd_work_of_gather<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 13);
     let loaded = machine.load::<u32>(Global::Dispatch, 3);
-    let instance = index / loaded;
+    let instance = quotient(index, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 3);
     let layer = index.wrapping_sub(instance.wrapping_mul(loaded_2));
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
@@ -2717,7 +1196,7 @@ pub(crate) fn crowd_work_of_scatter<M: Machine>(machine: &M, index: u32) {
 pub(crate) fn crowd_work_of_times<M: Machine>(machine: &M, index_in_window: u32) {
     let _block = machine.block(line!(), 14);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let layer = index_in_window / loaded;
+    let layer = quotient(index_in_window, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
     let base_index = index_in_window.wrapping_sub(layer.wrapping_mul(loaded_2));
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
@@ -2763,7 +1242,7 @@ pub(crate) fn crowd_work_of_times<M: Machine>(machine: &M, index_in_window: u32)
 pub(crate) fn crowd_work_of_walk<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = index / loaded;
+    let instance = quotient(index, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 5);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
     let link = machine.load::<CrowdLink>(
@@ -2807,9 +1286,9 @@ pub(crate) fn crowd_work_of_walk<M: Machine>(machine: &M, index: u32) {
 /// `index` is a row of a matrix of a joint of an instance; `dispatch.joints` counts the skeleton's.
 pub(crate) fn crowd_work_of_skin<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 15);
-    let matrix = index / 3u32;
+    let matrix = quotient(index, 3u32);
     let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = matrix / loaded;
+    let instance = quotient(matrix, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
     let first = matrix
         .wrapping_sub(instance.wrapping_mul(loaded_2))
@@ -2927,7 +1406,7 @@ pub(crate) fn distance_at_of_readers<M: Machine>(machine: &M, index: u32) -> M::
 
 pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M::F {
     let _block = machine.block(line!(), 11);
-    let four = machine.load::<[u32; 4]>(Global::Distances, 4 * ((index / 4u32) as usize));
+    let four = machine.load::<[u32; 4]>(Global::Distances, 4 * (quotient(index, 4u32) as usize));
     let two = if index & 2u32 == 2u32 {
         [four[2], four[3]]
     } else {
@@ -2977,12 +1456,12 @@ pub(crate) fn distance_from_middle_of_time_distance<M: Machine>(
 
 pub(crate) fn dot3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> M::F {
     let _block = machine.block(line!(), 5);
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
 pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F {
     let _block = machine.block(line!(), 7);
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    ((a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]) + a[3] * b[3]
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
@@ -3100,7 +1579,7 @@ pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -
     let second = if symmetric {
         whole
     } else {
-        whole - M::F::of(HALF_PI) - M::F::of(HALF_PI_LOW)
+        (whole - M::F::of(HALF_PI)) - M::F::of(HALF_PI_LOW)
     };
     let result_2 = wrapped(machine, first);
     let result_3 = wrapped(machine, second);
@@ -3120,7 +1599,7 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 8);
     let result = norm_squared(machine, segment.tangent);
-    let z = parameter * parameter * result;
+    let z = (parameter * parameter) * result;
     let sines = sine_cosm1_quarter(machine, parameter, z);
     both(
         segment.middle,
@@ -3148,7 +1627,7 @@ pub(crate) fn evaluate_polynomial_segment<M: Machine>(
 pub(crate) fn find_position<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 14);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let layer = index / loaded;
+    let layer = quotient(index, loaded);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
     let base_index = index.wrapping_sub(layer.wrapping_mul(loaded_2));
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
@@ -3298,7 +1777,7 @@ pub(crate) async fn finish_2_of_together<M: Machine>(
             break;
         }
         let loaded_2 = part;
-        let value = loaded_2 / 3u32;
+        let value = quotient(loaded_2, 3u32);
         let other = lane.wrapping_sub(within).wrapping_add(value);
         let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
         if loaded_3 != 0u32 {
@@ -3351,7 +1830,7 @@ pub(crate) async fn finish_2_of_together_2<M: Machine>(
             break;
         }
         let loaded_2 = part;
-        let value = loaded_2 / 9u32;
+        let value = quotient(loaded_2, 9u32);
         let other = lane.wrapping_sub(within).wrapping_add(value);
         let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
         if loaded_3 != 0u32 {
@@ -3404,7 +1883,7 @@ pub(crate) async fn finish_2_of_together_3<M: Machine>(
             break;
         }
         let loaded_2 = part;
-        let value = loaded_2 / 3u32;
+        let value = quotient(loaded_2, 3u32);
         let other = lane.wrapping_sub(within).wrapping_add(value);
         let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
         if loaded_3 != 0u32 {
@@ -3566,7 +2045,7 @@ pub(crate) fn item_at_of_readers<M: Machine>(machine: &M, index: u32) -> Item<M:
 
 pub(crate) fn item_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
     let _block = machine.block(line!(), 16);
-    let texel = 3u32.wrapping_mul(index) / 2u32;
+    let texel = quotient(3u32.wrapping_mul(index), 2u32);
     let first = machine.load::<[u32; 4]>(Global::Items, 4 * (texel as usize));
     let second = machine.load::<[u32; 4]>(Global::Items, 4 * (texel.wrapping_add(1u32) as usize));
     let is_odd = index & 1u32 == 1u32;
@@ -3767,7 +2246,7 @@ pub(crate) fn layered_of_layers<M: Machine>(
                 .wrapping_add(joint);
             let result_3 = cell_at(machine, mask);
             let joint_weight =
-                M::F::of((weight as i32) as f32) * M::F::of(WEIGHT_UNIT) * result_3[0];
+                (M::F::of((weight as i32) as f32) * M::F::of(WEIGHT_UNIT)) * result_3[0];
             let clip = entry.clip_and_weight & 0xffffu32;
             let loaded_9 = machine.load::<u32>(Global::Dispatch, 9);
             let loaded_10 = machine.load::<u32>(Global::Dispatch, 2);
@@ -3884,11 +2363,11 @@ pub(crate) async fn main_of_self_test<M: Machine>(machine: &M) {
     let low = probe.n & 4095i32;
     let sines = sine_cosine(machine, c);
     reply.contraction = a * b + c;
-    reply.reassociation = a + b - a;
+    reply.reassociation = (a + b) - a;
     reply.rounding = a + c;
-    reply.association = a * b * c;
+    reply.association = (a * b) * c;
     reply.conversion = M::F::of(probe.n.wrapping_sub(low) as f32) + M::F::of(low as f32);
-    reply.cancellation = a * c + b - a * c;
+    reply.cancellation = (a * c + b) - a * c;
     reply.sine = sines[0];
     reply.cosine = sines[1];
     let result = root(machine, a * a + c * c);
@@ -4600,7 +3079,7 @@ pub(crate) async fn main_of_whole_rotations<M: Machine>(machine: &M) {
             let _block = machine.block(line!(), 8);
             let loaded_5 = next;
             let index = loaded_5.wrapping_sub(idle);
-            let instance = index / joints;
+            let instance = quotient(index, joints);
             let result = layered(
                 machine,
                 instance,
@@ -4645,7 +3124,7 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
             break;
         }
         let loaded_4 = matrix;
-        let instance = loaded_4 / joints;
+        let instance = quotient(loaded_4, joints);
         let loaded_5 = matrix;
         transform_joint(
             machine,
@@ -4678,7 +3157,7 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
                 break;
             }
             let loaded_12 = index;
-            let instance_2 = loaded_12 / in_level;
+            let instance_2 = quotient(loaded_12, in_level);
             let loaded_13 = index;
             let loaded_14 = machine.load::<CrowdLink>(
                 Global::Links,
@@ -4789,7 +3268,7 @@ pub(crate) fn matrix_rows<M: Machine>(
 
 pub(crate) fn norm_squared<M: Machine>(machine: &M, q: [M::F; 4]) -> M::F {
     let _block = machine.block(line!(), 7);
-    q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]
 }
 
 /// q / |q| for |q| well away from 0.
@@ -5331,7 +3810,7 @@ pub(crate) fn position_at_of_whole<M: Machine>(machine: &M, index: u32) -> Crowd
 
 pub(crate) fn position_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
     let _block = machine.block(line!(), 8);
-    let two = machine.load::<[u32; 4]>(Global::Positions, 4 * ((index / 2u32) as usize));
+    let two = machine.load::<[u32; 4]>(Global::Positions, 4 * (quotient(index, 2u32) as usize));
     let pair = if index & 1u32 == 1u32 {
         [two[2], two[3]]
     } else {
@@ -5347,10 +3826,10 @@ pub(crate) fn position_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> C
 pub(crate) fn product<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> [M::F; 4] {
     let _block = machine.block(line!(), 28);
     [
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+        ((a[3] * b[0] + a[0] * b[3]) + a[1] * b[2]) - a[2] * b[1],
+        ((a[3] * b[1] - a[0] * b[2]) + a[1] * b[3]) + a[2] * b[0],
+        ((a[3] * b[2] + a[0] * b[1]) - a[1] * b[0]) + a[2] * b[3],
+        ((a[3] * b[3] - a[0] * b[0]) - a[1] * b[1]) - a[2] * b[2],
     ]
 }
 
@@ -5369,9 +3848,9 @@ pub(crate) fn reciprocal_root<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 17);
     let seed = M::F::of_bits(ROOT_SEED.wrapping_sub(x.bits() >> 1u32));
     let half = M::F::of(0.5) * x;
-    let first = seed * (M::F::of(1.5) - half * seed * seed);
-    let second = first * (M::F::of(1.5) - half * first * first);
-    second * (M::F::of(1.5) - half * second * second)
+    let first = seed * (M::F::of(1.5) - (half * seed) * seed);
+    let second = first * (M::F::of(1.5) - (half * first) * first);
+    second * (M::F::of(1.5) - (half * second) * second)
 }
 
 pub(crate) fn root<M: Machine>(machine: &M, x: M::F) -> M::F {
@@ -5408,7 +3887,7 @@ pub(crate) fn rotated<M: Machine>(machine: &M, q: [M::F; 4], v: [M::F; 3]) -> [M
 pub(crate) fn rotated_by<M: Machine>(machine: &M, q: [M::F; 4], v: [M::F; 4]) -> [M::F; 4] {
     let _block = machine.block(line!(), 21);
     let half = flushed4(machine, v);
-    let square = half[0] * half[0] + half[1] * half[1] + half[2] * half[2];
+    let square = (half[0] * half[0] + half[1] * half[1]) + half[2] * half[2];
     let long = square > M::F::of(LONGEST_ANGLE_SQUARE);
     let z = if long { M::F::of(0.0) } else { square };
     let sines = sine_cosm1(machine, M::F::of(1.0), z);
@@ -5564,7 +4043,7 @@ pub(crate) fn rotation_step<M: Machine>(
     let result_2 = product(machine, inverse, both(near, from_value, |x, y| x - y));
     let half_step = flushed4(machine, result_2);
     let square =
-        half_step[0] * half_step[0] + half_step[1] * half_step[1] + half_step[2] * half_step[2];
+        (half_step[0] * half_step[0] + half_step[1] * half_step[1]) + half_step[2] * half_step[2];
     let sine = root(machine, square);
     let result_3 = dot4(machine, from_value, near);
     let half = arc_tangent(machine, sine, result_3);
@@ -5591,9 +4070,9 @@ pub(crate) fn row_at<M: Machine>(machine: &M, row: u32) -> [M::F; 4] {
         let loaded_2 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
         return loaded_2;
     }
-    let matrix = row / 3u32;
+    let matrix = quotient(row, 3u32);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = matrix / loaded_3;
+    let instance = quotient(matrix, loaded_3);
     let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
     let first = matrix
         .wrapping_sub(instance.wrapping_mul(loaded_4))
@@ -5657,7 +4136,7 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
     index: u32,
 ) -> KeySample<M::F> {
     let _block = machine.block(line!(), 8);
-    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * ((index / 2u32) as usize));
+    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * (quotient(index, 2u32) as usize));
     let pair = if index & 1u32 == 1u32 {
         [two[2], two[3]]
     } else {
@@ -5698,7 +4177,7 @@ pub(crate) fn sample_at_listed_sample_of_readers_2<M: Machine>(
     index: u32,
 ) -> ListedSample<M::F> {
     let _block = machine.block(line!(), 8);
-    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * ((index / 2u32) as usize));
+    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * (quotient(index, 2u32) as usize));
     let pair = if index & 1u32 == 1u32 {
         [two[2], two[3]]
     } else {
@@ -5987,7 +4466,7 @@ pub(crate) fn slerp<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F
     let result_2 = root(machine, square);
     let result_3 = root(machine, whole);
     let half = arc_tangent(machine, result_2, result_3);
-    let sines = sine_cosine(machine, (t + t - M::F::of(1.0)) * half);
+    let sines = sine_cosine(machine, ((t + t) - M::F::of(1.0)) * half);
     let result_4 = reciprocal_root(machine, square);
     let partner = both(
         difference,
@@ -6073,7 +4552,7 @@ pub(crate) fn small_angle_cubic<M: Machine>(
     let result_13 = dot3(machine, w1, w1);
     let result_14 = dot3(machine, w2, w2);
     let result_15 = dot3(machine, v3, v3);
-    let squared_extent = result_13 + result_14 + result_15;
+    let squared_extent = (result_13 + result_14) + result_15;
     let result_16 = norm_squared(machine, chord_before);
     let result_17 = norm_squared(machine, chord);
     let result_18 = norm_squared(machine, chord_after);
@@ -6126,13 +4605,13 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1) + n3 * M::F::of(B_133_1)
+                [((n1 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1)) + n3 * M::F::of(B_133_1))
                     - d23 * M::F::of(B_123_1); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1) + n1 * M::F::of(B_133_1)
+                [((n3 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1)) + n1 * M::F::of(B_133_1))
                     - d12 * M::F::of(B_123_1); 3],
                 |x, y| x * y,
             ),
@@ -6140,7 +4619,7 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         ),
         both(
             v2,
-            [outward * M::F::of(B_211_1) + n2 * M::F::of(B_222_1) + d13 * M::F::of(B_123_1); 3],
+            [(outward * M::F::of(B_211_1) + n2 * M::F::of(B_222_1)) + d13 * M::F::of(B_123_1); 3],
             |x, y| x * y,
         ),
         |x, y| x + y,
@@ -6149,12 +4628,12 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2) + n3 * M::F::of(B_133_2); 3],
+                [(n1 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2)) + n3 * M::F::of(B_133_2); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2) + n1 * M::F::of(B_133_2); 3],
+                [(n3 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2)) + n1 * M::F::of(B_133_2); 3],
                 |x, y| x * y,
             ),
             |x, y| x - y,
@@ -6166,13 +4645,13 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3) + n3 * M::F::of(B_133_3)
+                [((n1 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3)) + n3 * M::F::of(B_133_3))
                     - d23 * M::F::of(B_123_3); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3) + n1 * M::F::of(B_133_3)
+                [((n3 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3)) + n1 * M::F::of(B_133_3))
                     - d12 * M::F::of(B_123_3); 3],
                 |x, y| x * y,
             ),
@@ -6180,7 +4659,7 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         ),
         both(
             v2,
-            [outward * M::F::of(B_211_3) + n2 * M::F::of(B_222_3) + d13 * M::F::of(B_123_3); 3],
+            [(outward * M::F::of(B_211_3) + n2 * M::F::of(B_222_3)) + d13 * M::F::of(B_123_3); 3],
             |x, y| x * y,
         ),
         |x, y| x + y,
@@ -6189,12 +4668,12 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4) + n3 * M::F::of(B_133_4); 3],
+                [(n1 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4)) + n3 * M::F::of(B_133_4); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4) + n1 * M::F::of(B_133_4); 3],
+                [(n3 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4)) + n1 * M::F::of(B_133_4); 3],
                 |x, y| x * y,
             ),
             |x, y| x - y,
@@ -6206,13 +4685,13 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5) + n3 * M::F::of(B_133_5)
+                [((n1 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5)) + n3 * M::F::of(B_133_5))
                     - d23 * M::F::of(B_123_5); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5) + n1 * M::F::of(B_133_5)
+                [((n3 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5)) + n1 * M::F::of(B_133_5))
                     - d12 * M::F::of(B_123_5); 3],
                 |x, y| x * y,
             ),
@@ -6220,7 +4699,7 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         ),
         both(
             v2,
-            [outward * M::F::of(B_211_5) + n2 * M::F::of(B_222_5) + d13 * M::F::of(B_123_5); 3],
+            [(outward * M::F::of(B_211_5) + n2 * M::F::of(B_222_5)) + d13 * M::F::of(B_123_5); 3],
             |x, y| x * y,
         ),
         |x, y| x + y,
@@ -6229,12 +4708,12 @@ pub(crate) fn small_angle_cubic<M: Machine>(
         both(
             both(
                 v1,
-                [n1 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6) + n3 * M::F::of(B_133_6); 3],
+                [(n1 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6)) + n3 * M::F::of(B_133_6); 3],
                 |x, y| x * y,
             ),
             both(
                 v3,
-                [n3 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6) + n1 * M::F::of(B_133_6); 3],
+                [(n3 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6)) + n1 * M::F::of(B_133_6); 3],
                 |x, y| x * y,
             ),
             |x, y| x - y,
@@ -6377,9 +4856,9 @@ pub(crate) fn span_at<M: Machine>(machine: &M, base: CrowdBase, tick: u32) -> u3
 pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4]) -> [M::F; 3] {
     let _block = machine.block(line!(), 21);
     [
-        a[3] * chord[0] - chord[3] * a[0] - (a[1] * chord[2] - a[2] * chord[1]),
-        a[3] * chord[1] - chord[3] * a[1] - (a[2] * chord[0] - a[0] * chord[2]),
-        a[3] * chord[2] - chord[3] * a[2] - (a[0] * chord[1] - a[1] * chord[0]),
+        (a[3] * chord[0] - chord[3] * a[0]) - (a[1] * chord[2] - a[2] * chord[1]),
+        (a[3] * chord[1] - chord[3] * a[1]) - (a[2] * chord[0] - a[0] * chord[2]),
+        (a[3] * chord[2] - chord[3] * a[2]) - (a[0] * chord[1] - a[1] * chord[0]),
     ]
 }
 
@@ -6910,12 +5389,12 @@ pub(crate) fn wide_sum<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> [u3
 pub(crate) fn wrapped<M: Machine>(machine: &M, angle: M::F) -> M::F {
     let _block = machine.block(line!(), 8);
     let low = if angle < M::F::of(-3.1415927) {
-        angle + M::F::of(6.2831855) + M::F::of(-1.7484555e-7)
+        (angle + M::F::of(6.2831855)) + M::F::of(-1.7484555e-7)
     } else {
         angle
     };
     if low > M::F::of(PI) {
-        low - M::F::of(6.2831855) - M::F::of(-1.7484555e-7)
+        (low - M::F::of(6.2831855)) - M::F::of(-1.7484555e-7)
     } else {
         low
     }

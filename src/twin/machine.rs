@@ -147,6 +147,12 @@ impl Float for f32 {
     }
 }
 
+/// Numbers divided as in WGSL: by 0, a number stays.
+#[inline]
+pub(crate) fn quotient(a: u32, b: u32) -> u32 {
+    a.checked_div(b).unwrap_or(a)
+}
+
 /// An operation on two vectors.
 #[inline]
 pub(crate) fn both<A: Copy, B: Copy, R, const N: usize>(
@@ -291,7 +297,7 @@ impl Memory {
 
     /// An invocation that calls single functions.
     #[cfg(test)]
-    pub(crate) fn invocation(&self) -> Invocation<'_, f32, ()> {
+    pub(crate) fn invocation<F: Float, W: Watch>(&self, watch: W) -> Invocation<'_, F, W> {
         let ids = InvocationIds {
             global_invocation_id: [0; 3],
             workgroup_id: [0; 3],
@@ -302,7 +308,7 @@ impl Memory {
             memory: self,
             ids,
             private: RefCell::default(),
-            watch: (),
+            watch,
             numbers: PhantomData,
         }
     }

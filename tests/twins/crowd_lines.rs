@@ -18,7 +18,7 @@ use crate::twin::machine::Memory;
 use crate::work::whole_instances::WholeInstances;
 use crate::{Device, Engine};
 
-use super::lines::{CARDS, Count, Lane, walk};
+use super::lines::{CARDS, Count, walk};
 
 const INSTANCES: u32 = 50;
 
@@ -94,9 +94,7 @@ fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: Crow
     let memory = Memory::new(whole.kernel, inputs.into_iter(), arguments, Vec::new());
     let mut count = Count::default();
     for group in 0..groups {
-        let lanes =
-            memory.run_group::<f32, Lane>([group, 0, 0], [groups, 1, 1], |_| Lane::default());
-        count.add(&lanes, &memory);
+        count.add(&memory, [group, 0, 0], [groups, 1, 1]);
     }
     let found = memory.into_output();
     // Nothing is stored but the result, once.

@@ -7,6 +7,7 @@
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::panic::resume_unwind;
 use std::rc::Rc;
 
 use fastrand::Rng;
@@ -34,6 +35,8 @@ use crate::work::lists::grid::{GridRows, write_blocks};
 use crate::work::lists::sample_list::SampleList;
 use crate::work::lists::{Cut, GroupWork, work, write};
 use crate::{Device, Engine};
+
+use super::numbers::{Kind, Number, is_planted, is_touched};
 
 /// Workgroups of a dispatch that are run, of all that it has.
 const WORKGROUPS: u32 = 60;
@@ -70,7 +73,7 @@ struct Blocks {
 
 /// What an invocation did.
 #[derive(Default)]
-pub(super) struct Lane {
+pub(super) struct Seen {
     touches: RefCell<Vec<Touch>>,
     blocks: Rc<Blocks>,
 }
@@ -84,19 +87,7 @@ impl Drop for Left {
     }
 }
 
-impl Watch for Lane {
-    type Block = Left;
-
-    fn touch(&self, global: Global, words: Range<usize>, is_store: bool) {
-        let path = self.blocks.path.get();
-        self.touches.borrow_mut().push(Touch {
-            global,
-            words,
-            is_store,
-            path,
-        });
-    }
-
+impl Seen {
     fn block(&self, line: u32, steps: usize) -> Left {
         let before = self.blocks.path.get();
         let mut entered = self.blocks.entered.borrow_mut();
@@ -111,6 +102,79 @@ impl Watch for Lane {
         self.blocks.steps.borrow_mut().insert(path, (line, steps));
         self.blocks.path.set(path);
         Left(Rc::clone(&self.blocks), before)
+    }
+}
+
+/// An invocation whose loads, stores and blocks are counted, or one that ends where a mistake leads it astray.
+pub(super) enum Lane {
+    Counted(Seen),
+    /// By its number in the workgroup; with the number of blocks that it entered.
+    Guarded(u32, Cell<usize>),
+}
+
+/// No invocation of a trial has buffers of more words, or enters more blocks.
+const MAX_WORDS: usize = 1 << 20;
+const MAX_BLOCKS: usize = 1 << 14;
+
+fn stop_if(is_astray: bool) {
+    if is_astray {
+        resume_unwind(Box::new("astray"));
+    }
+}
+
+impl Lane {
+    pub(super) fn counted(_: u32) -> Self {
+        Self::Counted(Seen::default())
+    }
+
+    fn seen(self) -> Option<Seen> {
+        match self {
+            Self::Counted(seen) => Some(seen),
+            Self::Guarded(..) => None,
+        }
+    }
+
+    pub(super) fn guarded(invocation: u32) -> Self {
+        Self::Guarded(invocation, Cell::new(0))
+    }
+}
+
+impl Watch for Lane {
+    type Block = Option<Left>;
+
+    #[track_caller]
+    fn location(&self, at: usize, words: usize) -> usize {
+        if is_planted(Kind::Place) {
+            at + words
+        } else {
+            at
+        }
+    }
+
+    fn touch(&self, global: Global, words: Range<usize>, is_store: bool) {
+        match self {
+            Self::Guarded(invocation, _) => {
+                stop_if(words.end > MAX_WORDS);
+                is_touched(*invocation, &words);
+            }
+            Self::Counted(seen) => seen.touches.borrow_mut().push(Touch {
+                global,
+                words,
+                is_store,
+                path: seen.blocks.path.get(),
+            }),
+        }
+    }
+
+    fn block(&self, line: u32, steps: usize) -> Option<Left> {
+        match self {
+            Self::Guarded(_, blocks) => {
+                blocks.set(blocks.get() + 1);
+                stop_if(blocks.get() > MAX_BLOCKS);
+                None
+            }
+            Self::Counted(seen) => Some(seen.block(line, steps)),
+        }
     }
 }
 
@@ -199,8 +263,10 @@ pub(super) struct Count {
 }
 
 impl Count {
-    /// Counts what a workgroup did in buffers.
-    pub(super) fn add(&mut self, lanes: &[Lane], memory: &Memory) {
+    /// Runs a workgroup, and counts what it does in buffers.
+    pub(super) fn add(&mut self, memory: &Memory, group: [u32; 3], groups: [u32; 3]) {
+        let lanes = memory.run_group::<Number, Lane>(group, groups, Lane::counted);
+        let lanes = &Vec::from_iter(lanes.into_iter().filter_map(Lane::seen));
         for lane in lanes {
             let is_buffer = |touch: &Touch| memory.is_buffer(touch.global);
             lane.touches.borrow_mut().retain(is_buffer);
@@ -265,8 +331,7 @@ impl Launch {
         let mut count = Count::default();
         for number in (0..all).step_by((all / WORKGROUPS).max(1) as usize) {
             let group = [number % x, number / x % y, number / (x * y)];
-            let lanes = memory.run_group::<f32, Lane>(group, self.groups, |_| Lane::default());
-            count.add(&lanes, &memory);
+            count.add(&memory, group, self.groups);
         }
         assert!(count.words > 400, "{:?}: {}", self.kernel, count.words);
         count
@@ -274,7 +339,7 @@ impl Launch {
 }
 
 /// The nth stores of all lanes in one block go together.
-fn stores_of(wave: &[Lane], line: u64) -> Lines {
+fn stores_of(wave: &[Seen], line: u64) -> Lines {
     let mut together = BTreeMap::<(u64, usize), Vec<Range<u64>>>::new();
     for lane in wave {
         let mut stores = BTreeMap::<u64, usize>::new();
@@ -294,7 +359,7 @@ fn stores_of(wave: &[Lane], line: u64) -> Lines {
     lines
 }
 
-fn loads_of(workgroup: &[Lane], line: u64) -> Lines {
+fn loads_of(workgroup: &[Seen], line: u64) -> Lines {
     let mut buffers = BTreeMap::<Global, Vec<_>>::new();
     for lane in workgroup {
         for touch in lane.touches.borrow().iter().filter(|touch| !touch.is_store) {

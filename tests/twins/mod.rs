@@ -3,7 +3,8 @@
 //!
 //! * `arithmetic.rs`: functions that are written for lanes, and those that are written by hand, on hostile arguments;
 //! * `on_trials.rs`: whole kernels on the inputs of the kernels' check, and the CPU's way to the same;
-//! * `numbers.rs`: numbers as devices may compute with them, and mistakes: the check's inputs must show each;
+//! * `numbers.rs`: numbers as devices may compute with them;
+//! * `mistakes.rs`: a mistake anywhere is found, and what kernels and functions give is what `recorded.txt` says;
 //! * `lines.rs` and `crowd_lines.rs`: the memory that the waves of a card touch and the statements that they execute,
 //!   over whole workloads, whose results must be the CPU's.
 //!
@@ -12,5 +13,6 @@
 mod arithmetic;
 mod crowd_lines;
 mod lines;
+mod mistakes;
 mod numbers;
 mod on_trials;

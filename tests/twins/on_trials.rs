@@ -9,7 +9,7 @@ use crate::output::encoding::Encoding;
 use crate::shader::{
     ArcSegment, ArcsDispatch, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch,
     CrowdEntry, CrowdLink, CrowdPosition, CrowdSpan, END_NEGATED, Form, IS_CONSTANT, KERNELS,
-    Kernel, Link, List, ListedSample, PoseDispatch, Probe, ROTATION, SCALE, START_NEGATED, Store,
+    Kernel, Link, List, ListedSample, PoseDispatch, ROTATION, SCALE, START_NEGATED, Store,
     TRANSLATION, WORKGROUP,
 };
 use crate::time::runs::Affine;
@@ -18,8 +18,7 @@ use crate::twin::crowd_matrices::{Rows, affine_product, row_product, to_any_half
 use crate::twin::functions::arc_between;
 use crate::twin::machine::{Memory, UNTOUCHED};
 use crate::twin::{
-    crowd_entries, crowd_times, pose_add, pose_blend, pose_mix, pose_smooth, pose_steps,
-    pose_world, self_test,
+    crowd_entries, crowd_times, pose_add, pose_blend, pose_mix, pose_smooth, pose_steps, pose_world,
 };
 
 /// Trials of each kernel.
@@ -67,17 +66,6 @@ fn kernels_that_read_texels_store_the_same() {
         }
     }
     assert!(count > 100, "{count} trials");
-}
-
-#[test]
-fn the_self_test() {
-    assert_is(Kernel::SelfTest, |trial| {
-        trial
-            .input::<Probe>(0)
-            .into_iter()
-            .map(self_test::reply)
-            .collect()
-    });
 }
 
 /// Listed samples, in every encoding: those in segments, and constants.

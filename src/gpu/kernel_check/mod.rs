@@ -63,15 +63,19 @@ impl Trial {
         memory.into_output()
     }
 
+    /// Runs the trial on a device, over an output.
+    pub(crate) fn run(&self, pipeline: &Pipeline, output: &mut [u8]) -> Result<(), VulkanError> {
+        let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
+        run_on(pipeline, &inputs, &self.arguments, self.groups, output)
+    }
+
     /// Runs the trial, and counts the values that differ, of all.
     fn differing(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<[usize; 2], VulkanError> {
         let mut expected = self.expected(kernel);
         expected.resize(expected.len() + GUARD, UNTOUCHED);
         let mut found = self.before.clone();
         found.resize(expected.len(), UNTOUCHED);
-        let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
-        let output = bytemuck::cast_slice_mut(&mut found);
-        run_on(pipeline, &inputs, &self.arguments, self.groups, output)?;
+        self.run(pipeline, bytemuck::cast_slice_mut(&mut found))?;
         let pairs = found.iter().zip(&expected);
         let differing = pairs.filter(|(found, expected)| found != expected).count();
         Ok([differing, expected.len()])

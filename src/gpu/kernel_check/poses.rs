@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable as _;
 
-use crate::shader::{Kernel, Link, PoseDispatch, ROOT};
+use crate::shader::{Kernel, LEAST_SQUARED_SUM, Link, PoseDispatch, ROOT};
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
@@ -32,6 +32,8 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::PosesBlend => vec![
             blend(random, &[0.5, 0.25, 0.25]),
             blend(random, &[1.0, -1.0]),
+            // A sum that is hardly long enough.
+            blend(random, &[1.0003 * LEAST_SQUARED_SUM.sqrt(), 0.0]),
         ],
         Kernel::PosesMix => [0.0, 0.4, 1.0].map(|weight| mix(random, weight)).into(),
         Kernel::PosesSteps => vec![steps(random, true), steps(random, false)],

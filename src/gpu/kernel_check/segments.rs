@@ -25,6 +25,12 @@ trait Segment: Evaluate {
     fn between(keys: [[f32; 4]; 2]) -> Self;
 }
 
+/// The first block of a grid, which another dispatch has.
+const OTHER: Block = Block {
+    first: 0,
+    starts: 0,
+};
+
 fn any_vector(random: &mut Random) -> [f32; 4] {
     random.vector().map(canonical)
 }
@@ -266,12 +272,7 @@ impl<S: Segment> SegmentInputs<S> {
         let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
         const SHIFT: u32 = 3;
         self.row(random, is_listed, ends);
-        // Another dispatch has the first block.
-        let other = Block {
-            first: 0,
-            starts: 0,
-        };
-        let blocks = [vec![other], self.blocks(0, ends)].concat();
+        let blocks = [vec![OTHER], self.blocks(0, ends)].concat();
         let grid = Grid {
             detail: self.detail(),
             stride: 1,
@@ -300,14 +301,14 @@ impl<S: Segment> SegmentInputs<S> {
         // [block of samples][row]
         let of_samples = SAMPLES.div_ceil(BLOCK_SAMPLES) as usize;
         let blocks = (0..of_samples).flat_map(|i| of_rows.iter().map(move |row| row[i]));
-        let blocks: Vec<_> = blocks.collect();
+        let blocks: Vec<_> = [OTHER].into_iter().chain(blocks).collect();
         let grid = Grid {
             detail: self.detail(),
             stride: STRIDE,
             samples: SAMPLES,
             rows: ROWS,
             first_output: FIRST,
-            first_block: 0,
+            first_block: 1,
             shift: 0,
         };
         // A row may begin anywhere in a line.
