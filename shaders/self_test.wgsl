@@ -1,6 +1,5 @@
 // Entry point of the self-test: one expression for each way in which a driver can be inexact.
-// The host compares every result with its twin's, bit for bit, before it trusts a device.
-// Twin: src/twin/self_test.rs.
+// The host compares every result with that of the kernel in Rust, bit for bit, before it trusts a device.
 
 /// The inputs of one invocation.
 struct Probe {

@@ -211,6 +211,7 @@ fn every_shader_function_has_its_twin() {
                 "whole",
                 "whole_rotations",
                 "whole_matrices",
+                "self_test",
                 "link",
                 "workgroup",
                 "dispatch",

@@ -22,19 +22,22 @@ use naga::{
 
 /// The functions that are written, each with its cut: the names of `let` after which a pipelined loop interrupts it.
 /// A function `f` with a cut is written as `f_begin` and `f_end`, too.
-const FUNCTIONS: [(&str, &[&str]); 33] = [
+const FUNCTIONS: [(&str, &[&str]); 36] = [
     ("canonical", &[]),
     ("flushed", &[]),
     ("flushed4", &[]),
     ("magnitude", &[]),
     ("reciprocal", &[]),
     ("reciprocal_root", &[]),
+    ("root", &[]),
+    ("arc_tangent", &[]),
     ("sine_cosine", &[]),
     ("sine_cosm1", &[]),
     ("sine_cosm1_quarter", &["zx", "sine_tail", "cosine_tail"]),
     ("norm_squared", &[]),
     ("normalised", &[]),
     ("rotated", &[]),
+    ("slerp", &[]),
     ("over", &[]),
     ("polynomial", &["z", "zz"]),
     ("arc_between", &[]),
@@ -58,24 +61,17 @@ const FUNCTIONS: [(&str, &[&str]); 33] = [
     ("small_angle_cubic", &[]),
 ];
 
-/// Functions that Rust has already, and which those of the list call: the algebra that f64 shares, and those of which
-/// lanes need parts that a cut does not give.
-const BY_HAND: [(&str, Numbers, &str); 7] = [
-    ("product", Numbers::Any, "math::quaternion::product"),
-    ("dot4", Numbers::Any, "math::quaternion::dot as dot4"),
-    ("dot3", Numbers::Any, "math::quaternion::dot3"),
-    ("cross3", Numbers::Any, "math::quaternion::cross3"),
-    ("root", Numbers::Any, "twin::arc_tangent::root"),
-    (
-        "arc_tangent",
-        Numbers::One,
-        "twin::arc_tangent::arc_tangent",
-    ),
-    ("slerp", Numbers::One, "twin::quaternion::slerp"),
+/// Functions that Rust has already, and which those of the list call: the algebra that f64 shares. They take any
+/// numbers.
+const BY_HAND: [(&str, &str); 4] = [
+    ("product", "math::quaternion::product"),
+    ("dot4", "math::quaternion::dot as dot4"),
+    ("dot3", "math::quaternion::dot3"),
+    ("cross3", "math::quaternion::cross3"),
 ];
 
 /// What a function cannot be written as, and why.
-type Result<T> = std::result::Result<T, String>;
+pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// What numbers a function takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,9 +108,9 @@ pub(crate) struct Functions {
 
 impl Functions {
     pub(crate) fn new(shared: BTreeSet<String>) -> Self {
-        let by_hand = BY_HAND.map(|(name, numbers, _)| {
+        let by_hand = BY_HAND.map(|(name, _)| {
             let shape = Shape {
-                numbers,
+                numbers: Numbers::Any,
                 vectors: Vectors::Apart,
             };
             (name.to_owned(), (shape, String::new()))
@@ -195,7 +191,7 @@ impl Functions {
                 });
                 if let Ok(fields) = fields {
                     let text = format!(
-                        "#[derive(Clone, Copy)]\npub(crate) struct {name}<N> {{\n{fields}}}\n\n"
+                        "#[derive(Debug, Clone, Copy)]\npub(crate) struct {name}<N> {{\n{fields}}}\n\n"
                     );
                     self.structs.insert(name.clone(), text);
                 }
@@ -217,7 +213,7 @@ impl Functions {
             "//! The shaders' arithmetic. Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n\
              use crate::shader::*;\nuse crate::simd::lanes::Number;\n",
         );
-        for (_, _, path) in BY_HAND {
+        for (_, path) in BY_HAND {
             text += &format!("use crate::{path};\n");
         }
         text.push('\n');
@@ -239,7 +235,7 @@ impl Functions {
 }
 
 /// The comment above a function, as Rust's documentation.
-fn docs(source: &str, name: &str) -> String {
+pub(crate) fn docs(source: &str, name: &str) -> String {
     let before = source
         .split(&format!("\nfn {name}("))
         .next()
@@ -256,7 +252,7 @@ fn docs(source: &str, name: &str) -> String {
         .collect()
 }
 
-fn formatted(text: &str) -> String {
+pub(crate) fn formatted(text: &str) -> String {
     let rustfmt = Command::new("rustfmt")
         .args(["--edition", "2024"])
         .stdin(Stdio::piped())
@@ -344,19 +340,19 @@ impl Types<'_> {
 
 /// An expression in Rust.
 #[derive(Clone)]
-struct Text {
-    text: String,
+pub(crate) struct Text {
+    pub(crate) text: String,
     /// How strongly its outermost operator binds.
-    level: u8,
+    pub(crate) level: u8,
 }
 
 /// A name, a call, an element: nothing binds more strongly.
-const ATOM: u8 = 20;
-const UNARY: u8 = 18;
+pub(crate) const ATOM: u8 = 20;
+pub(crate) const UNARY: u8 = 18;
 /// Always between parentheses as an operand.
-const LOOSE: u8 = 0;
+pub(crate) const LOOSE: u8 = 0;
 
-fn atom(text: impl Into<String>) -> Text {
+pub(crate) fn atom(text: impl Into<String>) -> Text {
     Text {
         text: text.into(),
         level: ATOM,
@@ -365,7 +361,7 @@ fn atom(text: impl Into<String>) -> Text {
 
 impl Text {
     /// As an operand of an operator that binds this strongly.
-    fn within(self, level: u8) -> String {
+    pub(crate) fn within(self, level: u8) -> String {
         match self.level < level {
             true => format!("({})", self.text),
             false => self.text,
@@ -1260,7 +1256,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text) -> Result<Text> {
+pub(crate) fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text) -> Result<Text> {
     use BinaryOperator as Op;
     let (sign, level) = match op {
         Op::Multiply => ("*", 16),
@@ -1330,7 +1326,7 @@ fn prune(lines: &mut Vec<Line>) {
     }
 }
 
-fn field(member: &StructMember) -> &str {
+pub(crate) fn field(member: &StructMember) -> &str {
     member.name.as_deref().unwrap_or_default()
 }
 

@@ -6,6 +6,7 @@
 //! What it makes is checked in, in `shaders/compiled/`: who builds the engine needs no naga, and gets
 //! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
 
+mod entries;
 #[allow(unreachable_pub)] // tests and fuzzing include it
 mod exactness;
 mod functions;
@@ -27,6 +28,7 @@ use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 
+use entries::Source;
 use functions::Functions;
 use rust::{Compiled, Declared};
 use table::{Kernel, WIDE_STORE};
@@ -62,7 +64,7 @@ type Files = Vec<(&'static str, Vec<u8>)>;
 fn compile() -> Files {
     let mut declared = Declared::default();
     let (mut compiled, mut code) = (Vec::new(), Vec::new());
-    let mut parsed = Vec::new();
+    let (mut parsed, mut of_texels) = (Vec::new(), Vec::new());
     for kernel in table::kernels() {
         let (storage, texels) = modules(&kernel);
         declared.collect(&storage.name, &storage.parsed);
@@ -77,14 +79,32 @@ fn compile() -> Files {
             texel_words: texels.as_ref().map(emit),
             name: kernel.name,
         });
-        parsed.push(storage);
+        let files = kernel.files.iter().chain(&WIDE_STORE);
+        let files = Vec::from_iter(files.map(|&file| (file, read_shader(file))));
+        of_texels.extend(texels.map(|texels| (texels, files.clone())));
+        parsed.push((storage, files));
     }
     let mut functions = Functions::new(declared.in_buffers());
-    for module in &parsed {
+    for (module, _) in &parsed {
         functions.collect(&module.name, &module.source, &module.parsed, &module.info);
     }
+    let sources: Vec<Source<'_>> = parsed
+        .iter()
+        .chain(&of_texels)
+        .map(|(module, files)| Source {
+            name: &module.name,
+            text: &module.source,
+            files,
+            module: &module.parsed,
+            info: &module.info,
+        })
+        .collect();
     let rust = declared.rust() + &rust::kernels(&compiled);
     let mut files = vec![
+        (
+            "shaders/compiled/entries.rs",
+            entries::rust(&sources).into_bytes(),
+        ),
         (
             "shaders/compiled/functions.rs",
             functions.rust().into_bytes(),

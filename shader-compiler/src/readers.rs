@@ -19,7 +19,7 @@ pub(crate) fn storage(reads: &[&Read]) -> String {
         writeln!(
             text,
             "@group(0) @binding({binding}) var<storage, read> {buffer}: array<{element}>;
-             fn {function}(place: u32) -> {element} {{ return {buffer}[place]; }}"
+             fn {function}(index: u32) -> {element} {{ return {buffer}[index]; }}"
         )
         .unwrap();
     }
@@ -40,7 +40,7 @@ pub(crate) fn texels(reads: &[&Read], module: &Module) -> String {
         writeln!(
             text,
             "@group(0) @binding({binding}) var {buffer}: texture_1d<u32>;
-             fn {function}(place: u32) -> {element} {{\n{body}}}"
+             fn {function}(index: u32) -> {element} {{\n{body}}}"
         )
         .unwrap();
     }
@@ -88,24 +88,24 @@ fn reader(read: &Read, module: &Module) -> String {
     match size {
         4 => format!(
             "let four = {};
-             let two = select(four.xy, four.zw, (place & 2u) == 2u);
+             let two = select(four.xy, four.zw, (index & 2u) == 2u);
              return {};\n",
-            load("place / 4u"),
-            scalars(&["select(two.x, two.y, (place & 1u) == 1u)"])
+            load("index / 4u"),
+            scalars(&["select(two.x, two.y, (index & 1u) == 1u)"])
         ),
         8 => format!(
             "let two = {};
-             let own = select(two.xy, two.zw, (place & 1u) == 1u);
+             let pair = select(two.xy, two.zw, (index & 1u) == 1u);
              return {};\n",
-            load("place / 2u"),
-            scalars(&["own.x", "own.y"])
+            load("index / 2u"),
+            scalars(&["pair.x", "pair.y"])
         ),
         // A texel and a half.
         24 => format!(
-            "let texel = (3u * place) / 2u;
+            "let texel = (3u * index) / 2u;
              let first = {};
              let second = {};
-             let is_odd = (place & 1u) == 1u;
+             let is_odd = (index & 1u) == 1u;
              let head = select(first, vec4u(first.zw, second.xy), is_odd);
              let tail = select(second.xy, second.zw, is_odd);
              return {};\n",
@@ -117,7 +117,7 @@ fn reader(read: &Read, module: &Module) -> String {
             let Field::Scalar(kind) = fields[0] else {
                 panic!("{buffer}: four fields of four bytes are scalars");
             };
-            let words = vector(kind, load("place"));
+            let words = vector(kind, load("index"));
             let (element, all) = (read.element, ["all.x", "all.y", "all.z", "all.w"]);
             format!(
                 "let all = {words};\nreturn {element}({});\n",
@@ -125,7 +125,7 @@ fn reader(read: &Read, module: &Module) -> String {
             )
         }
         16 if fields.len() == 1 => match fields[0] {
-            Field::Vector(kind) => format!("return {};\n", vector(kind, load("place"))),
+            Field::Vector(kind) => format!("return {};\n", vector(kind, load("index"))),
             _ => panic!("{buffer}: no reader for one field of 16 bytes"),
         },
         _ if size.is_multiple_of(16) => {
@@ -151,7 +151,7 @@ fn reader(read: &Read, module: &Module) -> String {
             assert_eq!(next, texels, "{buffer}: fields fill all texels");
             let element = read.element;
             format!(
-                "let first = {texels}u * place;\nreturn {element}({});\n",
+                "let first = {texels}u * index;\nreturn {element}({});\n",
                 all.join(", ")
             )
         }

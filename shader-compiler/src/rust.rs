@@ -20,7 +20,7 @@ pub(crate) struct Declared {
 }
 
 /// The constant that each store has of its own.
-const PARTS: &str = "PARTS";
+pub(crate) const PARTS: &str = "PARTS";
 
 /// A struct as it lies in a buffer.
 struct Layout {

@@ -6,24 +6,21 @@ use crate::math::quaternion::dot3;
 use crate::math::quaternion::product;
 use crate::shader::*;
 use crate::simd::lanes::Number;
-use crate::twin::arc_tangent::arc_tangent;
-use crate::twin::arc_tangent::root;
-use crate::twin::quaternion::slerp;
 
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct FromIdentity<N> {
     pub(crate) vector: [N; 3],
     pub(crate) cosm1: N,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct MatrixRows<N> {
     pub(crate) first: [N; 3],
     pub(crate) second: [N; 3],
     pub(crate) third: [N; 3],
 }
 
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct SmallAngleCubic<N> {
     pub(crate) powers: [[N; 4]; 7],
     pub(crate) is_valid: bool,
@@ -69,6 +66,37 @@ pub(crate) fn reciprocal_root<N: Number>(x: N) -> N {
     let first = seed * (N::all(1.5) - half * seed * seed);
     let second = first * (N::all(1.5) - half * first * first);
     second * (N::all(1.5) - half * second * second)
+}
+
+#[inline(always)]
+pub(crate) fn root<N: Number>(x: N) -> N {
+    let near = x * reciprocal_root(x);
+    near + (x - near * near) * (N::all(0.5) * reciprocal_root(x))
+}
+
+/// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+#[inline(always)]
+pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
+    let up = magnitude(y);
+    let along = magnitude(x);
+    let steep = up > along;
+    let large = if steep { up } else { along };
+    let small = if steep { along } else { up };
+    let divisor = if large == 0.0 { 1.0 } else { large };
+    let inverse = reciprocal(divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
+    let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
+    let flat = tail * (z * t) + t;
+    let acute = if steep {
+        HALF_PI - flat + HALF_PI_LOW
+    } else {
+        flat
+    };
+    let obtuse = if x < 0.0 { PI - acute + PI_LOW } else { acute };
+    if y < 0.0 { -obtuse } else { obtuse }
 }
 
 /// Sine (x) and cosine (y).
@@ -176,6 +204,50 @@ pub(crate) fn rotated<N: Number>(q: [N; 4], v: [N; 3]) -> [N; 3] {
         v[0] + twice[0] * q[3] + again[0],
         v[1] + twice[1] * q[3] + again[1],
         v[2] + twice[2] * q[3] + again[2],
+    ]
+}
+
+/// Slerp about the middle of the arc, the shorter way, for t from 0 to 1.
+#[inline(always)]
+pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+    let near = if dot4(a, b) < 0.0 {
+        [-b[0], -b[1], -b[2], -b[3]]
+    } else {
+        b
+    };
+    let sum = [
+        a[0] + near[0],
+        a[1] + near[1],
+        a[2] + near[2],
+        a[3] + near[3],
+    ];
+    let difference = flushed4([
+        near[0] - a[0],
+        near[1] - a[1],
+        near[2] - a[2],
+        near[3] - a[3],
+    ]);
+    let square = dot4(difference, difference);
+    let whole = dot4(sum, sum);
+    let half = arc_tangent(root(square), root(whole));
+    let sines = sine_cosine((t + t - 1.0) * half);
+    let number_1 = if square == 0.0 {
+        0.0
+    } else {
+        reciprocal_root(square)
+    };
+    let partner = [
+        difference[0] * number_1,
+        difference[1] * number_1,
+        difference[2] * number_1,
+        difference[3] * number_1,
+    ];
+    let number_2 = reciprocal_root(whole);
+    [
+        sum[0] * number_2 * sines.1 + partner[0] * sines.0,
+        sum[1] * number_2 * sines.1 + partner[1] * sines.0,
+        sum[2] * number_2 * sines.1 + partner[2] * sines.0,
+        sum[3] * number_2 * sines.1 + partner[3] * sines.0,
     ]
 }
 

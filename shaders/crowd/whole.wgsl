@@ -60,8 +60,8 @@ fn entry_at(index: u32) -> CrowdEntry {
     return entries[first_entry + index];
 }
 
-fn channel_at(place: u32) -> CrowdChannel { return channels[place]; }
-fn cell_at(place: u32) -> vec4f { return cells[place]; }
+fn channel_at(index: u32) -> CrowdChannel { return channels[index]; }
+fn cell_at(index: u32) -> vec4f { return cells[index]; }
 
 fn position_at(index: u32) -> CrowdPosition {
     return CrowdPosition(found_spans[index], found_parameters[index]);

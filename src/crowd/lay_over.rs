@@ -114,7 +114,7 @@ impl Over<'_> {
     }
 }
 
-/// [`slerp`](crate::twin::quaternion::slerp) without the special case of rotations that are about 90° apart in R⁴;
+/// [`slerp`](crate::twin::functions::slerp) without the special case of rotations that are about 90° apart in R⁴;
 /// then `None`.
 #[inline(always)]
 fn slerp<L: Lanes, const VECTORS: usize>(

@@ -7,14 +7,12 @@ use bytemuck::Zeroable as _;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::kernel_check::self_test::probes;
+use crate::gpu::kernel_check::self_test::trial;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::gpu::run_once::run_once;
 use crate::machine::error::VulkanError;
 pub(crate) use crate::machine::reports::{NegativeControl, SelfTestReport};
-use crate::shader::{Dispatch, Kernel, Reply, WORKGROUP};
-use crate::twin::self_test::reply;
+use crate::shader::{Kernel, Reply};
 
 /// Runs every expression on a device.
 pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
@@ -37,21 +35,12 @@ fn expressions(
     device: &Arc<LogicalDevice>,
     exactness: Exactness,
 ) -> Result<Vec<SelfTestReport>, VulkanError> {
-    let probes = probes();
-    let mut replies = vec![Reply::zeroed(); probes.len()];
+    let trial = trial();
+    let expected: Vec<Reply> = bytemuck::pod_collect_to_vec(&trial.expected(Kernel::SelfTest));
+    let mut replies = vec![Reply::zeroed(); expected.len()];
     let pipeline = Pipeline::new(device, Kernel::SelfTest, exactness)?;
-    let dispatch = Dispatch {
-        item_count: probes.len() as u32,
-        stride: 1,
-        ..Dispatch::zeroed()
-    };
-    run_once(
-        &pipeline,
-        &[bytemuck::cast_slice(&probes)],
-        bytemuck::bytes_of(&dispatch),
-        [(probes.len() as u32).div_ceil(WORKGROUP), 1, 1],
-        bytemuck::cast_slice_mut(&mut replies),
-    )?;
+    let output = bytemuck::cast_slice_mut(&mut replies);
+    trial.run(&pipeline, output)?;
     let self_tests: [(&str, Value); 10] = [
         ("contraction", |reply| reply.contraction),
         ("re-association of a sum", |reply| reply.reassociation),
@@ -64,13 +53,12 @@ fn expressions(
         ("root", |reply| reply.root),
         ("arc tangent", |reply| reply.arc_tangent),
     ];
-    let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
     let reports = self_tests.map(|(name, value)| {
         let pairs = expected.iter().zip(&replies);
         let differing = pairs.filter(|(a, b)| value(a).to_bits() != value(b).to_bits());
         SelfTestReport {
             name,
-            total: probes.len(),
+            total: expected.len(),
             differing: differing.count(),
         }
     });

@@ -1,15 +1,10 @@
-//! Twin of `shaders/math/arc_tangent.wgsl`: the same names, the same order.
+//! Reciprocal, square root and arc tangent, of `shaders/math/arc_tangent.wgsl`; and the parts of them that vectors of
+//! rotations need, in the same order of operations.
 
 use crate::shader::*;
 use crate::simd::lanes::Number;
-pub(crate) use crate::twin::functions::{flushed, reciprocal_root};
-use crate::twin::functions::{magnitude, reciprocal};
-
-#[inline(always)]
-pub(crate) fn root<N: Number>(x: N) -> N {
-    let inverse = reciprocal_root(x);
-    root_by(x, inverse)
-}
+use crate::twin::functions::reciprocal;
+pub(crate) use crate::twin::functions::{arc_tangent, flushed, reciprocal_root, root};
 
 /// The root of a number of which the reciprocal root is known.
 #[inline(always)]
@@ -30,28 +25,6 @@ pub(crate) fn flat_arc_tangent<N: Number>(small: N, large: N) -> N {
     let lower = (high * z + N::all(ARC_3)) * z + N::all(ARC_2);
     let tail = (lower * z + N::all(ARC_1)) * z + N::all(ARC_0);
     tail * (z * t) + t
-}
-
-#[inline(always)]
-pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
-    let up = magnitude(y);
-    let along = magnitude(x);
-    let steep = up > along;
-    let large = if steep { up } else { along };
-    let small = if steep { along } else { up };
-    let divisor = if large == 0.0 { 1.0 } else { large };
-    let flat = flat_arc_tangent(small, divisor);
-    let acute = if steep {
-        (HALF_PI - flat) + HALF_PI_LOW
-    } else {
-        flat
-    };
-    let angle = if x < 0.0 {
-        (PI - acute) + PI_LOW
-    } else {
-        acute
-    };
-    if y < 0.0 { -angle } else { angle }
 }
 
 #[cfg(test)]

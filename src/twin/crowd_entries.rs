@@ -23,7 +23,8 @@ pub(crate) fn change(index: u32, entry: &CrowdEntry) -> CrowdChange {
     }
 }
 
-/// Writes a changed entry to its index.
+/// Writes a changed entry to its index, as the kernel does.
+#[cfg(test)]
 pub(crate) fn scatter(change: &CrowdChange, all: &mut [CrowdEntry]) {
     all[change.index as usize] = CrowdEntry {
         clip_and_weight: change.clip_and_weight,

@@ -9,6 +9,24 @@ pub(crate) mod crowd_entries;
 pub(crate) mod crowd_layers;
 pub(crate) mod crowd_matrices;
 pub(crate) mod crowd_times;
+// Each statement and each operation of the shaders is one here, whether Rust needs it or has a shorter way to say it;
+// tests alone run the kernels that read texel buffers.
+#[cfg(feature = "vulkan")]
+#[allow(
+    dead_code,
+    unused_assignments,
+    unused_variables,
+    clippy::approx_constant,
+    clippy::doc_markdown,
+    clippy::if_not_else,
+    clippy::let_and_return,
+    clippy::needless_return,
+    clippy::nonminimal_bool,
+    clippy::redundant_closure,
+    clippy::redundant_closure_for_method_calls
+)]
+#[path = "../../shaders/compiled/entries.rs"]
+pub(crate) mod entries;
 pub(crate) mod euler;
 pub(crate) mod evaluate_arc;
 pub(crate) mod evaluate_polynomial;
@@ -21,6 +39,8 @@ pub(crate) mod f16;
 )]
 #[path = "../../shaders/compiled/functions.rs"]
 pub(crate) mod functions;
+#[cfg(feature = "vulkan")]
+pub(crate) mod machine;
 pub(crate) mod matrix;
 pub(crate) mod pose_add;
 pub(crate) mod pose_blend;
@@ -29,7 +49,6 @@ pub(crate) mod pose_smooth;
 pub(crate) mod pose_steps;
 pub(crate) mod pose_world;
 pub(crate) mod quaternion;
-pub(crate) mod self_test;
 pub(crate) mod sine_cosine;
 pub(crate) mod small_angle;
 pub(crate) mod snorm16;

@@ -12,22 +12,3 @@ pub(crate) fn moved(value: [f32; 4], sum: [f32; 4], are_rotations: bool) -> [f32
     };
     moved.map(canonical)
 }
-
-/// The whole function of the shader; `steps` starts with the first step that affects the value at index 0.
-pub(crate) fn pose(
-    values: &[[f32; 4]],
-    steps: &[[f32; 4]],
-    weights: &[f32],
-    are_rotations: bool,
-    index: usize,
-) -> [f32; 4] {
-    let mut sum = [0.0; 4];
-    for (m, weight) in weights.iter().enumerate() {
-        let after = steps[index + weights.len() + m];
-        let before = steps[index + weights.len() - 1 - m];
-        for c in 0..4 {
-            sum[c] += (after[c] - before[c]) * weight;
-        }
-    }
-    moved(values[index], sum, are_rotations)
-}

@@ -1,12 +1,11 @@
 //! Quaternion algebra, of `shaders/math/quaternion.wgsl`. Its `product` and `dot4` are
-//! [`product`](crate::math::quaternion::product) and [`dot`], which f64 shares. [`slerp`] is written by hand, the same
-//! names in the same order: vectors of rotations need parts of it.
+//! [`product`](crate::math::quaternion::product) and [`dot`], which f64 shares. [`chord`] and [`along`] are parts of
+//! [`slerp`](crate::twin::functions::slerp) in the same order of operations, for blocks of rotations ([`lay_over`](crate::crowd::lay_over)).
 
 use crate::math::quaternion::dot;
 use crate::simd::lanes::Number;
-use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
+use crate::twin::functions::flushed;
 pub(crate) use crate::twin::functions::{normalised, over, rotated};
-use crate::twin::sine_cosine::sine_cosine;
 
 /// The sum of two rotations, and the difference from the first to the nearer sign of the second.
 #[inline(always)]
@@ -43,26 +42,4 @@ pub(crate) fn along<N: Number>(
         sum[2] * to_unit * sine_and_cosine.1 + difference[2] * inverse * sine_and_cosine.0,
         sum[3] * to_unit * sine_and_cosine.1 + difference[3] * inverse * sine_and_cosine.0,
     ]
-}
-
-/// The function of the shader; its parts are separate functions for blocks of rotations
-/// ([`lay_over`](crate::crowd::lay_over)).
-#[inline(always)]
-pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
-    let (sum, difference) = chord(a, b);
-    let square = dot(difference, difference);
-    let whole = dot(sum, sum);
-    let half = arc_tangent(root(square), root(whole));
-    let sine_and_cosine = sine_cosine((t + t - 1.0) * half);
-    let inverse = if square == 0.0 {
-        0.0
-    } else {
-        reciprocal_root(square)
-    };
-    along(
-        sum,
-        difference,
-        (reciprocal_root(whole), inverse),
-        sine_and_cosine,
-    )
 }

@@ -1,10 +1,8 @@
 //! How many lines of memory the waves of a card touch when they evaluate whole instances of a crowd, counted as in
-//! `lines.rs`, and how many bytes they store.
-
-use std::collections::BTreeMap;
+//! `lines.rs`. What they store has to be the CPU's.
 
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
@@ -14,28 +12,15 @@ use crate::method::slerp::SLERP;
 use crate::method::vector_method::VectorMethod;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::pose::skeleton::Skeleton;
-use crate::shader::{
-    CROWD_WORKGROUP, CrowdDispatch, Kernel, LINE_VECTORS, MAX_WHOLE_JOINTS, MAX_WHOLE_POSITIONS,
-};
+use crate::shader::{CrowdDispatch, Kernel};
 use crate::tracks::set::TrackSet;
+use crate::twin::machine::Memory;
 use crate::work::whole_instances::WholeInstances;
+use crate::{Device, Engine};
 
-use super::lines::{CARDS, Lines, cells, global, loads_of, store, walk};
-use super::machine::{Machine, Touch};
-use super::operations::FloatMode;
-use super::program::Checked;
-use super::source;
+use super::lines::{CARDS, Count, walk};
 
 const INSTANCES: u32 = 50;
-
-/// What comes with a dispatch, and the memory of an invocation and of a workgroup.
-const NO_BUFFERS: [&str; 5] = [
-    "dispatch",
-    "first_entry",
-    "found_spans",
-    "found_parameters",
-    "rows",
-];
 
 /// Two clips of a skeleton.
 fn library(joints: usize, method: Method) -> CrowdLibrary {
@@ -52,133 +37,90 @@ fn library(joints: usize, method: Method) -> CrowdLibrary {
         }
         library.push(&set, method, VectorMethod::Linear).unwrap();
     }
+    let bind = (0..joints).map(|joint| Affine3A::from_rotation_x(joint as f32));
+    let bind: Vec<Affine3A> = bind.collect();
+    library.set_inverse_bind(&bind).unwrap();
     library
 }
 
-/// Runs all workgroups, and counts.
+/// Runs all workgroups, counts, and compares the result with the CPU's.
 fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: CrowdOutput) {
+    const CLOCK: u64 = 1 << 20;
     let mut random = Rng::with_seed(6);
     let joints = library.joint_count() as u32;
     let arguments = CrowdDispatch {
         count: INSTANCES,
-        clock_low: 1 << 20,
+        clock_low: CLOCK as u32,
         ..library.arguments(layers)
     };
     let is_plain = layers == 1 && library.tables.has_only_arcs();
     let whole = WholeInstances::new(&arguments, output, is_plain).expect("it is small");
     let (pushed, groups) = whole.dispatch(arguments, &library.levels);
-    let kernel = whole.kernel.code(false).0;
-    let program = Checked::parse(source(kernel)).program(FloatMode::AsWritten);
-    let mut machine = Machine::new(&program);
-    let entries: Vec<_> = (0..INSTANCES * layers as u32)
-        .map(|_| {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut crowd = engine.crowd(library, INSTANCES as usize, layers).unwrap();
+    crowd.set_clock(CLOCK).unwrap();
+    let entries: Vec<_> = (0..INSTANCES as usize * layers)
+        .map(|entry| {
             let plays = CrowdLayer {
                 weight: 0.5,
                 ..CrowdLayer::new(random.usize(..2)).at(random.i64(..1 << 20))
             };
-            plays.packed(&library.tables.clips, 0, 0).unwrap()
+            crowd.set(entry / layers, entry % layers, plays).unwrap();
+            plays.packed(&library.tables.clips, 0, CLOCK).unwrap()
         })
         .collect();
     let mut links = library.links.clone();
-    links.extend(
-        library
-            .levels
-            .windows(2)
-            .map(|level| crate::shader::CrowdLink {
-                joint: level[0],
-                parent: level[1],
-            }),
-    );
-    let each = if output.is_half { 2 } else { 4 };
-    let stored = if output.is_half { "halves" } else { "values" };
-    let vectors = INSTANCES * joints * output.vector_count() as u32;
-    let tables = &library.tables;
-    for (name, filled) in [
-        ("dispatch", cells(bytemuck::bytes_of(&pushed))),
-        ("first_entry", vec![0]),
-        ("found_spans", vec![0; MAX_WHOLE_POSITIONS as usize]),
-        ("found_parameters", vec![0; MAX_WHOLE_POSITIONS as usize]),
-        ("entries", cells(bytemuck::cast_slice(&entries))),
-        ("clips", cells(bytemuck::cast_slice(&tables.clips))),
-        ("time_bases", cells(bytemuck::cast_slice(&tables.bases))),
-        ("spans", cells(bytemuck::cast_slice(&tables.spans))),
-        ("channels", cells(bytemuck::cast_slice(&tables.channels))),
-        (
-            "cells",
-            cells(bytemuck::cast_slice(&library.cells().unwrap())),
-        ),
-        (stored, vec![0; (vectors * each) as usize]),
-    ] {
-        machine.globals[global(&program, name)] = filled;
-    }
+    let levels = library.levels.windows(2);
+    links.extend(levels.map(|level| crate::shader::CrowdLink {
+        joint: level[0],
+        parent: level[1],
+    }));
+    let (tables, cells) = (&library.tables, library.cells().unwrap());
+    let mut inputs: Vec<&[u8]> = vec![
+        bytemuck::cast_slice(&entries),
+        bytemuck::cast_slice(&tables.clips),
+        bytemuck::cast_slice(&tables.bases),
+        bytemuck::cast_slice(&tables.spans),
+        bytemuck::cast_slice(&tables.channels),
+        bytemuck::cast_slice(&cells),
+    ];
     if output.values != CrowdValues::Rotations {
-        let bind = vec![0; 12 * joints as usize];
-        for (name, filled) in [
-            ("rows", vec![0; 12 * MAX_WHOLE_JOINTS as usize]),
-            ("links", cells(bytemuck::cast_slice(&links))),
-            ("bind", bind),
-        ] {
-            machine.globals[global(&program, name)] = filled;
-        }
+        inputs.extend([
+            bytemuck::cast_slice(&links),
+            bytemuck::cast_slice(&library.bind),
+        ]);
     }
-    let is_buffer = |touch: &Touch| !NO_BUFFERS.contains(&&*program.globals[touch.global]);
-    let main = program.functions.len() - 1;
-    let of_group = pushed.instances * joints * output.vector_count() as u32;
-    let line_vectors = LINE_VECTORS << u32::from(output.is_half);
-    let mut of_cards = [[Lines::default(); 2]; CARDS.len()];
-    let mut bytes = 0;
+    let arguments = bytemuck::bytes_of(&pushed);
+    let memory = Memory::new(whole.kernel, inputs.into_iter(), arguments, Vec::new());
+    let mut count = Count::default();
     for group in 0..groups {
-        let mut run = |lane| {
-            machine.touches = Some(Vec::new());
-            let arguments = [group, 0, 0, groups, 1, 1, lane].map(u64::from);
-            assert!(
-                machine.call(main, &arguments).is_some(),
-                "{kernel}: {group}, {lane}"
-            );
-            let mut touches = machine.touches.take().unwrap_or_default();
-            touches.retain(is_buffer);
-            touches
-        };
-        // The first run leaves the positions for the second.
-        (0..CROWD_WORKGROUP).for_each(|lane| drop(run(lane)));
-        let lanes: Vec<Vec<Touch>> = (0..CROWD_WORKGROUP).map(run).collect();
-        // Invocations take vectors from the beginning of a line on, in rounds.
-        let first = group * of_group / line_vectors * line_vectors;
-        let vector = |touch: &Touch| (touch.bytes().start / (4 * u64::from(each))) as u32 - first;
-        for ((wave, line), lines) in CARDS.into_iter().zip(&mut of_cards) {
-            let mut together = BTreeMap::<(u32, u32), Vec<_>>::new();
-            for (lane, touches) in (0..).zip(&lanes) {
-                for touch in touches.iter().filter(|touch| touch.is_store) {
-                    let vector = vector(touch);
-                    assert_eq!(vector % CROWD_WORKGROUP, lane, "{kernel}: {group}");
-                    let key = (vector / CROWD_WORKGROUP, lane / wave);
-                    together.entry(key).or_default().push(touch.bytes());
-                }
-            }
-            together
-                .values()
-                .for_each(|ranges| lines[0].add(store(ranges, line)));
-            lines[1].add(loads_of(&lanes, line));
-        }
-        let stores = lanes.iter().flatten().filter(|touch| touch.is_store);
-        bytes += stores
-            .map(|touch| touch.bytes().end - touch.bytes().start)
-            .sum::<u64>();
+        count.add(&memory, [group, 0, 0], [groups, 1, 1]);
     }
+    let found = memory.into_output();
     // Nothing is stored but the result, once.
-    assert_eq!(bytes, u64::from(vectors * each * 4), "{kernel}");
-    let label = format!("{kernel}, {joints} joints, {output:?}");
-    for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(of_cards) {
+    assert_eq!(count.words as usize, found.len(), "{:?}", whole.kernel);
+    let expected: Vec<u32> = match output.is_half {
+        true => {
+            let mut values = vec![[0u16; 4]; crowd.output_len(output)];
+            crowd
+                .evaluate_half_into(output.values, &mut values)
+                .unwrap();
+            bytemuck::pod_collect_to_vec(&values)
+        }
+        false => {
+            let mut values = vec![[0.0f32; 4]; crowd.output_len(output)];
+            crowd.evaluate_into(output.values, &mut values).unwrap();
+            bytemuck::pod_collect_to_vec(&values)
+        }
+    };
+    let label = format!("{:?}, {joints} joints, {output:?}", whole.kernel);
+    assert!(found == expected, "{label}: not the CPU's values");
+    for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
         let (stored, loaded) = (stores.ratio(), loads.ratio());
         println!("{label}, {wave} lanes, lines of {line}: {stored:.2} {loaded:.2}");
-        assert!(
-            stored <= 1.1,
-            "{label}, {wave} lanes, lines of {line}: {stored}"
-        );
-        assert!(
-            loaded <= 1.3,
-            "{label}, {wave} lanes, lines of {line}: {loaded}"
-        );
+        let label = format!("{label}, {wave} lanes, lines of {line}");
+        assert!(stored <= 1.1, "{label}: {stored}");
+        assert!(loaded <= 1.3, "{label}: {loaded}");
     }
 }
 

@@ -1,11 +1,14 @@
-//! How many lines of memory the waves of a card touch. Cards run 32 or 64 invocations together, and
-//! move memory in lines: sectors of 32 bytes on NVIDIA's, lines of 64 or 128 on AMD's. Here the
-//! kernels that cards are given run over the work lists of workloads as `tumble bench` has them,
-//! smaller ones; every load and store is noted, and each wave's lines are counted. No device is
-//! needed: what counts are the addresses, and those follow from the shaders.
+//! How many lines of memory the waves of a card touch, and how many statements they execute. Cards run 32 or 64
+//! invocations together, and move memory in lines: sectors of 32 bytes on NVIDIA's, lines of 64 or 128 on AMD's. A wave
+//! executes a branch if any of its invocations takes it. Here the kernels that cards are given run over the work lists
+//! of workloads as `tumble bench` has them, smaller ones. No device is needed: what counts are addresses and branches,
+//! and those follow from the shaders. What they store has to be the CPU's.
 
+use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::panic::resume_unwind;
+use std::rc::Rc;
 
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
@@ -20,20 +23,20 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::preparation::SetRequest;
 use crate::shader::{
-    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample, TangentWeights,
-    WORKGROUP,
+    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, Kernel, KeySample, List, ListedSample, Store,
+    TangentWeights, WORKGROUP,
 };
 use crate::time::frames::{SampleTimes, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
+use crate::twin::entries::Global;
+use crate::twin::machine::{Memory, UNTOUCHED, Watch};
 use crate::work::lists::grid::{GridRows, write_blocks};
 use crate::work::lists::keys::KeyJob;
 use crate::work::lists::sample_list::SampleList;
 use crate::work::lists::{Cut, GroupWork, work, write};
+use crate::{Device, Engine};
 
-use super::machine::{Machine, Touch};
-use super::operations::FloatMode;
-use super::program::{Checked, Program};
-use super::source;
+use super::numbers::{Kind, Number, is_planted, is_touched};
 
 /// Workgroups of a dispatch that are run, of all that it has.
 const WORKGROUPS: u32 = 60;
@@ -42,32 +45,149 @@ const WORKGROUPS: u32 = 60;
 pub(super) const CARDS: [(u32, u64); 6] =
     [(32, 32), (32, 64), (32, 128), (64, 32), (64, 64), (64, 128)];
 
-/// The built-in inputs of an entry point.
-#[derive(Clone, Copy)]
-enum Builtins {
-    /// The workgroup, how many there are, and the invocation's index in it.
-    Workgroup,
-    /// The invocation's index among all, and how many workgroups there are.
-    Invocation,
-    /// The invocation's index among all.
-    InvocationAlone,
+/// A load or a store of an invocation.
+pub(super) struct Touch {
+    global: Global,
+    words: Range<usize>,
+    is_store: bool,
+    /// The blocks around it: invocations that run together take it together where they are the same.
+    path: u64,
+}
+
+impl Touch {
+    fn bytes(&self) -> Range<u64> {
+        4 * self.words.start as u64..4 * self.words.end as u64
+    }
+}
+
+/// The blocks of statements that an invocation entered. A path stands for a block, in a call, in an iteration of a
+/// loop, and so on up to the entry point.
+#[derive(Default)]
+struct Blocks {
+    path: Cell<u64>,
+    /// How often each line of the file was entered from each path.
+    entered: RefCell<BTreeMap<(u64, u32), u64>>,
+    /// The line of each path, and its operations.
+    steps: RefCell<BTreeMap<u64, (u32, usize)>>,
+}
+
+/// What an invocation did.
+#[derive(Default)]
+pub(super) struct Seen {
+    touches: RefCell<Vec<Touch>>,
+    blocks: Rc<Blocks>,
+}
+
+/// Leaves the block when it is dropped.
+pub(super) struct Left(Rc<Blocks>, u64);
+
+impl Drop for Left {
+    fn drop(&mut self) {
+        self.0.path.set(self.1);
+    }
+}
+
+impl Seen {
+    fn block(&self, line: u32, steps: usize) -> Left {
+        let before = self.blocks.path.get();
+        let mut entered = self.blocks.entered.borrow_mut();
+        let times = entered.entry((before, line)).or_default();
+        *times += 1;
+        // FNV's step for each number.
+        let path = [before, line.into(), *times]
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325, |hash, n| {
+                (hash ^ n).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
+            });
+        self.blocks.steps.borrow_mut().insert(path, (line, steps));
+        self.blocks.path.set(path);
+        Left(Rc::clone(&self.blocks), before)
+    }
+}
+
+/// An invocation whose loads, stores and blocks are counted, or one that ends where a mistake leads it astray.
+pub(super) enum Lane {
+    Counted(Seen),
+    /// By its number in the workgroup; with the number of blocks that it entered.
+    Guarded(u32, Cell<usize>),
+}
+
+/// No invocation of a trial has buffers of more words, or enters more blocks.
+const MAX_WORDS: usize = 1 << 20;
+const MAX_BLOCKS: usize = 1 << 14;
+
+fn stop_if(is_astray: bool) {
+    if is_astray {
+        resume_unwind(Box::new("astray"));
+    }
+}
+
+impl Lane {
+    pub(super) fn counted(_: u32) -> Self {
+        Self::Counted(Seen::default())
+    }
+
+    fn seen(self) -> Option<Seen> {
+        match self {
+            Self::Counted(seen) => Some(seen),
+            Self::Guarded(..) => None,
+        }
+    }
+
+    pub(super) fn guarded(invocation: u32) -> Self {
+        Self::Guarded(invocation, Cell::new(0))
+    }
+}
+
+impl Watch for Lane {
+    type Block = Option<Left>;
+
+    #[track_caller]
+    fn location(&self, at: usize, words: usize) -> usize {
+        if is_planted(Kind::Place) {
+            at + words
+        } else {
+            at
+        }
+    }
+
+    fn touch(&self, global: Global, words: Range<usize>, is_store: bool) {
+        match self {
+            Self::Guarded(invocation, _) => {
+                stop_if(words.end > MAX_WORDS);
+                is_touched(*invocation, &words);
+            }
+            Self::Counted(seen) => seen.touches.borrow_mut().push(Touch {
+                global,
+                words,
+                is_store,
+                path: seen.blocks.path.get(),
+            }),
+        }
+    }
+
+    fn block(&self, line: u32, steps: usize) -> Option<Left> {
+        match self {
+            Self::Guarded(_, blocks) => {
+                blocks.set(blocks.get() + 1);
+                stop_if(blocks.get() > MAX_BLOCKS);
+                None
+            }
+            Self::Counted(seen) => Some(seen.block(line, steps)),
+        }
+    }
 }
 
 /// A dispatch: its kernel, and what it reads.
 struct Launch {
-    kernel: String,
-    builtins: Builtins,
-    workgroup: u32,
+    kernel: Kernel,
     groups: [u32; 3],
-    globals: Vec<(&'static str, Vec<u64>)>,
-    /// Rotations of its result.
-    rotations: usize,
+    inputs: Vec<Vec<u8>>,
+    arguments: Vec<u8>,
 }
 
-/// The cells of a buffer, four bytes each.
-pub(super) fn cells(bytes: &[u8]) -> Vec<u64> {
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
-    words.into_iter().map(u64::from).collect()
+fn bytes<T: bytemuck::NoUninit>(values: &[T]) -> Vec<u8> {
+    bytemuck::cast_slice(values).to_vec()
 }
 
 /// Lines that waves touched, and the fewest that would have done.
@@ -82,7 +202,7 @@ impl Lines {
         self.touched as f64 / self.least.max(1) as f64
     }
 
-    pub(super) fn add(&mut self, more: Self) {
+    fn add(&mut self, more: Self) {
         self.touched += more.touched;
         self.least += more.least;
     }
@@ -97,7 +217,7 @@ fn touched(ranges: &[Range<u64>], line: u64) -> u64 {
 }
 
 /// What a store of all lanes of a wave takes: at least the bytes as if they lay side by side.
-pub(super) fn store(ranges: &[Range<u64>], line: u64) -> Lines {
+fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     let bytes: u64 = ranges.iter().map(|range| range.end - range.start).sum();
     Lines {
         touched: touched(ranges, line),
@@ -125,98 +245,111 @@ fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     }
 }
 
-/// The stores and the loads of a dispatch, for each kind of card, and the rotations stored.
+/// What the waves of some workgroups did, for each kind of card.
 #[derive(Default)]
-struct Count {
-    of_cards: [[Lines; 2]; CARDS.len()],
-    rotations: u64,
+pub(super) struct Count {
+    /// Stores and loads.
+    pub(super) of_cards: [[Lines; 2]; CARDS.len()],
+    /// Words stored.
+    pub(super) words: u64,
     /// Bytes that lanes loaded.
     loaded: u64,
     /// Lines of 64 bytes that workgroups loaded.
     of_workgroups: Lines,
+    /// Operations of waves of 32 lanes, and of their lanes.
+    pub(super) steps: [u64; 2],
+    /// How many waves entered each line of the file, once for each path, and how many lanes.
+    lines: BTreeMap<u32, [u64; 2]>,
+}
+
+impl Count {
+    /// Runs a workgroup, and counts what it does in buffers.
+    pub(super) fn add(&mut self, memory: &Memory, group: [u32; 3], groups: [u32; 3]) {
+        let lanes = memory.run_group::<Number, Lane>(group, groups, Lane::counted);
+        let lanes = &Vec::from_iter(lanes.into_iter().filter_map(Lane::seen));
+        for lane in lanes {
+            let is_buffer = |touch: &Touch| memory.is_buffer(touch.global);
+            lane.touches.borrow_mut().retain(is_buffer);
+            for touch in &*lane.touches.borrow() {
+                match touch.is_store {
+                    true => self.words += touch.words.len() as u64,
+                    false => self.loaded += 4 * touch.words.len() as u64,
+                }
+            }
+        }
+        self.of_workgroups.add(loads_of(lanes, 64));
+        for ((wave, line), lines) in CARDS.into_iter().zip(&mut self.of_cards) {
+            for wave in lanes.chunks(wave as usize) {
+                lines[0].add(stores_of(wave, line));
+            }
+            lines[1].add(loads_of(lanes, line));
+        }
+        for wave in lanes.chunks(32) {
+            let mut together = BTreeMap::new();
+            for lane in wave {
+                let steps = lane.blocks.steps.borrow();
+                self.steps[1] += steps.values().map(|(_, steps)| *steps as u64).sum::<u64>();
+                for (line, _) in steps.values() {
+                    self.lines.entry(*line).or_default()[1] += 1;
+                }
+                together.extend(steps.iter().map(|(path, block)| (*path, *block)));
+            }
+            for (line, steps) in together.into_values() {
+                self.steps[0] += steps as u64;
+                self.lines.entry(line).or_default()[0] += 1;
+            }
+        }
+    }
+
+    /// How often waves and lanes entered a function of the generated file.
+    fn entered(&self, function: &str) -> [u64; 2] {
+        let text = include_str!("../../shaders/compiled/entries.rs");
+        let start = format!("fn {function}<");
+        let before = text.lines().position(|line| line.contains(&start));
+        let mut behind = self.lines.range(before.expect("it is a function") as u32..);
+        behind.next().map_or([0; 2], |(_, count)| *count)
+    }
 }
 
 impl Launch {
+    fn memory(&self) -> Memory {
+        let inputs = self.inputs.iter().map(Vec::as_slice);
+        Memory::new(self.kernel, inputs, &self.arguments, Vec::new())
+    }
+
+    /// The rotations that it stores.
+    fn rotations(&self) -> Vec<[u32; 4]> {
+        let memory = self.memory();
+        memory.run::<f32, ()>(self.groups, |_| ());
+        bytemuck::pod_collect_to_vec(&memory.into_output())
+    }
+
     fn run(&self) -> Count {
-        let program = Checked::parse(source(&self.kernel)).program(FloatMode::AsWritten);
-        let mut machine = Machine::new(&program);
-        for (name, cells) in &self.globals {
-            machine.globals[global(&program, name)].clone_from(cells);
-        }
-        let output = global(&program, "rotations");
-        machine.globals[output] = vec![0; 4 * self.rotations];
-        let main = program.functions.len() - 1;
-        let pushed = ["dispatch", "rows"]
-            .map(|name| program.globals.iter().position(|global| global == name));
+        let memory = self.memory();
         let [x, y, z] = self.groups;
         let all = x * y * z;
         let mut count = Count::default();
         for number in (0..all).step_by((all / WORKGROUPS).max(1) as usize) {
             let group = [number % x, number / x % y, number / (x * y)];
-            let lanes: Vec<Vec<Touch>> = (0..self.workgroup)
-                .map(|lane| {
-                    machine.touches = Some(Vec::new());
-                    let found = machine.call(main, &self.arguments(group, lane));
-                    assert!(found.is_some(), "{}: {group:?}, {lane}", self.kernel);
-                    let mut touches = machine.touches.take().unwrap_or_default();
-                    touches.retain(|touch| !pushed.contains(&Some(touch.global)));
-                    touches
-                })
-                .collect();
-            let stores = lanes.iter().flatten().filter(|touch| touch.is_store);
-            count.rotations += stores.count() as u64;
-            let loads = lanes.iter().flatten().filter(|touch| !touch.is_store);
-            let bytes = |range: Range<u64>| range.end - range.start;
-            count.loaded += loads.map(|touch| bytes(touch.bytes())).sum::<u64>();
-            count.of_workgroups.add(loads_of(&lanes, 64));
-            for ((wave, line), lines) in CARDS.into_iter().zip(&mut count.of_cards) {
-                for wave in lanes.chunks(wave as usize) {
-                    lines[0].add(stores_of(wave, line));
-                }
-                lines[1].add(loads_of(&lanes, line));
-            }
+            count.add(&memory, group, self.groups);
         }
-        assert!(
-            count.rotations > 100,
-            "{}: {}",
-            self.kernel,
-            count.rotations
-        );
+        assert!(count.words > 400, "{:?}: {}", self.kernel, count.words);
         count
     }
-
-    fn arguments(&self, group: [u32; 3], lane: u32) -> Vec<u64> {
-        let invocation = [group[0] * self.workgroup + lane, group[1], group[2]];
-        let builtins = match self.builtins {
-            Builtins::Workgroup => [&group[..], &self.groups, &[lane]].concat(),
-            Builtins::Invocation => [invocation, self.groups].concat(),
-            Builtins::InvocationAlone => invocation.to_vec(),
-        };
-        builtins.into_iter().map(u64::from).collect()
-    }
 }
 
-pub(super) fn global(program: &Program, name: &str) -> usize {
-    let index = program.globals.iter().position(|global| global == name);
-    index.unwrap_or_else(|| panic!("no global {name}"))
-}
-
-/// Of each iteration of a loop the first stores of all lanes go together, then the second ones.
-fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
-    let mut together = BTreeMap::<(usize, usize), Vec<Range<u64>>>::new();
+/// The nth stores of all lanes in one block go together.
+fn stores_of(wave: &[Seen], line: u64) -> Lines {
+    let mut together = BTreeMap::<(u64, usize), Vec<Range<u64>>>::new();
     for lane in wave {
-        let (mut iteration, mut stores) = (0, 0);
-        for touch in lane.iter().filter(|touch| touch.is_store) {
-            stores = if touch.iteration == iteration {
-                stores + 1
-            } else {
-                0
-            };
-            iteration = touch.iteration;
+        let mut stores = BTreeMap::<u64, usize>::new();
+        for touch in lane.touches.borrow().iter().filter(|touch| touch.is_store) {
+            let nth = stores.entry(touch.path).or_default();
             together
-                .entry((iteration, stores))
+                .entry((touch.path, *nth))
                 .or_default()
                 .push(touch.bytes());
+            *nth += 1;
         }
     }
     let mut lines = Lines::default();
@@ -226,10 +359,12 @@ fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
     lines
 }
 
-pub(super) fn loads_of(workgroup: &[Vec<Touch>], line: u64) -> Lines {
-    let mut buffers = BTreeMap::<usize, Vec<_>>::new();
-    for touch in workgroup.iter().flatten().filter(|touch| !touch.is_store) {
-        buffers.entry(touch.global).or_default().push(touch.bytes());
+fn loads_of(workgroup: &[Seen], line: u64) -> Lines {
+    let mut buffers = BTreeMap::<Global, Vec<_>>::new();
+    for lane in workgroup {
+        for touch in lane.touches.borrow().iter().filter(|touch| !touch.is_store) {
+            buffers.entry(touch.global).or_default().push(touch.bytes());
+        }
     }
     let mut lines = Lines::default();
     for ranges in buffers.values_mut() {
@@ -323,13 +458,8 @@ fn of_clip(
         "slerp" => Form::Arc,
         _ => Form::Polynomial,
     };
-    let form = format!("{form:?}").to_lowercase();
-    let mut globals = vec![
-        ("segments", cells(group.segments.as_bytes())),
-        ("constants", cells(bytemuck::cast_slice(&group.constants))),
-    ];
+    let mut inputs = vec![group.segments.as_bytes().to_vec(), bytes(&group.constants)];
     let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
-    let rotations = window.len();
     if let Some(list) = SampleList::new(&clip, &timeline, &window) {
         let mut samples = vec![
             ListedSample {
@@ -339,16 +469,12 @@ fn of_clip(
             window.len()
         ];
         list.write(&mut samples).unwrap();
-        globals.push(("samples", cells(bytemuck::cast_slice(&samples))));
-        let dispatch = dispatch_of(samples.len(), 1);
-        globals.push(("dispatch", cells(bytemuck::bytes_of(&dispatch))));
+        inputs.push(bytes(&samples));
         return Launch {
-            kernel: format!("{form}_samples_f32"),
-            builtins: Builtins::Invocation,
-            workgroup: WORKGROUP,
+            kernel: Kernel::over_segments(form, List::Samples, Store::F32),
             groups: [(samples.len() as u32).div_ceil(WORKGROUP), 1, 1],
-            globals,
-            rotations,
+            inputs,
+            arguments: bytes(&[dispatch_of(samples.len(), 1)]),
         };
     }
     let lists = work(&clip, &timeline, &window, cut, &mut Vec::new()).unwrap();
@@ -359,36 +485,32 @@ fn of_clip(
     let mut distances = vec![0.0; distances];
     let rows = GridRows::new(&window).filter(|_| cut == Cut::Whole);
     write(&lists, rows, &mut items[..count], &mut distances);
-    globals.push(("items", cells(bytemuck::cast_slice(&items))));
-    let listed = if is_timed { "times" } else { "frames" };
-    if is_timed {
-        globals.push(("distances", cells(bytemuck::cast_slice(&distances))));
-    }
+    inputs.push(bytes(&items));
+    let times = is_timed.then(|| bytes(&distances));
     let Some(rows) = rows else {
-        let dispatch = dispatch_of(count, window.stride());
-        globals.push(("dispatch", cells(bytemuck::bytes_of(&dispatch))));
+        inputs.extend(times);
+        let list = if is_timed { List::Times } else { List::Frames };
         return Launch {
-            kernel: format!("{form}_{listed}_f32"),
-            builtins: Builtins::Invocation,
-            workgroup: WORKGROUP,
+            kernel: Kernel::over_segments(form, list, Store::F32),
             groups: [(count as u32).div_ceil(WORKGROUP), 1, 1],
-            globals,
-            rotations,
+            inputs,
+            arguments: bytes(&[dispatch_of(count, window.stride())]),
         };
     };
     let grids = rows.of_groups(&lists).expect("items in order");
     let mut blocks: Vec<Block> = vec![bytemuck::Zeroable::zeroed(); grids[0].blocks() as usize];
     write_blocks(&lists, &grids, count as u32, &mut blocks);
-    globals.push(("blocks", cells(bytemuck::cast_slice(&blocks))));
-    let arguments = grids[0].arguments;
-    globals.push(("dispatch", cells(bytemuck::bytes_of(&arguments))));
+    inputs.push(bytes(&blocks));
+    inputs.extend(times);
+    let list = match is_timed {
+        true => List::TimesCoalesced,
+        false => List::FramesCoalesced,
+    };
     Launch {
-        kernel: format!("{form}_{listed}_coalesced_f32"),
-        builtins: Builtins::Workgroup,
-        workgroup: WORKGROUP,
+        kernel: Kernel::over_segments(form, list, Store::F32),
         groups: grids[0].workgroups(),
-        globals,
-        rotations,
+        inputs,
+        arguments: bytes(&[grids[0].arguments]),
     }
 }
 
@@ -424,31 +546,55 @@ fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     dispatch
         .write(None, &mut keys, &mut samples, &mut weights)
         .unwrap();
-    let kernel = match curve {
-        KeyCurve::Arcs => "from_keys_arcs",
-        KeyCurve::TwoKeys => "from_keys_two_keys",
-        KeyCurve::Cubics(_) => "from_keys_cubics",
-    };
-    let mut globals = vec![
-        ("keys", cells(bytemuck::cast_slice(&keys))),
-        ("samples", cells(bytemuck::cast_slice(&samples))),
-        ("rows", cells(bytemuck::bytes_of(&rows))),
-    ];
-    if !weights.is_empty() {
-        globals.push(("weights", cells(bytemuck::cast_slice(&weights))));
-    }
+    let mut inputs = vec![bytes(&keys), bytes(&samples)];
+    inputs.extend((!weights.is_empty()).then(|| bytes(&weights)));
     Launch {
-        kernel: kernel.to_owned(),
-        builtins: Builtins::InvocationAlone,
-        workgroup: FROM_KEYS_WORKGROUP,
+        kernel: match curve {
+            KeyCurve::Arcs => Kernel::FromKeysArcs,
+            KeyCurve::TwoKeys => Kernel::FromKeysTwoKeys,
+            KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
+        },
         groups: [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
             rows.count.div_ceil(rows.each),
             1,
         ],
-        globals,
-        rotations: dispatch.rotation_count(),
+        inputs,
+        arguments: bytes(&[rows]),
     }
+}
+
+/// The CPU's result has the bits of what a dispatch stores: all of it, or as much as it stores.
+fn assert_is_the_cpus(
+    launch: &Launch,
+    (set, frames): (&TrackSet, &SampleTimes),
+    method: Method,
+    layout: Layout,
+) {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let request = cpu.request(set, method, frames).layout(layout);
+    let expected = request.evaluate().unwrap();
+    let (expected, found) = (expected.as_arrays(), launch.rotations());
+    assert!(found.len() <= expected.len(), "{:?}", launch.kernel);
+    let mut left_out = 0;
+    for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+        // The host stores the others, and where a cubic turns too far.
+        if *found == [UNTOUCHED; 4] || *found == [0; 4] {
+            left_out += 1;
+        } else {
+            let expected = expected.map(f32::to_bits);
+            assert_eq!(
+                *found, expected,
+                "{:?}, {layout:?}, rotation {i}",
+                launch.kernel
+            );
+        }
+    }
+    assert!(
+        left_out * 20 < found.len(),
+        "{:?}: {left_out}",
+        launch.kernel
+    );
 }
 
 // ---------------------------------------------------------------- the tests
@@ -458,7 +604,7 @@ fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];
-    let mut launches = Vec::new();
+    let mut count_of_launches = 0;
     for method in [SLERP, BESSEL_OVERHAUSER] {
         for (name, (set, frames)) in [
             ("sparse", sparse(96)),
@@ -468,38 +614,50 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             // As many tracks as fill no whole lines, frame by frame.
             ("odd", sparse(509)),
         ] {
-            for layout in layouts {
+            let mut launches = Vec::from(layouts.map(|layout| {
                 let launch = of_clip(&set, &frames, method, layout, Cut::Whole);
-                launches.push((format!("{name}, {method}, {layout:?}"), launch));
-            }
+                (format!("{name}, {method}, {layout:?}"), launch, layout)
+            }));
             if ["dense", "crowd"].contains(&name) {
                 let launch = of_keys(&set, &frames, method);
-                launches.push((format!("{name}, {method}, from keys"), launch));
+                launches.push((format!("{name}, {method}, from keys"), launch, layouts[0]));
             }
+            for (name, launch, layout) in &launches {
+                assert_touches_hardly_more_lines(name, launch);
+                if !name.starts_with("odd") {
+                    assert_is_the_cpus(launch, (&set, &frames), method, *layout);
+                }
+            }
+            count_of_launches += launches.len();
         }
     }
-    assert_eq!(launches.len(), 2 * (5 * 2 + 2));
-    for (name, launch) in &launches {
-        let count = launch.run();
-        let mut ratios = String::new();
-        for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
-            let (stored, loaded) = (stores.ratio(), loads.ratio());
-            ratios += &format!(" {stored:.2} {loaded:.2} |");
-            let label = format!("{name}, {wave} lanes, lines of {line}");
-            assert!(stored <= 1.1, "{label}: stores {stored}");
-            // Frame by frame neighbours have items of their own, some of which lie across lines.
-            let limit = if name.ends_with("FrameMajor") {
-                1.4
-            } else {
-                1.3
-            };
-            assert!(loaded <= limit, "{label}: loads {loaded}");
-        }
-        let each = |bytes: u64| bytes as f64 / count.rotations as f64;
-        let (lanes, lines) = (count.loaded, 64 * count.of_workgroups.touched);
-        let (lanes, lines) = (each(lanes), each(lines));
-        println!("{name} |{ratios} loads of a rotation: lanes {lanes:.0} B, lines {lines:.0} B");
+    assert_eq!(count_of_launches, 2 * (5 * 2 + 2));
+}
+
+fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
+    let count = launch.run();
+    let mut ratios = String::new();
+    for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
+        let (stored, loaded) = (stores.ratio(), loads.ratio());
+        ratios += &format!(" {stored:.2} {loaded:.2} |");
+        let label = format!("{name}, {wave} lanes, lines of {line}");
+        assert!(stored <= 1.1, "{label}: stores {stored}");
+        // Frame by frame neighbours have items of their own, some of which lie across lines.
+        let limit = if name.ends_with("FrameMajor") {
+            1.4
+        } else {
+            1.3
+        };
+        assert!(loaded <= limit, "{label}: loads {loaded}");
     }
+    let each = |count_of: u64| 4.0 * count_of as f64 / count.words as f64;
+    let (lanes, lines) = (each(count.loaded), each(64 * count.of_workgroups.touched));
+    let [wave, lane] = count.steps.map(each);
+    println!(
+        "{name} |{ratios} loads of a rotation: lanes {lanes:.0} B, lines {lines:.0} B; operations: a wave's {:.1}, a \
+         lane's {lane:.1}",
+        32.0 * wave
+    );
 }
 
 /// The count sees what the other mapping does: neighbours store 256 bytes from each other.
@@ -508,11 +666,33 @@ fn an_item_for_each_invocation_touches_more_lines() {
     let (set, frames) = sparse(96);
     for layout in [Layout::TrackMajor, Layout::FrameMajor] {
         let launch = of_clip(&set, &frames, SLERP, layout, Cut::Short);
-        assert_eq!(launch.kernel, "arc_frames_f32");
+        assert_eq!(launch.kernel, Kernel::ArcFramesF32);
         let count = launch.run();
         for ((_, line), [stores, _]) in CARDS.into_iter().zip(count.of_cards) {
             let least = 0.85 * line as f64 / 16.0;
             assert!(stores.ratio() > least, "{layout:?}, {line}: {stores:?}");
         }
+        assert_is_the_cpus(&launch, (&set, &frames), SLERP, layout);
     }
+    for method in [SLERP, BESSEL_OVERHAUSER] {
+        let (set, frames) = scattered(24);
+        let launch = of_clip(&set, &frames, method, Layout::TrackMajor, Cut::Short);
+        assert_is_the_cpus(&launch, (&set, &frames), method, Layout::TrackMajor);
+    }
+}
+
+/// A lane looks for an item in few of its iterations, but a wave in most, for some lane of it does.
+#[test]
+fn a_wave_switches_segments_more_often_than_its_lanes() {
+    let (set, frames) = sparse(96);
+    let launch = of_clip(&set, &frames, SLERP, Layout::TrackMajor, Cut::Whole);
+    assert_eq!(launch.kernel, Kernel::ArcFramesCoalescedF32);
+    let count = launch.run();
+    let (iterations, switches) = (count.entered("cell_of"), count.entered("item_of"));
+    let share = |i: usize| switches[i] as f64 / iterations[i] as f64;
+    let (wave, lane) = (share(0), share(1));
+    println!("switches an iteration: a wave's {wave:.2}, a lane's {lane:.2}");
+    assert!(iterations[0] > 100 && iterations[1] == 32 * iterations[0]);
+    assert!(wave > 0.7 && lane < 0.5 * wave, "{wave}, {lane}");
+    assert!(count.steps[1] < 32 * count.steps[0]);
 }

@@ -1,5 +1,5 @@
 //! The check of kernels: before the first result of a kernel is used, its output on the device is compared, bit for
-//! bit, with the output of its twin for the same inputs.
+//! bit, with what its entry point in Rust ([`entries`](crate::twin::entries)) makes of the same inputs.
 
 mod crowd;
 mod from_keys;
@@ -11,79 +11,79 @@ pub(crate) mod self_test;
 mod whole_instances;
 
 use bytemuck::NoUninit;
+use random::Random;
 
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::run_once::run_on;
 use crate::machine::error::VulkanError;
 pub(crate) use crate::machine::reports::KernelCheck;
 use crate::shader::Kernel;
-
-#[cfg(test)]
-pub(crate) use from_keys::StoredKey;
-
-/// The contents of a result before a kernel runs, which stay where it stores nothing.
-const UNTOUCHED: u32 = u32::MAX;
+use crate::twin::machine::{Memory, UNTOUCHED};
 
 /// The number of values after a result that no kernel may write.
 const GUARD: usize = 16;
 
-/// One dispatch of a kernel: its inputs, and the output of its twin.
-pub(super) struct Trial {
+/// One dispatch of a kernel. Its output is [`UNTOUCHED`] before, or what the trial says.
+pub(crate) struct Trial {
     /// The buffers that it reads, in the order of their bindings.
-    inputs: Vec<Vec<u8>>,
+    pub(crate) inputs: Vec<Vec<u8>>,
     /// The push constants of the dispatch.
-    arguments: Vec<u8>,
-    groups: [u32; 3],
+    pub(crate) arguments: Vec<u8>,
+    pub(crate) groups: [u32; 3],
     /// The contents of the output before the dispatch.
-    before: Vec<u32>,
-    expected: Vec<u32>,
+    pub(crate) before: Vec<u32>,
 }
 
 impl Trial {
-    pub(super) fn new<const N: usize>(
-        inputs: [Vec<u8>; N],
-        arguments: &impl NoUninit,
-        groups: [u32; 3],
-    ) -> Self {
+    fn new(inputs: impl Into<Vec<Vec<u8>>>, arguments: &impl NoUninit, groups: [u32; 3]) -> Self {
         Self {
             inputs: inputs.into(),
             arguments: bytemuck::bytes_of(arguments).to_vec(),
             groups,
             before: Vec::new(),
-            expected: Vec::new(),
         }
     }
 
-    /// Expects a value as the `index`th of its type.
-    pub(super) fn expect<T: NoUninit>(&mut self, index: usize, value: &T) {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytemuck::bytes_of(value));
-        self.expect_words(index * words.len(), &words);
+    /// A trial over an output that the kernel changes in part.
+    fn over<T: NoUninit>(self, before: &[T]) -> Self {
+        let before = bytemuck::pod_collect_to_vec(&bytes(before));
+        Self { before, ..self }
     }
 
-    fn expect_words(&mut self, first: usize, words: &[u32]) {
-        let end = first + words.len();
-        if self.expected.len() < end {
-            self.expected.resize(end, UNTOUCHED);
-        }
-        self.expected[first..end].copy_from_slice(words);
+    /// The kernel's memory before the dispatch.
+    pub(crate) fn memory(&self, kernel: Kernel) -> Memory {
+        let inputs = self.inputs.iter().map(Vec::as_slice);
+        Memory::new(kernel, inputs, &self.arguments, self.before.clone())
     }
 
-    /// Runs the trial, and counts the values that differ.
-    fn differing(&self, pipeline: &Pipeline) -> Result<usize, VulkanError> {
-        let mut expected = self.expected.clone();
+    /// The output after the dispatch.
+    pub(crate) fn expected(&self, kernel: Kernel) -> Vec<u32> {
+        let memory = self.memory(kernel);
+        memory.run::<f32, ()>(self.groups, |_| ());
+        memory.into_output()
+    }
+
+    /// Runs the trial on a device, over an output.
+    pub(crate) fn run(&self, pipeline: &Pipeline, output: &mut [u8]) -> Result<(), VulkanError> {
+        let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
+        run_on(pipeline, &inputs, &self.arguments, self.groups, output)
+    }
+
+    /// Runs the trial, and counts the values that differ, of all.
+    fn differing(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<[usize; 2], VulkanError> {
+        let mut expected = self.expected(kernel);
         expected.resize(expected.len() + GUARD, UNTOUCHED);
         let mut found = self.before.clone();
         found.resize(expected.len(), UNTOUCHED);
-        let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
-        let output = bytemuck::cast_slice_mut(&mut found);
-        run_on(pipeline, &inputs, &self.arguments, self.groups, output)?;
+        self.run(pipeline, bytemuck::cast_slice_mut(&mut found))?;
         let pairs = found.iter().zip(&expected);
-        Ok(pairs.filter(|(found, expected)| found != expected).count())
+        let differing = pairs.filter(|(found, expected)| found != expected).count();
+        Ok([differing, expected.len()])
     }
 }
 
 /// The bytes of a buffer.
-pub(super) fn bytes<T: NoUninit>(values: &[T]) -> Vec<u8> {
+fn bytes<T: NoUninit>(values: &[T]) -> Vec<u8> {
     bytemuck::cast_slice(values).to_vec()
 }
 
@@ -96,19 +96,20 @@ fn groups(invocations: usize, in_row: bool) -> [u32; 3] {
     }
 }
 
-fn trials(kernel: Kernel) -> Vec<Trial> {
+/// Trials of a kernel; each call makes others.
+pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     match kernel {
         Kernel::SelfTest => vec![self_test::trial()],
         Kernel::FromKeysArcs | Kernel::FromKeysTwoKeys | Kernel::FromKeysCubics => {
-            from_keys::trials(kernel)
+            from_keys::trials(kernel, random)
         }
-        Kernel::PrepareArcs => from_keys::arc_trials(),
+        Kernel::PrepareArcs => from_keys::arc_trials(random),
         Kernel::PosesAdd
         | Kernel::PosesBlend
         | Kernel::PosesMix
         | Kernel::PosesSmooth
         | Kernel::PosesSteps
-        | Kernel::PosesWorld => poses::trials(kernel),
+        | Kernel::PosesWorld => poses::trials(kernel, random),
         Kernel::CrowdRotations
         | Kernel::CrowdPlainRotations
         | Kernel::CrowdLocals
@@ -119,12 +120,12 @@ fn trials(kernel: Kernel) -> Vec<Trial> {
         | Kernel::CrowdSkin
         | Kernel::CrowdHalf
         | Kernel::CrowdGather
-        | Kernel::CrowdScatter => crowd::trials(kernel),
+        | Kernel::CrowdScatter => crowd::trials(kernel, random),
         Kernel::CrowdWholeRotations
         | Kernel::CrowdPlainWholeRotations
         | Kernel::CrowdWholeMatrices
-        | Kernel::CrowdPlainWholeMatrices => whole_instances::trials(kernel),
-        _ => segments::trials(kernel),
+        | Kernel::CrowdPlainWholeMatrices => whole_instances::trials(kernel, random),
+        _ => segments::trials(kernel, random),
     }
 }
 
@@ -136,9 +137,10 @@ pub(crate) fn check(kernel: Kernel, pipeline: &Pipeline) -> Result<KernelCheck, 
         differing: 0,
         remembered: false,
     };
-    for trial in trials(kernel) {
-        check.total += trial.expected.len() + GUARD;
-        check.differing += trial.differing(pipeline)?;
+    for trial in trials(kernel, &mut Random::canonical()) {
+        let [differing, total] = trial.differing(kernel, pipeline)?;
+        check.differing += differing;
+        check.total += total;
     }
     Ok(check)
 }

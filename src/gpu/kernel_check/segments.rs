@@ -1,6 +1,5 @@
 //! Trials of the kernels that evaluate segments: each form with each list, in every encoding of its store.
 
-use crate::cpu::evaluate::one;
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::math::canonical::canonical;
 use crate::output::encoding::Encoding;
@@ -9,7 +8,6 @@ use crate::shader::{
     Kernel, LINE, List, ListedSample, MAY_BE_TINY, PolynomialSegment, SAMPLES_EACH, Store,
     WORKGROUP,
 };
-use crate::time::runs::Affine;
 use crate::twin::Evaluate;
 use crate::twin::arc_between::arc_between;
 
@@ -26,6 +24,12 @@ trait Segment: Evaluate {
     /// The arc between two keys.
     fn between(keys: [[f32; 4]; 2]) -> Self;
 }
+
+/// The first block of a grid, which another dispatch has.
+const OTHER: Block = Block {
+    first: 0,
+    starts: 0,
+};
 
 fn any_vector(random: &mut Random) -> [f32; 4] {
     random.vector().map(canonical)
@@ -54,18 +58,17 @@ impl Segment for PolynomialSegment {
     }
 }
 
-pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     let Some((form, list, store)) = kernel.compiled().segments else {
         return Vec::new();
     };
     match form {
-        Form::Arc => of_form::<ArcSegment>(list, store),
-        Form::Polynomial => of_form::<PolynomialSegment>(list, store),
+        Form::Arc => of_form::<ArcSegment>(list, store, random),
+        Form::Polynomial => of_form::<PolynomialSegment>(list, store, random),
     }
 }
 
-fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
-    let random = &mut Random::canonical();
+fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Trial> {
     let encodings = Encoding::of_store(store);
     // Two shapes of a dispatch, and every encoding at least once.
     (0..encodings.len().max(2))
@@ -92,8 +95,6 @@ struct SegmentInputs<S> {
     constants: Vec<[f32; 4]>,
     distances: Vec<f32>,
     items: Vec<Item>,
-    /// The offset of each stored sample, and its rotation.
-    stored: Vec<(usize, [f32; 4])>,
 }
 
 impl<S: Segment> SegmentInputs<S> {
@@ -110,19 +111,11 @@ impl<S: Segment> SegmentInputs<S> {
             constants: (0..CONSTANTS).map(|_| random.rotation()).collect(),
             distances: Vec::new(),
             items: Vec::new(),
-            stored: Vec::new(),
         }
     }
 
-    /// Makes an item, and stores its values; `outputs` are the offsets of its samples.
-    fn item(
-        &mut self,
-        random: &mut Random,
-        is_listed: bool,
-        output: u32,
-        outputs: impl ExactSizeIterator<Item = usize>,
-    ) {
-        let count = outputs.len() as u32;
+    /// Makes an item, whose first sample has an offset.
+    fn item(&mut self, random: &mut Random, is_listed: bool, output: u32, count: u32) {
         let (source, bit) = Self::source(random);
         // Frames about the middle of a short run, or those at one end of a very long one.
         let (frame, scale) = match random.once_in(6) {
@@ -132,35 +125,22 @@ impl<S: Segment> SegmentInputs<S> {
                 random.number() / 16.0,
             ),
         };
-        let affine = Affine {
-            scale,
-            offset: random.parameter(),
-        };
+        let offset = random.parameter();
         let first = match is_listed {
             true => self.distances.len() as i32,
             false => frame,
         };
-        for (j, stored_at) in outputs.enumerate() {
-            let distance = match is_listed {
-                true => {
-                    self.distances.push(random.number() * 4.0);
-                    self.distances[first as usize + j]
-                }
-                false => (first + j as i32) as f32,
-            };
-            let rotation = match bit {
-                0 => one(&self.segments[source as usize], affine, distance),
-                _ => self.constants[source as usize],
-            };
-            self.stored.push((stored_at, rotation));
+        if is_listed {
+            let distance = |_| random.number() * 4.0;
+            self.distances.extend((0..count).map(distance));
         }
         self.items.push(Item {
             source,
             output,
             count: count | bit,
             first,
-            scale: affine.scale,
-            offset: affine.offset,
+            scale,
+            offset,
         });
     }
 
@@ -172,23 +152,14 @@ impl<S: Segment> SegmentInputs<S> {
         }
     }
 
-    fn finish(self, listed: Vec<Vec<u8>>, arguments: Vec<u8>, groups: [u32; 3]) -> Trial {
-        let mut inputs = vec![bytes(&self.segments), bytes(&self.constants)];
-        inputs.extend(listed);
-        let mut trial = Trial {
-            inputs,
-            arguments,
-            groups,
-            before: Vec::new(),
-            expected: Vec::new(),
-        };
-        let mut encoded = vec![0; self.encoding.bytes()];
-        for (index, rotation) in self.stored {
-            self.encoding.encode_all(&[rotation], &mut encoded);
-            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&encoded);
-            trial.expect_words(index * words.len(), &words);
-        }
-        trial
+    fn finish(
+        self,
+        listed: Vec<Vec<u8>>,
+        arguments: &impl bytemuck::NoUninit,
+        groups: [u32; 3],
+    ) -> Trial {
+        let inputs = vec![bytes(&self.segments), bytes(&self.constants)];
+        Trial::new([inputs, listed].concat(), arguments, groups)
     }
 
     fn detail(&self) -> u32 {
@@ -207,18 +178,10 @@ impl<S: Segment> SegmentInputs<S> {
             let track = i % stride;
             let count = 1 + random.below(ITEM_SAMPLES) as usize;
             let output = next[track] * stride + track;
-            self.item(
-                random,
-                is_listed,
-                output as u32,
-                (0..count).map(|j| output + j * stride + FIRST),
-            );
+            self.item(random, is_listed, output as u32, count as u32);
             next[track] += count;
         }
         // Another dispatch has the first items.
-        let others = (self.items[..BEFORE].iter()).map(|item| (item.count & !IS_CONSTANT) as usize);
-        let others: usize = others.sum();
-        self.stored.drain(..others);
         let dispatch = Dispatch {
             first_item: BEFORE as u32,
             item_count: ITEMS as u32,
@@ -229,34 +192,19 @@ impl<S: Segment> SegmentInputs<S> {
         };
         let mut listed = vec![bytes(&self.items)];
         listed.extend(is_listed.then(|| bytes(&self.distances)));
-        let arguments = bytemuck::bytes_of(&dispatch).to_vec();
-        self.finish(listed, arguments, groups(ITEMS, is_one))
+        self.finish(listed, &dispatch, groups(ITEMS, is_one))
     }
 
     /// Samples in any segments, one for each invocation; some invocations do nothing.
-    fn samples(mut self, random: &mut Random, in_row: bool) -> Trial {
+    fn samples(self, random: &mut Random, in_row: bool) -> Trial {
         const SAMPLES: usize = 203;
         const BEFORE: usize = 5;
         let mut samples = Vec::new();
         let first_output = 4;
-        for i in 0..SAMPLES + BEFORE {
+        for _ in 0..SAMPLES + BEFORE {
             let ((source, bit), parameter) = (Self::source(random), random.parameter());
-            samples.push(ListedSample {
-                source: source | bit,
-                parameter,
-            });
-            // A scale of 1 and an offset of 0 keep the parameter.
-            let same = Affine {
-                scale: 1.0,
-                offset: 0.0,
-            };
-            let rotation = match bit {
-                0 => one(&self.segments[source as usize], same, parameter),
-                _ => self.constants[source as usize],
-            };
-            if i >= BEFORE {
-                self.stored.push((first_output + i - BEFORE, rotation));
-            }
+            let source = source | bit;
+            samples.push(ListedSample { source, parameter });
         }
         let idle = if in_row { 3 } else { 0 };
         let dispatch = Dispatch {
@@ -268,25 +216,17 @@ impl<S: Segment> SegmentInputs<S> {
             idle,
         };
         let groups = groups(SAMPLES + idle as usize, in_row);
-        let arguments = bytemuck::bytes_of(&dispatch).to_vec();
-        self.finish(vec![bytes(&samples)], arguments, groups)
+        self.finish(vec![bytes(&samples)], &dispatch, groups)
     }
 
     /// One row of items for a grid, from position `first` to `end`; between some of them there are samples of no
-    /// item. `output_at` is the offset at which a position is stored.
-    fn row(
-        &mut self,
-        random: &mut Random,
-        is_listed: bool,
-        [first, end]: [u32; 2],
-        output_at: impl Fn(u32) -> usize,
-    ) {
+    /// item.
+    fn row(&mut self, random: &mut Random, is_listed: bool, [first, end]: [u32; 2]) {
         let mut position = first;
         while position < end {
             let length = (1 + random.below(40)).min(end - position);
             let count = length - random.below(3).min(length - 1);
-            let outputs: Vec<_> = (position..position + count).map(&output_at).collect();
-            self.item(random, is_listed, position, outputs.into_iter());
+            self.item(random, is_listed, position, count);
             // As on the CPU, every segment that may give a tiny component says so; others may.
             let Some(item) = self.items.last_mut() else {
                 unreachable!("it was just added");
@@ -323,8 +263,7 @@ impl<S: Segment> SegmentInputs<S> {
     fn grid(self, blocks: &[Block], grid: Grid, groups: [u32; 3], is_listed: bool) -> Trial {
         let mut listed = vec![bytes(&self.items), bytes(blocks)];
         listed.extend(is_listed.then(|| bytes(&self.distances)));
-        let arguments = bytemuck::bytes_of(&grid).to_vec();
-        self.finish(listed, arguments, groups)
+        self.finish(listed, &grid, groups)
     }
 
     /// A grid with contiguous samples, as one row.
@@ -332,15 +271,8 @@ impl<S: Segment> SegmentInputs<S> {
         const SAMPLES: u32 = 709;
         let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
         const SHIFT: u32 = 3;
-        self.row(random, is_listed, ends, |position| {
-            (position + SHIFT) as usize
-        });
-        // Another dispatch has the first block.
-        let other = Block {
-            first: 0,
-            starts: 0,
-        };
-        let blocks = [vec![other], self.blocks(0, ends)].concat();
+        self.row(random, is_listed, ends);
+        let blocks = [vec![OTHER], self.blocks(0, ends)].concat();
         let grid = Grid {
             detail: self.detail(),
             stride: 1,
@@ -361,23 +293,22 @@ impl<S: Segment> SegmentInputs<S> {
         const STRIDE: u32 = 13;
         const FIRST: u32 = 5;
         let mut of_rows = Vec::new();
-        for row in 0..ROWS {
+        for _ in 0..ROWS {
             let first_item = self.items.len();
-            let output_at = |sample: u32| (FIRST + row + sample * STRIDE) as usize;
-            self.row(random, is_listed, [0, SAMPLES], output_at);
+            self.row(random, is_listed, [0, SAMPLES]);
             of_rows.push(self.blocks(first_item, [0, SAMPLES]));
         }
         // [block of samples][row]
         let of_samples = SAMPLES.div_ceil(BLOCK_SAMPLES) as usize;
         let blocks = (0..of_samples).flat_map(|i| of_rows.iter().map(move |row| row[i]));
-        let blocks: Vec<_> = blocks.collect();
+        let blocks: Vec<_> = [OTHER].into_iter().chain(blocks).collect();
         let grid = Grid {
             detail: self.detail(),
             stride: STRIDE,
             samples: SAMPLES,
             rows: ROWS,
             first_output: FIRST,
-            first_block: 0,
+            first_block: 1,
             shift: 0,
         };
         // A row may begin anywhere in a line.

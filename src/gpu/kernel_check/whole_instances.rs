@@ -1,17 +1,12 @@
 //! Trials of the kernels over whole instances of a crowd.
 
-use bytemuck::Zeroable as _;
-
 use crate::math::canonical::canonical;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan,
-    CrowdWholeDispatch, FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SCALE, SPEED_MAGNITUDE,
-    START_BIAS, TRANSLATION,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdSpan, CrowdWholeDispatch,
+    FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SPEED_MAGNITUDE, START_BIAS,
 };
-use crate::twin::crowd_layers::Layers;
-use crate::twin::crowd_matrices::{Rows, affine_product, to_any_half, transform};
-use crate::twin::crowd_times::base_positions;
+use crate::twin::crowd_matrices::Rows;
 
 use super::crowd::{
     BASES, BEFORE, CELLS, CLIPS, JOINTS, LEVELS, MASKS, channel, entry, links_of_levels, plain,
@@ -26,9 +21,8 @@ const INSTANCES: u32 = 26;
 const OF_WORKGROUP: u32 = 10;
 const CLOCK: u64 = 0x00ab_cdef_0123_4567;
 
-pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
-    let random = &mut Random::canonical();
     let is_plain = matches!(
         kernel,
         Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices
@@ -140,11 +134,6 @@ impl WholeScene {
         }
     }
 
-    /// The entries of the window.
-    fn window(&self) -> &[CrowdEntry] {
-        &self.entries[(BEFORE * self.layers) as usize..]
-    }
-
     fn trial(&self, output: CrowdOutput) -> Trial {
         let is_rotations = output.values == CrowdValues::Rotations;
         let walks = matches!(output.values, CrowdValues::Model | CrowdValues::Skinning);
@@ -168,8 +157,7 @@ impl WholeScene {
         };
         // One of the workgroups has no instance.
         let groups = [2, INSTANCES.div_ceil(OF_WORKGROUP).div_ceil(2), 1];
-        let mut trial = Trial::new([], &pushed, groups);
-        trial.inputs = vec![
+        let mut inputs = vec![
             bytes(&self.entries),
             bytes(&self.clips),
             bytes(&self.bases),
@@ -178,63 +166,8 @@ impl WholeScene {
             bytes(&self.cells),
         ];
         if !is_rotations {
-            trial.inputs.extend([bytes(&links), bytes(&self.bind)]);
+            inputs.extend([bytes(&links), bytes(&self.bind)]);
         }
-        for (index, vector) in self.vectors(output.values).iter().enumerate() {
-            match output.is_half {
-                true => trial.expect(index, &vector.map(to_any_half)),
-                false => trial.expect(index, vector),
-            }
-        }
-        trial
-    }
-
-    /// What the twins make of it, one step after another.
-    fn vectors(&self, values: CrowdValues) -> Vec<[f32; 4]> {
-        let none = CrowdPosition::zeroed();
-        let mut positions = vec![none; self.window().len() * BASES as usize];
-        let of_entries = positions.chunks_exact_mut(BASES as usize);
-        for (entry, found) in self.window().iter().zip(of_entries) {
-            let (clips, bases, spans) = (&self.clips, &self.bases, &self.spans);
-            base_positions(entry, CLOCK, clips, bases, spans, found);
-        }
-        let [masks, references] = CELL_TABLES;
-        let twin = Layers {
-            entries: self.window(),
-            channels: &self.channels,
-            cells: &self.cells,
-            positions: &positions,
-            joints: JOINTS,
-            layers: self.layers,
-            bases: BASES,
-            masks,
-            references,
-        };
-        let mut vectors = Vec::new();
-        for instance in 0..INSTANCES {
-            let layered = |joint, kind| twin.layered(instance, joint, kind);
-            if values == CrowdValues::Rotations {
-                vectors.extend((0..JOINTS).map(|joint| layered(joint, ROTATION)));
-                continue;
-            }
-            let transform = |joint| {
-                let [moved, scale] = [TRANSLATION, SCALE].map(|kind| layered(joint, kind));
-                transform(layered(joint, ROTATION), moved, scale)
-            };
-            let mut pose: Vec<Rows> = (0..JOINTS).map(transform).collect();
-            if values != CrowdValues::Local {
-                for [joint, parent] in LEVELS.concat() {
-                    let (joint, parent) = (joint as usize, parent as usize);
-                    pose[joint] = affine_product(&pose[parent], &pose[joint]);
-                }
-            }
-            if values == CrowdValues::Skinning {
-                for (matrix, bind) in pose.iter_mut().zip(&self.bind) {
-                    *matrix = affine_product(matrix, bind);
-                }
-            }
-            vectors.extend(pose.into_iter().flatten());
-        }
-        vectors
+        Trial::new(inputs, &pushed, groups)
     }
 }

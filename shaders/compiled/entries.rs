@@ -1,0 +1,5401 @@
+//! The kernels, one invocation at a time. Written by `cargo run -p tumble-shaders` from the shaders: change those.
+
+use crate::shader::*;
+use crate::twin::machine::{Entry, Float, Machine, barrier, both, choose, quotient, stored};
+
+/// The variables of the kernels, by their names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Global {
+    Added,
+    All,
+    Base,
+    Bind,
+    Blended,
+    Blocks,
+    Cells,
+    Changes,
+    Channels,
+    Clips,
+    Constants,
+    Dispatch,
+    Distances,
+    Entries,
+    FirstEntry,
+    FoundParameters,
+    FoundSpans,
+    FromLayer,
+    Gathered,
+    Halves,
+    Intervals,
+    IsThere,
+    Items,
+    Keys,
+    Layer,
+    Layers,
+    Links,
+    Local,
+    Matrices,
+    Mixed,
+    Positions,
+    Probes,
+    Reference,
+    Replies,
+    Rotations,
+    Rows,
+    Samples,
+    Segments,
+    Smoothed,
+    Spans,
+    Steps,
+    Tile,
+    TimeBases,
+    ToLayer,
+    Values,
+    Visible,
+    Weights,
+    World,
+}
+
+impl Global {
+    /// All of them, in their order.
+    pub(crate) const ALL: [Self; GLOBALS] = [
+        Self::Added,
+        Self::All,
+        Self::Base,
+        Self::Bind,
+        Self::Blended,
+        Self::Blocks,
+        Self::Cells,
+        Self::Changes,
+        Self::Channels,
+        Self::Clips,
+        Self::Constants,
+        Self::Dispatch,
+        Self::Distances,
+        Self::Entries,
+        Self::FirstEntry,
+        Self::FoundParameters,
+        Self::FoundSpans,
+        Self::FromLayer,
+        Self::Gathered,
+        Self::Halves,
+        Self::Intervals,
+        Self::IsThere,
+        Self::Items,
+        Self::Keys,
+        Self::Layer,
+        Self::Layers,
+        Self::Links,
+        Self::Local,
+        Self::Matrices,
+        Self::Mixed,
+        Self::Positions,
+        Self::Probes,
+        Self::Reference,
+        Self::Replies,
+        Self::Rotations,
+        Self::Rows,
+        Self::Samples,
+        Self::Segments,
+        Self::Smoothed,
+        Self::Spans,
+        Self::Steps,
+        Self::Tile,
+        Self::TimeBases,
+        Self::ToLayer,
+        Self::Values,
+        Self::Visible,
+        Self::Weights,
+        Self::World,
+    ];
+}
+
+pub(crate) const GLOBALS: usize = 48;
+
+/// Variables of which each invocation has its own.
+pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
+
+/// What kernels bind, in the order of the bindings.
+const BOUND: [&[Global]; 24] = [
+    &[Global::Probes, Global::Replies],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Distances,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Samples,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Blocks,
+        Global::Rotations,
+    ],
+    &[
+        Global::Segments,
+        Global::Constants,
+        Global::Items,
+        Global::Blocks,
+        Global::Distances,
+        Global::Rotations,
+    ],
+    &[Global::Keys, Global::Samples, Global::Rotations],
+    &[
+        Global::Keys,
+        Global::Samples,
+        Global::Weights,
+        Global::Rotations,
+    ],
+    &[
+        Global::Base,
+        Global::Layer,
+        Global::Reference,
+        Global::Added,
+    ],
+    &[Global::Layers, Global::Weights, Global::Blended],
+    &[
+        Global::FromLayer,
+        Global::ToLayer,
+        Global::Weights,
+        Global::Mixed,
+    ],
+    &[
+        Global::Values,
+        Global::Steps,
+        Global::Weights,
+        Global::Smoothed,
+    ],
+    &[Global::Values, Global::Steps],
+    &[Global::Local, Global::Links, Global::World],
+    &[
+        Global::Entries,
+        Global::Channels,
+        Global::Cells,
+        Global::Positions,
+        Global::Rotations,
+    ],
+    &[Global::All, Global::Visible, Global::Gathered],
+    &[Global::Changes, Global::All],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Positions,
+    ],
+    &[Global::Links, Global::Matrices],
+    &[Global::Bind, Global::Matrices],
+    &[Global::Values, Global::Halves],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::Values,
+        Global::Halves,
+    ],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::Links,
+        Global::Bind,
+        Global::Values,
+        Global::Halves,
+    ],
+    &[Global::Keys, Global::Intervals, Global::Rotations],
+];
+
+const fn entry(
+    bound: usize,
+    pushed: Option<Global>,
+    workgroup: u32,
+    texels: Option<usize>,
+) -> Entry {
+    Entry {
+        bound: BOUND[bound],
+        pushed,
+        workgroup,
+        texels,
+    }
+}
+
+/// The entry points: those of the kernels in their order, and then those that read texel buffers.
+pub(crate) static ENTRIES: [Entry; 161] = [
+    entry(0, None, 64, None),
+    entry(1, Some(Global::Dispatch), 64, Some(106)),
+    entry(1, Some(Global::Dispatch), 64, Some(107)),
+    entry(1, Some(Global::Dispatch), 64, Some(108)),
+    entry(1, Some(Global::Dispatch), 64, Some(109)),
+    entry(1, Some(Global::Dispatch), 64, Some(110)),
+    entry(1, Some(Global::Dispatch), 64, Some(111)),
+    entry(1, Some(Global::Dispatch), 64, Some(112)),
+    entry(1, Some(Global::Dispatch), 64, Some(113)),
+    entry(2, Some(Global::Dispatch), 64, Some(114)),
+    entry(2, Some(Global::Dispatch), 64, Some(115)),
+    entry(2, Some(Global::Dispatch), 64, Some(116)),
+    entry(2, Some(Global::Dispatch), 64, Some(117)),
+    entry(2, Some(Global::Dispatch), 64, Some(118)),
+    entry(2, Some(Global::Dispatch), 64, Some(119)),
+    entry(2, Some(Global::Dispatch), 64, Some(120)),
+    entry(2, Some(Global::Dispatch), 64, Some(121)),
+    entry(3, Some(Global::Dispatch), 64, Some(122)),
+    entry(3, Some(Global::Dispatch), 64, Some(123)),
+    entry(3, Some(Global::Dispatch), 64, Some(124)),
+    entry(3, Some(Global::Dispatch), 64, Some(125)),
+    entry(3, Some(Global::Dispatch), 64, Some(126)),
+    entry(3, Some(Global::Dispatch), 64, Some(127)),
+    entry(3, Some(Global::Dispatch), 64, Some(128)),
+    entry(3, Some(Global::Dispatch), 64, Some(129)),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, Some(130)),
+    entry(1, Some(Global::Dispatch), 64, Some(131)),
+    entry(1, Some(Global::Dispatch), 64, Some(132)),
+    entry(1, Some(Global::Dispatch), 64, Some(133)),
+    entry(1, Some(Global::Dispatch), 64, Some(134)),
+    entry(1, Some(Global::Dispatch), 64, Some(135)),
+    entry(1, Some(Global::Dispatch), 64, Some(136)),
+    entry(1, Some(Global::Dispatch), 64, Some(137)),
+    entry(2, Some(Global::Dispatch), 64, Some(138)),
+    entry(2, Some(Global::Dispatch), 64, Some(139)),
+    entry(2, Some(Global::Dispatch), 64, Some(140)),
+    entry(2, Some(Global::Dispatch), 64, Some(141)),
+    entry(2, Some(Global::Dispatch), 64, Some(142)),
+    entry(2, Some(Global::Dispatch), 64, Some(143)),
+    entry(2, Some(Global::Dispatch), 64, Some(144)),
+    entry(2, Some(Global::Dispatch), 64, Some(145)),
+    entry(3, Some(Global::Dispatch), 64, Some(146)),
+    entry(3, Some(Global::Dispatch), 64, Some(147)),
+    entry(3, Some(Global::Dispatch), 64, Some(148)),
+    entry(3, Some(Global::Dispatch), 64, Some(149)),
+    entry(3, Some(Global::Dispatch), 64, Some(150)),
+    entry(3, Some(Global::Dispatch), 64, Some(151)),
+    entry(3, Some(Global::Dispatch), 64, Some(152)),
+    entry(3, Some(Global::Dispatch), 64, Some(153)),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(6, Some(Global::Rows), 64, Some(154)),
+    entry(6, Some(Global::Rows), 64, Some(155)),
+    entry(7, Some(Global::Rows), 64, Some(156)),
+    entry(8, Some(Global::Dispatch), 64, None),
+    entry(9, Some(Global::Dispatch), 64, None),
+    entry(10, Some(Global::Dispatch), 64, None),
+    entry(11, Some(Global::Dispatch), 64, None),
+    entry(12, Some(Global::Dispatch), 64, None),
+    entry(13, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, Some(157)),
+    entry(14, Some(Global::Dispatch), 64, Some(158)),
+    entry(14, Some(Global::Dispatch), 64, Some(159)),
+    entry(14, Some(Global::Dispatch), 64, Some(160)),
+    entry(15, Some(Global::Dispatch), 64, None),
+    entry(16, Some(Global::Dispatch), 64, None),
+    entry(17, Some(Global::Dispatch), 64, None),
+    entry(18, Some(Global::Dispatch), 64, None),
+    entry(18, Some(Global::Dispatch), 64, None),
+    entry(19, Some(Global::Dispatch), 64, None),
+    entry(20, Some(Global::Dispatch), 64, None),
+    entry(21, Some(Global::Dispatch), 64, None),
+    entry(21, Some(Global::Dispatch), 64, None),
+    entry(22, Some(Global::Dispatch), 64, None),
+    entry(22, Some(Global::Dispatch), 64, None),
+    entry(23, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(6, Some(Global::Rows), 64, None),
+    entry(6, Some(Global::Rows), 64, None),
+    entry(7, Some(Global::Rows), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+];
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ArcSegment<F> {
+    pub(crate) middle: [F; 4],
+    pub(crate) tangent: [F; 4],
+}
+
+stored!(ArcSegment, (<F>), 8, middle 0, tangent 4);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ArcsHoisted<F> {
+    pub(crate) parameter: F,
+}
+
+stored!(ArcsHoisted, (<F>), 1, parameter 0);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Block {
+    pub(crate) first: u32,
+    pub(crate) starts: u32,
+}
+
+stored!(Block, (), 2, first 0, starts 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Cell {
+    pub(crate) output: u32,
+    pub(crate) row: u32,
+    pub(crate) position: u32,
+    pub(crate) block: u32,
+    pub(crate) is_inside: bool,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Corner {
+    pub(crate) first: u32,
+    pub(crate) column: u32,
+    pub(crate) block: u32,
+}
+
+stored!(Corner, (), 3, first 0, column 1, block 2);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdBase {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) step: u32,
+}
+
+stored!(CrowdBase, (), 3, first 0, count 1, step 2);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdChange {
+    pub(crate) index: u32,
+    pub(crate) clip_and_weight: u32,
+    pub(crate) speed_and_modes: u32,
+    pub(crate) start: u32,
+    pub(crate) anchor: u32,
+}
+
+stored!(CrowdChange, (), 5, index 0, clip_and_weight 1, speed_and_modes 2, start 3, anchor 4);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdChannel {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) form_and_base: u32,
+    pub(crate) keys: u32,
+}
+
+stored!(CrowdChannel, (), 4, first 0, count 1, form_and_base 2, keys 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdClip {
+    pub(crate) period: u32,
+    pub(crate) first_base: u32,
+    pub(crate) bases: u32,
+}
+
+stored!(CrowdClip, (), 3, period 0, first_base 1, bases 2);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdEntry {
+    pub(crate) clip_and_weight: u32,
+    pub(crate) speed_and_modes: u32,
+    pub(crate) start: u32,
+    pub(crate) anchor: u32,
+}
+
+stored!(CrowdEntry, (), 4, clip_and_weight 0, speed_and_modes 1, start 2, anchor 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdLink {
+    pub(crate) joint: u32,
+    pub(crate) parent: u32,
+}
+
+stored!(CrowdLink, (), 2, joint 0, parent 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdPosition<F> {
+    pub(crate) span: u32,
+    pub(crate) parameter: F,
+}
+
+stored!(CrowdPosition, (<F>), 2, span 0, parameter 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdSpan<F> {
+    pub(crate) start: u32,
+    pub(crate) whole: i32,
+    pub(crate) scale: F,
+    pub(crate) offset: F,
+}
+
+stored!(CrowdSpan, (<F>), 4, start 0, whole 1, scale 2, offset 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CubicsHoisted<F> {
+    pub(crate) first: TangentWeights<F>,
+    pub(crate) last: TangentWeights<F>,
+    pub(crate) parameter: F,
+}
+
+stored!(CubicsHoisted, (<F>), 9, first 0, last 4, parameter 8);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Dispatch {
+    pub(crate) first_item: u32,
+    pub(crate) item_count: u32,
+    pub(crate) stride: u32,
+    pub(crate) detail: u32,
+    pub(crate) first_output: u32,
+    pub(crate) idle: u32,
+}
+
+stored!(Dispatch, (), 6, first_item 0, item_count 1, stride 2, detail 3, first_output 4, idle 5);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FromIdentity<F> {
+    pub(crate) vector: [F; 3],
+    pub(crate) cosm1: F,
+}
+
+stored!(FromIdentity, (<F>), 4, vector 0, cosm1 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Item<F> {
+    pub(crate) source: u32,
+    pub(crate) output: u32,
+    pub(crate) count: u32,
+    pub(crate) first: i32,
+    pub(crate) scale: F,
+    pub(crate) offset: F,
+}
+
+stored!(Item, (<F>), 6, source 0, output 1, count 2, first 3, scale 4, offset 5);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct KeySample<F> {
+    pub(crate) key: u32,
+    pub(crate) parameter: F,
+}
+
+stored!(KeySample, (<F>), 2, key 0, parameter 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Link<F> {
+    pub(crate) offset: [F; 3],
+    pub(crate) track: u32,
+    pub(crate) parent: u32,
+}
+
+stored!(Link, (<F>), 8, offset 0, track 3, parent 4);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ListedSample<F> {
+    pub(crate) source: u32,
+    pub(crate) parameter: F,
+}
+
+stored!(ListedSample, (<F>), 2, source 0, parameter 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MatrixRows<F> {
+    pub(crate) first: [F; 3],
+    pub(crate) second: [F; 3],
+    pub(crate) third: [F; 3],
+}
+
+stored!(MatrixRows, (<F>), 12, first 0, second 4, third 8);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PolynomialSegment<F> {
+    pub(crate) coefficients: [[F; 4]; 11],
+}
+
+stored!(PolynomialSegment, (<F>), 44, coefficients 0);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Probe<F> {
+    pub(crate) a: F,
+    pub(crate) b: F,
+    pub(crate) c: F,
+    pub(crate) n: i32,
+}
+
+stored!(Probe, (<F>), 4, a 0, b 1, c 2, n 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Reply<F> {
+    pub(crate) contraction: F,
+    pub(crate) reassociation: F,
+    pub(crate) rounding: F,
+    pub(crate) association: F,
+    pub(crate) conversion: F,
+    pub(crate) cancellation: F,
+    pub(crate) sine: F,
+    pub(crate) cosine: F,
+    pub(crate) root: F,
+    pub(crate) arc_tangent: F,
+}
+
+stored!(Reply, (<F>), 10, contraction 0, reassociation 1, rounding 2, association 3, conversion 4, cancellation 5, sine 6, cosine 7, root 8, arc_tangent 9);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SmallAngleCubic<F> {
+    pub(crate) powers: [[F; 4]; 7],
+    pub(crate) is_valid: bool,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TangentWeights<F> {
+    pub(crate) before: F,
+    pub(crate) after: F,
+    pub(crate) outgoing: F,
+    pub(crate) kind: F,
+}
+
+stored!(TangentWeights, (<F>), 4, before 0, after 1, outgoing 2, kind 3);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TwoKeysHoisted<F> {
+    pub(crate) parameter: F,
+}
+
+stored!(TwoKeysHoisted, (<F>), 1, parameter 0);
+
+pub(crate) fn arc_between<M: Machine>(
+    machine: &M,
+    start: [M::F; 4],
+    end: [M::F; 4],
+) -> ArcSegment<M::F> {
+    let _block = machine.block(line!(), 44);
+    let half = both(
+        both(start, end, |x, y| x + y),
+        [M::F::of(0.5); 4],
+        |x, y| x * y,
+    );
+    let difference = both(end, start, |x, y| x - y);
+    let result = norm_squared(machine, difference);
+    let x = result * M::F::of(0.25);
+    let xx = x * x;
+    let secant_7 = M::F::of(SECANT_8) * x + M::F::of(SECANT_7);
+    let secant_5 = M::F::of(SECANT_6) * x + M::F::of(SECANT_5);
+    let secant_3 = M::F::of(SECANT_4) * x + M::F::of(SECANT_3);
+    let secant_1 = M::F::of(SECANT_2) * x + M::F::of(SECANT_1);
+    let secant_high = (M::F::of(SECANT_9) * xx + secant_7) * xx + secant_5;
+    let secant = ((secant_high * xx + secant_3) * xx + secant_1) * x;
+    let sine_7 = M::F::of(ARC_SINE_8) * x + M::F::of(ARC_SINE_7);
+    let sine_5 = M::F::of(ARC_SINE_6) * x + M::F::of(ARC_SINE_5);
+    let sine_3 = M::F::of(ARC_SINE_4) * x + M::F::of(ARC_SINE_3);
+    let sine_1 = M::F::of(ARC_SINE_2) * x + M::F::of(ARC_SINE_1);
+    let arc_sine = (((sine_7 * xx + sine_5) * xx + sine_3) * xx + sine_1) * x;
+    let result_2 = canonical(
+        machine,
+        both(both(half, [secant; 4], |x, y| x * y), half, |x, y| x + y),
+    );
+    let result_3 = canonical(
+        machine,
+        both(
+            both(difference, [arc_sine; 4], |x, y| x * y),
+            difference,
+            |x, y| x + y,
+        ),
+    );
+    ArcSegment {
+        middle: result_2,
+        tangent: result_3,
+    }
+}
+
+/// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 43);
+    let up = magnitude(machine, y);
+    let along = magnitude(machine, x);
+    let steep = up > along;
+    let large = if steep { up } else { along };
+    let small = if steep { along } else { up };
+    let divisor = if large == M::F::of(0.0) {
+        M::F::of(1.0)
+    } else {
+        large
+    };
+    let inverse = reciprocal(machine, divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high =
+        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
+            + M::F::of(ARC_4);
+    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
+        + M::F::of(ARC_0);
+    let flat = tail * (z * t) + t;
+    let acute = if steep {
+        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
+    } else {
+        flat
+    };
+    let obtuse = if x < M::F::of(0.0) {
+        (M::F::of(PI) - acute) + M::F::of(PI_LOW)
+    } else {
+        acute
+    };
+    if y < M::F::of(0.0) { -obtuse } else { obtuse }
+}
+
+/// An arc where its time base stands. The first cell is 0: a constant is an arc without a tangent.
+pub(crate) fn arc_value<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 16);
+    let is_key = at.span & ON_KEY != 0u32;
+    let along = (at.span & TICKS).wrapping_mul(channel.count);
+    let middle = channel.first.wrapping_add(along.wrapping_mul(2u32));
+    let key_or_first = cell_at(
+        machine,
+        if is_key {
+            channel.keys.wrapping_add(along)
+        } else {
+            middle
+        },
+    );
+    let tangent = cell_at(
+        machine,
+        if channel.count == 0u32 {
+            0u32
+        } else {
+            middle.wrapping_add(channel.count)
+        },
+    );
+    let result = evaluate_arc_segment(
+        machine,
+        ArcSegment {
+            middle: key_or_first,
+            tangent,
+        },
+        at.parameter,
+    );
+    let result_2 = canonical(machine, result);
+    if is_key { key_or_first } else { result_2 }
+}
+
+/// A key with its stored sign.
+pub(crate) fn as_stored<M: Machine>(machine: &M, stored: [u32; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 3);
+    [
+        stored[0] & 0xbfffffffu32,
+        [stored[1], stored[2], stored[3]][0],
+        [stored[1], stored[2], stored[3]][1],
+        [stored[1], stored[2], stored[3]][2],
+    ]
+    .map(|x| M::F::of_bits(x))
+}
+
+pub(crate) fn axis_angle<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 18);
+    let x = flushed(machine, rotation[0]);
+    let y = flushed(machine, rotation[1]);
+    let z = flushed(machine, rotation[2]);
+    let square = (x * x + y * y) + z * z;
+    let scale = reciprocal_root(machine, square);
+    let result = root(machine, square);
+    let result_2 = flushed(machine, rotation[3]);
+    let result_3 = arc_tangent(machine, result, result_2);
+    let angle = result_3 * M::F::of(114.59156);
+    let axis_and_angle = [x * scale, y * scale, z * scale, angle];
+    if square == M::F::of(0.0) {
+        [M::F::of(1.0), M::F::of(0.0), M::F::of(0.0), angle]
+    } else {
+        axis_and_angle
+    }
+}
+
+/// How many vectors of the line in which a vector is stored come before it. So many invocations are idle, so that
+/// those after them store whole lines.
+pub(crate) fn before_in_line<M: Machine>(machine: &M, vector: u32) -> u32 {
+    let _block = machine.block(line!(), 4);
+    let loaded = machine.load::<u32>(Global::Dispatch, 13);
+    vector & (LINE_VECTORS << loaded).wrapping_sub(1u32)
+}
+
+pub(crate) fn block_at<M: Machine>(machine: &M, index: u32) -> Block {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<Block>(Global::Blocks, 2 * (index as usize));
+    loaded
+}
+
+/// Components below 2^-64 in magnitude become +0.
+pub(crate) fn canonical<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let magnitude = both(q.map(|x| x.bits()), [0x7fffffffu32; 4], |x, y| x & y);
+    choose(
+        both(magnitude, [0x1f800000u32; 4], |x, y| x < y),
+        [M::F::of(0.0); 4],
+        q,
+    )
+}
+
+/// The Hamilton product of m and \[v, w].
+pub(crate) fn canonical_product<M: Machine>(
+    machine: &M,
+    m: [M::F; 4],
+    v: [M::F; 3],
+    w: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 29);
+    let result = canonical(
+        machine,
+        [
+            ((m[3] * v[0] + m[0] * w) + m[1] * v[2]) - m[2] * v[1],
+            ((m[3] * v[1] - m[0] * v[2]) + m[1] * w) + m[2] * v[0],
+            ((m[3] * v[2] + m[0] * v[1]) - m[1] * v[0]) + m[2] * w,
+            ((m[3] * w - m[0] * v[0]) - m[1] * v[1]) - m[2] * v[2],
+        ],
+    );
+    result
+}
+
+pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => cell_at_of_readers(machine, index),
+        _ => cell_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn cell_at_of_readers<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<[M::F; 4]>(Global::Cells, 4 * (index as usize));
+    loaded
+}
+
+pub(crate) fn cell_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<[u32; 4]>(Global::Cells, 4 * (index as usize));
+    loaded.map(|x| M::F::of_bits(x))
+}
+
+/// The sample that an invocation takes in its `iteration`. Eight neighbours always store at eight
+/// neighbouring cells, the first of which is a multiple of eight. An invocation's own samples are
+/// near each other: track by track 8 apart, frame by frame one.
+pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -> Cell {
+    let _block = machine.block(line!(), 17);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    if loaded == 1u32 {
+        let _block = machine.block(line!(), 11);
+        let index = corner.first.wrapping_add(iteration.wrapping_mul(LINE));
+        let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+        let position = loaded_2.wrapping_add(index);
+        let loaded_3 = machine.load::<u32>(Global::Dispatch, 6);
+        let output = position.wrapping_add(loaded_3);
+        let block = corner
+            .block
+            .wrapping_add(quotient(iteration.wrapping_mul(LINE), BLOCK_SAMPLES));
+        let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+        return Cell {
+            output,
+            row: 0u32,
+            position,
+            block,
+            is_inside: index < loaded_4,
+        };
+    }
+    let sample = corner.first.wrapping_add(iteration);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 4);
+    let row = sample.wrapping_mul(loaded_5).wrapping_add(loaded_6);
+    let output_2 = (row & 0xfffffff8u32).wrapping_add(corner.column);
+    let track = output_2.wrapping_sub(row);
+    let loaded_7 = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_8 = machine.load::<u32>(Global::Dispatch, 3);
+    let is_inside = (sample < loaded_7) & (track < loaded_8);
+    Cell {
+        output: output_2,
+        row: track,
+        position: sample,
+        block: corner.block.wrapping_add(track),
+        is_inside,
+    }
+}
+
+pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => channel_at_of_readers(machine, index),
+        _ => channel_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn channel_at_of_readers<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<CrowdChannel>(Global::Channels, 4 * (index as usize));
+    loaded
+}
+
+pub(crate) fn channel_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
+    let _block = machine.block(line!(), 1);
+    let all = machine.load::<[u32; 4]>(Global::Channels, 4 * (index as usize));
+    CrowdChannel {
+        first: all[0],
+        count: all[1],
+        form_and_base: all[2],
+        keys: all[3],
+    }
+}
+
+/// The Hamilton product a b.
+pub(crate) fn composed<M: Machine>(
+    machine: &M,
+    a: FromIdentity<M::F>,
+    b: FromIdentity<M::F>,
+) -> FromIdentity<M::F> {
+    let _block = machine.block(line!(), 12);
+    let result = cross3(machine, a.vector, b.vector);
+    let result_2 = dot3(machine, a.vector, b.vector);
+    FromIdentity {
+        vector: both(
+            both(
+                both(a.vector, b.vector, |x, y| x + y),
+                both(
+                    both(a.vector, [b.cosm1; 3], |x, y| x * y),
+                    both(b.vector, [a.cosm1; 3], |x, y| x * y),
+                    |x, y| x + y,
+                ),
+                |x, y| x + y,
+            ),
+            result,
+            |x, y| x + y,
+        ),
+        cosm1: ((a.cosm1 + b.cosm1) + a.cosm1 * b.cosm1) - result_2,
+    }
+}
+
+pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => constant_at_of_readers(machine, index),
+        _ => constant_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn constant_at_of_readers<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<[M::F; 4]>(Global::Constants, 4 * (index as usize));
+    loaded
+}
+
+pub(crate) fn constant_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<[u32; 4]>(Global::Constants, 4 * (index as usize));
+    loaded.map(|x| M::F::of_bits(x))
+}
+
+/// The coefficients of 1, s, s², … s¹⁰.
+pub(crate) fn constant_velocity<M: Machine>(machine: &M, arc: ArcSegment<M::F>) -> [[M::F; 4]; 11] {
+    let _block = machine.block(line!(), 29);
+    let square = norm_squared(machine, arc.tangent);
+    let even_2 = both(arc.middle, [square; 4], |x, y| x * y);
+    let odd_3 = both(arc.tangent, [square; 4], |x, y| x * y);
+    let even_4 = both(even_2, [square; 4], |x, y| x * y);
+    let odd_5 = both(odd_3, [square; 4], |x, y| x * y);
+    let even_6 = both(even_4, [square; 4], |x, y| x * y);
+    let odd_7 = both(odd_5, [square; 4], |x, y| x * y);
+    let even_8 = both(even_6, [square; 4], |x, y| x * y);
+    let odd_9 = both(odd_7, [square; 4], |x, y| x * y);
+    let result = canonical(machine, arc.tangent);
+    let result_2 = canonical(machine, both(even_2, [M::F::of(SERIES_2); 4], |x, y| x * y));
+    let result_3 = canonical(machine, both(odd_3, [M::F::of(SERIES_3); 4], |x, y| x * y));
+    let result_4 = canonical(machine, both(even_4, [M::F::of(SERIES_4); 4], |x, y| x * y));
+    let result_5 = canonical(machine, both(odd_5, [M::F::of(SERIES_5); 4], |x, y| x * y));
+    let result_6 = canonical(machine, both(even_6, [M::F::of(SERIES_6); 4], |x, y| x * y));
+    let result_7 = canonical(machine, both(odd_7, [M::F::of(SERIES_7); 4], |x, y| x * y));
+    let result_8 = canonical(machine, both(even_8, [M::F::of(SERIES_8); 4], |x, y| x * y));
+    let result_9 = canonical(machine, both(odd_9, [M::F::of(SERIES_9); 4], |x, y| x * y));
+    let result_10 = canonical(
+        machine,
+        both(
+            both(even_8, [square; 4], |x, y| x * y),
+            [M::F::of(SERIES_10); 4],
+            |x, y| x * y,
+        ),
+    );
+    [
+        arc.middle, result, result_2, result_3, result_4, result_5, result_6, result_7, result_8,
+        result_9, result_10,
+    ]
+}
+
+/// A key with the sign that continues the keys before it.
+pub(crate) fn continued<M: Machine>(machine: &M, stored: [u32; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let negation = stored[0] & SIGN_NEGATED;
+    let sign = negation << 1u32;
+    both(
+        stored,
+        [negation | sign, [sign; 3][0], [sign; 3][1], [sign; 3][2]],
+        |x, y| x ^ y,
+    )
+    .map(|x| M::F::of_bits(x))
+}
+
+pub(crate) fn continued_key_at<M: Machine>(machine: &M, key: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 2);
+    let result = key_at(machine, key);
+    let result_2 = continued(machine, result);
+    result_2
+}
+
+pub(crate) fn corner_of<M: Machine>(
+    machine: &M,
+    group: [u32; 3],
+    groups: [u32; 3],
+    lane: u32,
+) -> Corner {
+    let _block = machine.block(line!(), 17);
+    let tile = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let line = quotient(lane, LINE);
+    let within = lane & 7u32;
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    if loaded == 1u32 {
+        let _block = machine.block(line!(), 8);
+        let first = tile
+            .wrapping_mul(WORKGROUP)
+            .wrapping_add(line.wrapping_mul(LINE))
+            .wrapping_mul(SAMPLES_EACH)
+            .wrapping_add(within);
+        let loaded_2 = machine.load::<u32>(Global::Dispatch, 5);
+        return Corner {
+            first,
+            column: 0u32,
+            block: loaded_2.wrapping_add(quotient(first, BLOCK_SAMPLES)),
+        };
+    }
+    let first_2 = group[2]
+        .wrapping_mul(8u32)
+        .wrapping_add(line)
+        .wrapping_mul(SAMPLES_EACH);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let block = loaded_3.wrapping_add(quotient(first_2, BLOCK_SAMPLES).wrapping_mul(loaded_4));
+    Corner {
+        first: first_2,
+        column: tile.wrapping_mul(LINE).wrapping_add(within),
+        block,
+    }
+}
+
+pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 9);
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => crowd_work_of_rotations(machine, index),
+        1 => crowd_work_of_locals(machine, index),
+        2 => crowd_work_of_gather(machine, index),
+        3 => crowd_work_of_scatter(machine, index),
+        4 => crowd_work_of_times(machine, index),
+        5 => crowd_work_of_walk(machine, index),
+        6 => crowd_work_of_skin(machine, index),
+        _ => crowd_work_of_half(machine, index),
+    }
+}
+
+/// `index` is a joint of an instance.
+pub(crate) fn crowd_work_of_rotations<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let instance = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let result = layered(
+        machine,
+        instance,
+        index.wrapping_sub(instance.wrapping_mul(loaded_2)),
+        ROTATION,
+    );
+    store(machine, index, result);
+}
+
+/// `index` is a joint of an instance.
+pub(crate) fn crowd_work_of_locals<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 18);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let instance = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let joint = index.wrapping_sub(instance.wrapping_mul(loaded_2));
+    let result = layered(machine, instance, joint, ROTATION);
+    let rows = matrix_rows(machine, result, 0u32);
+    let moved = layered(machine, instance, joint, TRANSLATION);
+    let scale = layered(machine, instance, joint, SCALE);
+    let first = index.wrapping_mul(3u32);
+    let result_2 = transform_row(machine, rows.first, scale, moved[0]);
+    store(machine, first, result_2);
+    let result_3 = transform_row(machine, rows.second, scale, moved[1]);
+    store(machine, first.wrapping_add(1u32), result_3);
+    let result_4 = transform_row(machine, rows.third, scale, moved[2]);
+    store(machine, first.wrapping_add(2u32), result_4);
+}
+
+/// `index` is a layer of an instance of the window.
+pub(crate) fn crowd_work_of_gather<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 13);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let instance = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 3);
+    let layer = index.wrapping_sub(instance.wrapping_mul(loaded_2));
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_4 = machine.load::<u32>(Global::Visible, loaded_3.wrapping_add(instance) as usize);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
+    let loaded_6 = machine.load::<[u32; 4]>(
+        Global::All,
+        4 * (loaded_4.wrapping_mul(loaded_5).wrapping_add(layer) as usize),
+    );
+    machine.store::<[u32; 4]>(Global::Gathered, 4 * (index as usize), loaded_6);
+}
+
+/// `index` is a change.
+pub(crate) fn crowd_work_of_scatter<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 2);
+    let change = machine.load::<CrowdChange>(Global::Changes, 5 * (index as usize));
+    machine.store::<[u32; 4]>(
+        Global::All,
+        4 * (change.index as usize),
+        [
+            change.clip_and_weight,
+            change.speed_and_modes,
+            change.start,
+            change.anchor,
+        ],
+    );
+}
+
+/// `index_in_window` is a time base of an entry, of those of the window.
+pub(crate) fn crowd_work_of_times<M: Machine>(machine: &M, index_in_window: u32) {
+    let _block = machine.block(line!(), 14);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let layer = quotient(index_in_window, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let base_index = index_in_window.wrapping_sub(layer.wrapping_mul(loaded_2));
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let entry = machine.load::<CrowdEntry>(
+        Global::Entries,
+        4 * (loaded_3.wrapping_mul(loaded_4).wrapping_add(layer) as usize),
+    );
+    let clip = machine.load::<CrowdClip>(
+        Global::Clips,
+        3 * ((entry.clip_and_weight & 0xffffu32) as usize),
+    );
+    if base_index < clip.bases {
+        let _block = machine.block(line!(), 17);
+        let tick = tick_of(machine, entry, clip.period);
+        let base = machine.load::<CrowdBase>(
+            Global::TimeBases,
+            3 * (clip.first_base.wrapping_add(base_index) as usize),
+        );
+        let index = span_at(machine, base, tick);
+        let span = machine
+            .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(index) as usize));
+        let distance = distance_from_middle(machine, (tick as i32).wrapping_sub(span.whole), 0u32);
+        let is_key = span.start == tick | ON_KEY;
+        machine.store::<u32>(
+            Global::Positions,
+            2 * (index_in_window as usize),
+            index | (if is_key { ON_KEY } else { 0u32 }),
+        );
+        machine.store::<M::F>(
+            Global::Positions,
+            2 * (index_in_window as usize) + 1,
+            distance * span.scale + span.offset,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
+/// `index` is a joint of the level, of an instance; `dispatch.layers` is the number of joints of the
+/// skeleton.
+pub(crate) fn crowd_work_of_walk<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 34);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let instance = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 5);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    let link = machine.load::<CrowdLink>(
+        Global::Links,
+        2 * (loaded_2.wrapping_add(index.wrapping_sub(instance.wrapping_mul(loaded_3))) as usize),
+    );
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let above = instance
+        .wrapping_mul(loaded_4)
+        .wrapping_add(link.parent)
+        .wrapping_mul(3u32);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
+    let row = instance
+        .wrapping_mul(loaded_5)
+        .wrapping_add(link.joint)
+        .wrapping_mul(3u32);
+    let first = machine.load::<[M::F; 4]>(Global::Matrices, 4 * (row as usize));
+    let second = machine.load::<[M::F; 4]>(Global::Matrices, 4 * (row.wrapping_add(1u32) as usize));
+    let third = machine.load::<[M::F; 4]>(Global::Matrices, 4 * (row.wrapping_add(2u32) as usize));
+    let loaded_6 = machine.load::<[M::F; 4]>(Global::Matrices, 4 * (above as usize));
+    let result = row_product(machine, loaded_6, first, second, third);
+    machine.store::<[M::F; 4]>(Global::Matrices, 4 * (row as usize), result);
+    let loaded_7 =
+        machine.load::<[M::F; 4]>(Global::Matrices, 4 * (above.wrapping_add(1u32) as usize));
+    let result_2 = row_product(machine, loaded_7, first, second, third);
+    machine.store::<[M::F; 4]>(
+        Global::Matrices,
+        4 * (row.wrapping_add(1u32) as usize),
+        result_2,
+    );
+    let loaded_8 =
+        machine.load::<[M::F; 4]>(Global::Matrices, 4 * (above.wrapping_add(2u32) as usize));
+    let result_3 = row_product(machine, loaded_8, first, second, third);
+    machine.store::<[M::F; 4]>(
+        Global::Matrices,
+        4 * (row.wrapping_add(2u32) as usize),
+        result_3,
+    );
+}
+
+/// `index` is a row of a matrix of a joint of an instance; `dispatch.joints` counts the skeleton's.
+pub(crate) fn crowd_work_of_skin<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 15);
+    let matrix = quotient(index, 3u32);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let instance = quotient(matrix, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let first = matrix
+        .wrapping_sub(instance.wrapping_mul(loaded_2))
+        .wrapping_mul(3u32);
+    let loaded_3 = machine.load::<[M::F; 4]>(Global::Matrices, 4 * (index as usize));
+    let loaded_4 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first as usize));
+    let loaded_5 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(1u32) as usize));
+    let loaded_6 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(2u32) as usize));
+    let result = row_product(machine, loaded_3, loaded_4, loaded_5, loaded_6);
+    machine.store::<[M::F; 4]>(Global::Matrices, 4 * (index as usize), result);
+}
+
+/// Rounds values to half precision.
+/// Twin: src/twin/crowd_matrices.rs.
+pub(crate) fn crowd_work_of_half<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 7);
+    let loaded = machine.load::<[M::F; 4]>(Global::Values, 4 * (index as usize));
+    let half = to_any_half(machine, loaded);
+    machine.store::<[u32; 2]>(
+        Global::Halves,
+        2 * (index as usize),
+        [half[0] | (half[1] << 16u32), half[2] | (half[3] << 16u32)],
+    );
+}
+
+/// A cubic about the middle of its span.
+pub(crate) fn cubic<M: Machine>(
+    machine: &M,
+    c0: [M::F; 4],
+    c1: [M::F; 4],
+    c2: [M::F; 4],
+    c3: [M::F; 4],
+    s: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 7);
+    let z = s * s;
+    both(
+        c0,
+        both(
+            both(
+                both(both(c3, [s; 4], |x, y| x * y), c2, |x, y| x + y),
+                [z; 4],
+                |x, y| x * y,
+            ),
+            both(c1, [s; 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+        |x, y| x + y,
+    )
+}
+
+/// A cubic likewise.
+pub(crate) fn cubic_value<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 22);
+    let is_key = at.span & ON_KEY != 0u32;
+    let is_constant = channel.count == 0u32;
+    let along = (at.span & TICKS).wrapping_mul(channel.count);
+    let first = channel.first.wrapping_add(along.wrapping_mul(4u32));
+    let second = first.wrapping_add(channel.count);
+    let third = second.wrapping_add(channel.count);
+    let key_or_first = cell_at(
+        machine,
+        if is_key {
+            channel.keys.wrapping_add(along)
+        } else {
+            first
+        },
+    );
+    let result = cell_at(machine, if is_constant { 0u32 } else { second });
+    let result_2 = cell_at(machine, if is_constant { 0u32 } else { third });
+    let result_3 = cell_at(
+        machine,
+        if is_constant {
+            0u32
+        } else {
+            third.wrapping_add(channel.count)
+        },
+    );
+    let value = cubic(
+        machine,
+        key_or_first,
+        result,
+        result_2,
+        result_3,
+        at.parameter,
+    );
+    let result_4 = canonical(machine, value);
+    if is_key { key_or_first } else { result_4 }
+}
+
+pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => distance_at_of_readers(machine, index),
+        _ => distance_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn distance_at_of_readers<M: Machine>(machine: &M, index: u32) -> M::F {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<M::F>(Global::Distances, index as usize);
+    loaded
+}
+
+pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M::F {
+    let _block = machine.block(line!(), 11);
+    let four = machine.load::<[u32; 4]>(Global::Distances, 4 * (quotient(index, 4u32) as usize));
+    let two = if index & 2u32 == 2u32 {
+        [four[2], four[3]]
+    } else {
+        [four[0], four[1]]
+    };
+    M::F::of_bits(if index & 1u32 == 1u32 { two[1] } else { two[0] })
+}
+
+pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => distance_from_middle_of_frame_distance(machine, first, j),
+        _ => distance_from_middle_of_time_distance(machine, first, j),
+    }
+}
+
+/// A whole number of frames from the whole frame nearest to the middle. It is converted in two
+/// halves, each exact in f32, so that the one rounding is that of the addition.
+pub(crate) fn distance_from_middle_of_frame_distance<M: Machine>(
+    machine: &M,
+    first: i32,
+    j: u32,
+) -> M::F {
+    let _block = machine.block(line!(), 7);
+    let frames = first.wrapping_add(j as i32);
+    let low = frames & 4095i32;
+    M::F::of(frames.wrapping_sub(low) as f32) + M::F::of(low as f32)
+}
+
+/// Seconds from the middle, which the host subtracted in f64.
+pub(crate) fn distance_from_middle_of_time_distance<M: Machine>(
+    machine: &M,
+    first: i32,
+    j: u32,
+) -> M::F {
+    let _block = machine.block(line!(), 3);
+    let result = distance_at(machine, (first as u32).wrapping_add(j));
+    result
+}
+
+pub(crate) fn dot3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> M::F {
+    let _block = machine.block(line!(), 5);
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F {
+    let _block = machine.block(line!(), 7);
+    ((a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]) + a[3] * b[3]
+}
+
+pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => entry_at_of_readers(machine, index),
+        1 => entry_at_of_whole(machine, index),
+        _ => entry_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn entry_at_of_readers<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<CrowdEntry>(Global::Entries, 4 * (index as usize));
+    loaded
+}
+
+pub(crate) fn entry_at_of_whole<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::FirstEntry, 0);
+    let loaded_2 =
+        machine.load::<CrowdEntry>(Global::Entries, 4 * (loaded.wrapping_add(index) as usize));
+    loaded_2
+}
+
+pub(crate) fn entry_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
+    let _block = machine.block(line!(), 1);
+    let all = machine.load::<[u32; 4]>(Global::Entries, 4 * (index as usize));
+    CrowdEntry {
+        clip_and_weight: all[0],
+        speed_and_modes: all[1],
+        start: all[2],
+        anchor: all[3],
+    }
+}
+
+pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -> [M::F; 3] {
+    let mut condition: bool = Default::default();
+    let mut condition_2: bool = Default::default();
+    let _block = machine.block(line!(), 71);
+    let symmetric = detail & SYMMETRIC != 0u32;
+    let intrinsic = detail & INTRINSIC != 0u32;
+    let sign = if detail & NEGATIVE != 0u32 {
+        M::F::of(-1.0)
+    } else {
+        M::F::of(1.0)
+    };
+    let w = rotation[3];
+    let i = rotation[(detail & 3u32) as usize];
+    let j = rotation[((detail >> 2u32) & 3u32) as usize];
+    let k = rotation[((detail >> 4u32) & 3u32) as usize] * sign;
+    let a = flushed(machine, if symmetric { w } else { w - j });
+    let b = flushed(machine, if symmetric { i } else { i + k });
+    let c = flushed(machine, if symmetric { j } else { j + w });
+    let d = flushed(machine, if symmetric { k } else { k - i });
+    let sine = root(machine, c * c + d * d);
+    let cosine = root(machine, a * a + b * b);
+    let half_sum = arc_tangent(machine, b, a);
+    let half_difference = arc_tangent(machine, d, c);
+    let closed = sine < M::F::of(GIMBAL);
+    let open = cosine < M::F::of(GIMBAL);
+    if !closed {
+        let _block = machine.block(line!(), 1);
+        condition = open;
+    } else {
+        let _block = machine.block(line!(), 1);
+        condition = true;
+    }
+    let locked = condition;
+    let sum = half_sum + half_difference;
+    let difference = half_sum - half_difference;
+    let opposite = if intrinsic {
+        half_difference
+    } else {
+        -half_difference
+    };
+    let together = M::F::of(2.0) * (if closed { half_sum } else { opposite });
+    let third_sign = if symmetric { M::F::of(1.0) } else { sign };
+    let outer = if locked {
+        together
+    } else {
+        if intrinsic {
+            sum * third_sign
+        } else {
+            difference
+        }
+    };
+    let inner = if locked {
+        M::F::of(0.0)
+    } else {
+        if intrinsic {
+            difference
+        } else {
+            sum * third_sign
+        }
+    };
+    if locked {
+        let _block = machine.block(line!(), 1);
+        condition_2 = intrinsic;
+    } else {
+        let _block = machine.block(line!(), 1);
+        condition_2 = false;
+    }
+    let loaded = condition_2;
+    let first = if loaded { outer * third_sign } else { outer };
+    let result = arc_tangent(machine, sine, cosine);
+    let whole = M::F::of(2.0) * result;
+    let second = if symmetric {
+        whole
+    } else {
+        (whole - M::F::of(HALF_PI)) - M::F::of(HALF_PI_LOW)
+    };
+    let result_2 = wrapped(machine, first);
+    let result_3 = wrapped(machine, second);
+    let result_4 = wrapped(machine, inner);
+    [
+        result_2 * M::F::of(DEGREES),
+        result_3 * M::F::of(DEGREES),
+        result_4 * M::F::of(DEGREES),
+    ]
+}
+
+/// `parameter` runs from -1/2 to 1/2 over the segment.
+pub(crate) fn evaluate_arc_segment<M: Machine>(
+    machine: &M,
+    segment: ArcSegment<M::F>,
+    parameter: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 8);
+    let result = norm_squared(machine, segment.tangent);
+    let z = (parameter * parameter) * result;
+    let sines = sine_cosm1_quarter(machine, parameter, z);
+    both(
+        segment.middle,
+        both(
+            both(segment.middle, [sines[1]; 4], |x, y| x * y),
+            both(segment.tangent, [sines[0]; 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+        |x, y| x + y,
+    )
+}
+
+/// `s` runs from -1/2 to 1/2 over the segment.
+pub(crate) fn evaluate_polynomial_segment<M: Machine>(
+    machine: &M,
+    segment: PolynomialSegment<M::F>,
+    s: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let result = polynomial(machine, segment.coefficients, s);
+    result
+}
+
+/// Finds the position in a time base of a layer of the workgroup's instances, as `crowd/times` does.
+pub(crate) fn find_position<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 14);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let layer = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let base_index = index.wrapping_sub(layer.wrapping_mul(loaded_2));
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let entry = entry_at(machine, loaded_3.wrapping_mul(loaded_4).wrapping_add(layer));
+    let clip = machine.load::<CrowdClip>(
+        Global::Clips,
+        3 * ((entry.clip_and_weight & 0xffffu32) as usize),
+    );
+    if base_index < clip.bases {
+        let _block = machine.block(line!(), 17);
+        let tick = tick_of(machine, entry, clip.period);
+        let base = machine.load::<CrowdBase>(
+            Global::TimeBases,
+            3 * (clip.first_base.wrapping_add(base_index) as usize),
+        );
+        let found = span_at(machine, base, tick);
+        let span = machine
+            .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(found) as usize));
+        let distance = distance_from_middle(machine, (tick as i32).wrapping_sub(span.whole), 0u32);
+        let is_key = span.start == tick | ON_KEY;
+        machine.store::<u32>(
+            Global::FoundSpans,
+            index as usize,
+            found | (if is_key { ON_KEY } else { 0u32 }),
+        );
+        machine.store::<M::F>(
+            Global::FoundParameters,
+            index as usize,
+            distance * span.scale + span.offset,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
+/// Finds an invocation's part of the positions of so many instances.
+pub(crate) fn find_positions<M: Machine>(machine: &M, instances: u32, lane: u32) {
+    let mut index: u32 = Default::default();
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let count = instances.wrapping_mul(loaded).wrapping_mul(loaded_2);
+    index = lane;
+    loop {
+        let _block = machine.block(line!(), 8);
+        let loaded_3 = index;
+        if !(loaded_3 < count) {
+            break;
+        }
+        let loaded_4 = index;
+        find_position(machine, loaded_4);
+        let loaded_5 = index;
+        index = loaded_5.wrapping_add(CROWD_WORKGROUP);
+    }
+}
+
+/// Stores a vector of the result.
+pub(crate) fn finish_1<M: Machine>(machine: &M, vector: u32, value: [M::F; 4]) {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::Dispatch, 13);
+    if loaded != 0u32 {
+        let _block = machine.block(line!(), 6);
+        let half = to_any_half(machine, value);
+        machine.store::<[u32; 2]>(
+            Global::Halves,
+            2 * (vector as usize),
+            [half[0] | (half[1] << 16u32), half[2] | (half[3] << 16u32)],
+        );
+        return;
+    } else {
+        let _block = machine.block(line!(), 1);
+        machine.store::<[M::F; 4]>(Global::Values, 4 * (vector as usize), value);
+        return;
+    }
+}
+
+pub(crate) async fn finish_2<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
+        3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
+        1 => finish_2_of_together(machine, lane, index, rotation, is_stored).await,
+        2 => finish_2_of_together_2(machine, lane, index, rotation, is_stored).await,
+        _ => finish_2_of_together_3(machine, lane, index, rotation, is_stored).await,
+    }
+}
+
+/// Values of one part: eight neighbours store a line of them as they are.
+pub(crate) async fn finish_2_of_alone<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    let _block = machine.block(line!(), 1);
+    if is_stored {
+        let _block = machine.block(line!(), 1);
+        store(machine, index, rotation);
+        return;
+    } else {
+        return;
+    }
+}
+
+pub(crate) async fn finish_2_of_together<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    let mut part: u32 = Default::default();
+    let _block = machine.block(line!(), 7);
+    machine.store::<u32>(
+        Global::IsThere,
+        lane as usize,
+        if is_stored { 1u32 } else { 0u32 },
+    );
+    if is_stored {
+        let _block = machine.block(line!(), 2);
+        let result = parts_1(machine, rotation);
+        machine.store::<[M::F; 3]>(Global::Tile, 3 * (lane as usize), result);
+    }
+    barrier().await;
+    let within = lane & 7u32;
+    let first = index.wrapping_sub(within).wrapping_mul(3u32);
+    part = within;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded = part;
+        if !(loaded < 24u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let value = quotient(loaded_2, 3u32);
+        let other = lane.wrapping_sub(within).wrapping_add(value);
+        let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
+        if loaded_3 != 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded_4 = part;
+            let loaded_5 = part;
+            let loaded_6 = machine.load::<M::F>(
+                Global::Tile,
+                3 * (other as usize) + loaded_5.wrapping_sub(value.wrapping_mul(3u32)) as usize,
+            );
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_add(loaded_4) as usize,
+                loaded_6,
+            );
+        }
+        let loaded_7 = part;
+        part = loaded_7.wrapping_add(LINE);
+    }
+    barrier().await;
+}
+
+pub(crate) async fn finish_2_of_together_2<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    let mut part: u32 = Default::default();
+    let _block = machine.block(line!(), 7);
+    machine.store::<u32>(
+        Global::IsThere,
+        lane as usize,
+        if is_stored { 1u32 } else { 0u32 },
+    );
+    if is_stored {
+        let _block = machine.block(line!(), 2);
+        let result = parts_2(machine, rotation);
+        machine.store::<[M::F; 9]>(Global::Tile, 9 * (lane as usize), result);
+    }
+    barrier().await;
+    let within = lane & 7u32;
+    let first = index.wrapping_sub(within).wrapping_mul(9u32);
+    part = within;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded = part;
+        if !(loaded < 72u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let value = quotient(loaded_2, 9u32);
+        let other = lane.wrapping_sub(within).wrapping_add(value);
+        let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
+        if loaded_3 != 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded_4 = part;
+            let loaded_5 = part;
+            let loaded_6 = machine.load::<M::F>(
+                Global::Tile,
+                9 * (other as usize) + loaded_5.wrapping_sub(value.wrapping_mul(9u32)) as usize,
+            );
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_add(loaded_4) as usize,
+                loaded_6,
+            );
+        }
+        let loaded_7 = part;
+        part = loaded_7.wrapping_add(LINE);
+    }
+    barrier().await;
+}
+
+pub(crate) async fn finish_2_of_together_3<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    let mut part: u32 = Default::default();
+    let _block = machine.block(line!(), 7);
+    machine.store::<u32>(
+        Global::IsThere,
+        lane as usize,
+        if is_stored { 1u32 } else { 0u32 },
+    );
+    if is_stored {
+        let _block = machine.block(line!(), 2);
+        let result = parts_3(machine, rotation);
+        machine.store::<[[M::F; 4]; 3]>(Global::Tile, 12 * (lane as usize), result);
+    }
+    barrier().await;
+    let within = lane & 7u32;
+    let first = index.wrapping_sub(within).wrapping_mul(3u32);
+    part = within;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded = part;
+        if !(loaded < 24u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let value = quotient(loaded_2, 3u32);
+        let other = lane.wrapping_sub(within).wrapping_add(value);
+        let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
+        if loaded_3 != 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded_4 = part;
+            let loaded_5 = part;
+            let loaded_6 = machine.load::<[M::F; 4]>(
+                Global::Tile,
+                12 * (other as usize)
+                    + 4 * (loaded_5.wrapping_sub(value.wrapping_mul(3u32)) as usize),
+            );
+            machine.store::<[M::F; 4]>(
+                Global::Rotations,
+                4 * (first.wrapping_add(loaded_4) as usize),
+                loaded_6,
+            );
+        }
+        let loaded_7 = part;
+        part = loaded_7.wrapping_add(LINE);
+    }
+    barrier().await;
+}
+
+/// 0 where the magnitude is below 2^-50.
+pub(crate) fn flushed<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 4);
+    if x.bits() & 0x7fffffffu32 < FLUSHED_BITS {
+        M::F::of(0.0)
+    } else {
+        x
+    }
+}
+
+pub(crate) fn flushed4<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let result = flushed(machine, q[0]);
+    let result_2 = flushed(machine, q[1]);
+    let result_3 = flushed(machine, q[2]);
+    let result_4 = flushed(machine, q[3]);
+    [result, result_2, result_3, result_4]
+}
+
+/// Whether a position is one of an item's samples.
+pub(crate) fn has<M: Machine>(machine: &M, item: Item<M::F>, position: u32) -> bool {
+    let _block = machine.block(line!(), 3);
+    position.wrapping_sub(item.output) < item.count & 0x3fffffffu32
+}
+
+pub(crate) fn hoisted_arcs_hoisted<M: Machine>(
+    machine: &M,
+    first: u32,
+    next: u32,
+    parameter: M::F,
+) -> ArcsHoisted<M::F> {
+    ArcsHoisted { parameter }
+}
+
+pub(crate) fn hoisted_cubics_hoisted<M: Machine>(
+    machine: &M,
+    first: u32,
+    next: u32,
+    parameter: M::F,
+) -> CubicsHoisted<M::F> {
+    let _block = machine.block(line!(), 2);
+    let result = weights_at(machine, first);
+    let result_2 = weights_at(machine, next);
+    CubicsHoisted {
+        first: result,
+        last: result_2,
+        parameter,
+    }
+}
+
+pub(crate) fn hoisted_two_keys_hoisted<M: Machine>(
+    machine: &M,
+    first: u32,
+    next: u32,
+    parameter: M::F,
+) -> TwoKeysHoisted<M::F> {
+    TwoKeysHoisted { parameter }
+}
+
+/// A number of ticks in units of 2^-16.
+pub(crate) fn in_parts<M: Machine>(machine: &M, ticks: u32) -> [u32; 2] {
+    let _block = machine.block(line!(), 2);
+    [ticks << 16u32, ticks >> 16u32]
+}
+
+/// Begins with the instances of a workgroup, from the `first` of the dispatch on; returns how many they are.
+pub(crate) fn instances_from<M: Machine>(machine: &M, first: u32) -> u32 {
+    let _block = machine.block(line!(), 9);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    machine.store::<u32>(Global::FirstEntry, 0, first.wrapping_mul(loaded));
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    let rest = loaded_2.wrapping_sub(first);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 10);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 10);
+    if rest < loaded_4 { rest } else { loaded_3 }
+}
+
+pub(crate) fn interval_at<M: Machine>(machine: &M, index: u32) -> u32 {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<u32>(Global::Intervals, index as usize);
+    loaded
+}
+
+/// r⁻¹ v r.
+pub(crate) fn inverse_rotated<M: Machine>(
+    machine: &M,
+    v: [M::F; 3],
+    r: FromIdentity<M::F>,
+) -> [M::F; 3] {
+    let _block = machine.block(line!(), 7);
+    let once = cross3(machine, r.vector, v);
+    let twice = both(once, once, |x, y| x + y);
+    let result = cross3(machine, r.vector, twice);
+    both(
+        both(
+            v,
+            both(both(twice, [r.cosm1; 3], |x, y| x * y), twice, |x, y| x + y),
+            |x, y| x - y,
+        ),
+        result,
+        |x, y| x + y,
+    )
+}
+
+pub(crate) fn invocation_index<M: Machine>(
+    machine: &M,
+    invocation: [u32; 3],
+    groups: [u32; 3],
+) -> u32 {
+    let _block = machine.block(line!(), 3);
+    invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(WORKGROUP))
+        .wrapping_add(invocation[0])
+}
+
+pub(crate) fn item_at<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => item_at_of_readers(machine, index),
+        _ => item_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn item_at_of_readers<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<Item<M::F>>(Global::Items, 6 * (index as usize));
+    loaded
+}
+
+pub(crate) fn item_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+    let _block = machine.block(line!(), 16);
+    let texel = quotient(3u32.wrapping_mul(index), 2u32);
+    let first = machine.load::<[u32; 4]>(Global::Items, 4 * (texel as usize));
+    let second = machine.load::<[u32; 4]>(Global::Items, 4 * (texel.wrapping_add(1u32) as usize));
+    let is_odd = index & 1u32 == 1u32;
+    let head = if is_odd {
+        [
+            [first[2], first[3]][0],
+            [first[2], first[3]][1],
+            [second[0], second[1]][0],
+            [second[0], second[1]][1],
+        ]
+    } else {
+        first
+    };
+    let tail = if is_odd {
+        [second[2], second[3]]
+    } else {
+        [second[0], second[1]]
+    };
+    Item {
+        source: head[0],
+        output: head[1],
+        count: head[2],
+        first: head[3] as i32,
+        scale: M::F::of_bits(tail[0]),
+        offset: M::F::of_bits(tail[1]),
+    }
+}
+
+/// The item that a sample belongs to, if it belongs to any.
+pub(crate) fn item_of<M: Machine>(machine: &M, cell: Cell) -> u32 {
+    let _block = machine.block(line!(), 6);
+    let block = block_at(machine, cell.block);
+    block
+        .first
+        .wrapping_add((block.starts << (!cell.position & 31u32)).count_ones())
+}
+
+pub(crate) fn key_at<M: Machine>(machine: &M, index: u32) -> [u32; 4] {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<[u32; 4]>(Global::Keys, 4 * (index as usize));
+    loaded
+}
+
+/// A rotation, a translation or a scale under the next layer. For scales `reference` holds reciprocals.
+pub(crate) fn laid_over<M: Machine>(
+    machine: &M,
+    kind: u32,
+    is_additive: bool,
+    below: [M::F; 4],
+    layer: [M::F; 4],
+    reference: [M::F; 4],
+    weight: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 12);
+    if kind == ROTATION {
+        let _block = machine.block(line!(), 3);
+        if is_additive {
+            let _block = machine.block(line!(), 1);
+            let result = rotation_added(machine, below, layer, reference, weight);
+            return result;
+        }
+        let result_2 = over(machine, below, layer, weight);
+        let result_3 = canonical(machine, result_2);
+        return result_3;
+    }
+    if !is_additive {
+        let _block = machine.block(line!(), 6);
+        let result_4 = canonical(
+            machine,
+            if weight == M::F::of(1.0) {
+                layer
+            } else {
+                both(
+                    below,
+                    both(both(layer, below, |x, y| x - y), [weight; 4], |x, y| x * y),
+                    |x, y| x + y,
+                )
+            },
+        );
+        return result_4;
+    }
+    if kind == TRANSLATION {
+        let _block = machine.block(line!(), 4);
+        let result_5 = canonical(
+            machine,
+            both(
+                below,
+                both(both(layer, reference, |x, y| x - y), [weight; 4], |x, y| {
+                    x * y
+                }),
+                |x, y| x + y,
+            ),
+        );
+        return result_5;
+    }
+    let result_6 = canonical(
+        machine,
+        both(
+            below,
+            both(
+                below,
+                both(
+                    both(
+                        both(layer, reference, |x, y| x * y),
+                        [M::F::of(1.0); 4],
+                        |x, y| x - y,
+                    ),
+                    [weight; 4],
+                    |x, y| x * y,
+                ),
+                |x, y| x * y,
+            ),
+            |x, y| x + y,
+        ),
+    );
+    result_6
+}
+
+/// The `kind`th channel of a joint in one layer; `layer` counts within the window.
+pub(crate) fn layer_value<M: Machine>(
+    machine: &M,
+    layer: u32,
+    entry: CrowdEntry,
+    joint: u32,
+    kind: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 13);
+    let clip = entry.clip_and_weight & 0xffffu32;
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let channel = channel_at(
+        machine,
+        clip.wrapping_mul(loaded)
+            .wrapping_add(joint)
+            .wrapping_mul(CHANNELS)
+            .wrapping_add(kind),
+    );
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let at = position_at(
+        machine,
+        layer
+            .wrapping_mul(loaded_2)
+            .wrapping_add(channel.form_and_base & 0xffffffu32),
+    );
+    let result = sampled(machine, channel, at);
+    result
+}
+
+pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => layered_of_layers(machine, instance, joint, kind),
+        _ => layered_of_plain(machine, instance, joint, kind),
+    }
+}
+
+/// The `kind`th channel of a joint, with all layers; `instance` counts within the window.
+pub(crate) fn layered_of_layers<M: Machine>(
+    machine: &M,
+    instance: u32,
+    joint: u32,
+    kind: u32,
+) -> [M::F; 4] {
+    let mut value: [M::F; 4] = Default::default();
+    let mut layer: u32 = 1u32;
+    let _block = machine.block(line!(), 10);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let first = instance.wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 3);
+    let all = loaded_2.wrapping_add(instance).wrapping_mul(loaded_3);
+    let result = entry_at(machine, all);
+    let result_2 = layer_value(machine, first, result, joint, kind);
+    value = result_2;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded_4 = layer;
+        let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_4 < loaded_5) {
+            break;
+        }
+        let loaded_6 = layer;
+        let entry = entry_at(machine, all.wrapping_add(loaded_6));
+        let weight = entry.clip_and_weight >> 16u32;
+        if weight != 0u32 {
+            let _block = machine.block(line!(), 29);
+            let modes = entry.speed_and_modes;
+            let loaded_7 = machine.load::<u32>(Global::Dispatch, 8);
+            let loaded_8 = machine.load::<u32>(Global::Dispatch, 2);
+            let mask = loaded_7
+                .wrapping_add(((modes >> 24u32) & 31u32).wrapping_mul(loaded_8))
+                .wrapping_add(joint);
+            let result_3 = cell_at(machine, mask);
+            let joint_weight =
+                (M::F::of((weight as i32) as f32) * M::F::of(WEIGHT_UNIT)) * result_3[0];
+            let clip = entry.clip_and_weight & 0xffffu32;
+            let loaded_9 = machine.load::<u32>(Global::Dispatch, 9);
+            let loaded_10 = machine.load::<u32>(Global::Dispatch, 2);
+            let reference = loaded_9
+                .wrapping_add(
+                    clip.wrapping_mul(loaded_10)
+                        .wrapping_add(joint)
+                        .wrapping_mul(CHANNELS),
+                )
+                .wrapping_add(kind);
+            let loaded_11 = layer;
+            let next = layer_value(machine, first.wrapping_add(loaded_11), entry, joint, kind);
+            let loaded_12 = value;
+            let result_4 = cell_at(machine, reference);
+            let result_5 = laid_over(
+                machine,
+                kind,
+                modes >> 31u32 != 0u32,
+                loaded_12,
+                next,
+                result_4,
+                joint_weight,
+            );
+            value = result_5;
+        }
+        let loaded_13 = layer;
+        layer = loaded_13.wrapping_add(1u32);
+    }
+    let loaded_14 = value;
+    loaded_14
+}
+
+/// The `kind`th channel of a joint; `instance` counts within the window.
+pub(crate) fn layered_of_plain<M: Machine>(
+    machine: &M,
+    instance: u32,
+    joint: u32,
+    kind: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 18);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    let result = entry_at(machine, loaded.wrapping_add(instance));
+    let clip = result.clip_and_weight & 0xffffu32;
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let channel = channel_at(
+        machine,
+        clip.wrapping_mul(loaded_2)
+            .wrapping_add(joint)
+            .wrapping_mul(CHANNELS)
+            .wrapping_add(kind),
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
+    let at = position_at(
+        machine,
+        instance
+            .wrapping_mul(loaded_3)
+            .wrapping_add(channel.form_and_base & 0xffffffu32),
+    );
+    if kind == ROTATION {
+        let _block = machine.block(line!(), 1);
+        let result_2 = arc_value(machine, channel, at);
+        return result_2;
+    }
+    let result_3 = cubic_value(machine, channel, at);
+    result_3
+}
+
+pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 3);
+    M::F::of_bits(x.bits() & 0x7fffffffu32)
+}
+
+pub(crate) async fn main<M: Machine>(machine: &M) {
+    const OF_KERNELS: [u8; 161] = [
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
+        3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5, 5,
+        5, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 7, 8, 9, 10, 10, 10, 10, 10,
+        10, 11, 11, 11, 11, 11, 11, 11, 11, 12, 11, 11, 13, 13, 14, 14, 15, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4,
+        4, 4, 5, 5, 5, 5, 5, 5, 5, 5, 7, 8, 9, 11, 11, 11, 11,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => main_of_self_test(machine).await,
+        1 => main_of_runs(machine).await,
+        2 => main_of_samples(machine).await,
+        3 => main_of_coalesced(machine).await,
+        4 => main_of_runs_2(machine).await,
+        5 => main_of_samples_2(machine).await,
+        6 => main_of_coalesced_2(machine).await,
+        7 => main_of_from_keys(machine).await,
+        8 => main_of_from_keys_2(machine).await,
+        9 => main_of_from_keys_3(machine).await,
+        10 => main_of_poses(machine).await,
+        11 => main_of_crowd(machine).await,
+        12 => main_of_walk_all(machine).await,
+        13 => main_of_whole_rotations(machine).await,
+        14 => main_of_whole_matrices(machine).await,
+        _ => main_of_prepare_arcs(machine).await,
+    }
+}
+
+pub(crate) async fn main_of_self_test<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let mut reply: Reply<M::F> = Default::default();
+    let _block = machine.block(line!(), 38);
+    let index = invocation[0];
+    if index >= machine.length(Global::Probes, 4) {
+        return;
+    }
+    let probe = machine.load::<Probe<M::F>>(Global::Probes, 4 * (index as usize));
+    let a = probe.a;
+    let b = probe.b;
+    let c = probe.c;
+    let low = probe.n & 4095i32;
+    let sines = sine_cosine(machine, c);
+    reply.contraction = a * b + c;
+    reply.reassociation = (a + b) - a;
+    reply.rounding = a + c;
+    reply.association = (a * b) * c;
+    reply.conversion = M::F::of(probe.n.wrapping_sub(low) as f32) + M::F::of(low as f32);
+    reply.cancellation = (a * c + b) - a * c;
+    reply.sine = sines[0];
+    reply.cosine = sines[1];
+    let result = root(machine, a * a + c * c);
+    reply.root = result;
+    let result_2 = arc_tangent(machine, a, c);
+    reply.arc_tangent = result_2;
+    let loaded = reply;
+    machine.store::<Reply<M::F>>(Global::Replies, 10 * (index as usize), loaded);
+}
+
+pub(crate) async fn main_of_runs<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let mut output: u32 = Default::default();
+    let mut j: u32 = 0u32;
+    let mut j_2: u32 = 0u32;
+    let _block = machine.block(line!(), 15);
+    let index = invocation_index(machine, invocation, groups);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    if index >= loaded {
+        return;
+    }
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    let item = item_at(machine, loaded_2.wrapping_add(index));
+    let stride = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
+    output = item.output.wrapping_add(loaded_3);
+    if item.count & IS_CONSTANT != 0u32 {
+        let _block = machine.block(line!(), 2);
+        let constant = constant_at(machine, item.source);
+        let count = item.count & 0x7fffffffu32;
+        loop {
+            let _block = machine.block(line!(), 11);
+            let loaded_4 = j;
+            if !(loaded_4 < count) {
+                break;
+            }
+            let loaded_5 = output;
+            store(machine, loaded_5, constant);
+            let loaded_6 = output;
+            output = loaded_6.wrapping_add(stride);
+            let loaded_7 = j;
+            j = loaded_7.wrapping_add(1u32);
+        }
+        return;
+    }
+    let segment = segment_at_arc_segment(machine, item.source);
+    loop {
+        let _block = machine.block(line!(), 17);
+        let loaded_8 = j_2;
+        if !(loaded_8 < item.count) {
+            break;
+        }
+        let loaded_9 = j_2;
+        let result = distance_from_middle(machine, item.first, loaded_9);
+        let parameter = result * item.scale + item.offset;
+        let loaded_10 = output;
+        let result_2 = evaluate_arc_segment(machine, segment, parameter);
+        let result_3 = canonical(machine, result_2);
+        store(machine, loaded_10, result_3);
+        let loaded_11 = output;
+        output = loaded_11.wrapping_add(stride);
+        let loaded_12 = j_2;
+        j_2 = loaded_12.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_samples<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 22);
+    let index = invocation_index(machine, invocation, groups);
+    let loaded = machine.load::<u32>(Global::Dispatch, 5);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
+    if index.wrapping_sub(loaded) >= loaded_2 {
+        return;
+    }
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 0);
+    let sample = sample_at_listed_sample(machine, loaded_3.wrapping_add(index));
+    let is_constant = sample.source & IS_CONSTANT != 0u32;
+    let source = sample.source & 0x7fffffffu32;
+    let constant = constant_at(machine, if is_constant { source } else { 0u32 });
+    let segment = segment_at_arc_segment(machine, if is_constant { 0u32 } else { source });
+    let result = evaluate_arc_segment(machine, segment, sample.parameter);
+    let value = canonical(machine, result);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 4);
+    store(
+        machine,
+        loaded_4.wrapping_add(index),
+        if is_constant { constant } else { value },
+    );
+}
+
+pub(crate) async fn main_of_coalesced<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let lane = machine.ids().local_invocation_index;
+    let mut item: Item<M::F> = Default::default();
+    let mut segment: ArcSegment<M::F> = Default::default();
+    let mut row: u32 = 0u32;
+    let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
+    let _block = machine.block(line!(), 1);
+    let corner = corner_of(machine, group, groups, lane);
+    loop {
+        let _block = machine.block(line!(), 23);
+        let loaded = iteration;
+        if !(loaded < SAMPLES_EACH) {
+            break;
+        }
+        let loaded_2 = iteration;
+        let cell = cell_of(machine, corner, loaded_2);
+        let loaded_3 = row;
+        let loaded_4 = item;
+        let result = has(machine, loaded_4, cell.position);
+        if cell.is_inside & !((cell.row == loaded_3) & result) {
+            let _block = machine.block(line!(), 7);
+            let result_2 = item_of(machine, cell);
+            let result_3 = item_at(machine, result_2);
+            item = result_3;
+            let loaded_5 = item;
+            let result_4 = segment_of_arc_segment(machine, loaded_5);
+            segment = result_4;
+            row = cell.row;
+        }
+        let loaded_6 = item;
+        let result_5 = has(machine, loaded_6, cell.position);
+        let is_stored = cell.is_inside & result_5;
+        rotation = <[M::F; 4]>::default();
+        if is_stored {
+            let _block = machine.block(line!(), 4);
+            let loaded_7 = item.count;
+            if loaded_7 & IS_CONSTANT != 0u32 {
+                let _block = machine.block(line!(), 3);
+                let loaded_8 = item.source;
+                let result_6 = constant_at(machine, loaded_8);
+                rotation = result_6;
+            } else {
+                let _block = machine.block(line!(), 15);
+                let loaded_9 = item.first;
+                let loaded_10 = item.output;
+                let distance =
+                    distance_from_middle(machine, loaded_9, cell.position.wrapping_sub(loaded_10));
+                let loaded_11 = segment;
+                let loaded_12 = item.scale;
+                let loaded_13 = item.offset;
+                let result_7 =
+                    evaluate_arc_segment(machine, loaded_11, distance * loaded_12 + loaded_13);
+                rotation = result_7;
+                let loaded_14 = item.count;
+                if loaded_14 & MAY_BE_TINY != 0u32 {
+                    let _block = machine.block(line!(), 3);
+                    let loaded_15 = rotation;
+                    let result_8 = canonical(machine, loaded_15);
+                    rotation = result_8;
+                }
+            }
+        }
+        let loaded_16 = rotation;
+        finish_2(machine, lane, cell.output, loaded_16, is_stored).await;
+        let loaded_17 = iteration;
+        iteration = loaded_17.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_runs_2<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let mut output: u32 = Default::default();
+    let mut j: u32 = 0u32;
+    let mut j_2: u32 = 0u32;
+    let _block = machine.block(line!(), 15);
+    let index = invocation_index(machine, invocation, groups);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    if index >= loaded {
+        return;
+    }
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    let item = item_at(machine, loaded_2.wrapping_add(index));
+    let stride = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
+    output = item.output.wrapping_add(loaded_3);
+    if item.count & IS_CONSTANT != 0u32 {
+        let _block = machine.block(line!(), 2);
+        let constant = constant_at(machine, item.source);
+        let count = item.count & 0x7fffffffu32;
+        loop {
+            let _block = machine.block(line!(), 11);
+            let loaded_4 = j;
+            if !(loaded_4 < count) {
+                break;
+            }
+            let loaded_5 = output;
+            store(machine, loaded_5, constant);
+            let loaded_6 = output;
+            output = loaded_6.wrapping_add(stride);
+            let loaded_7 = j;
+            j = loaded_7.wrapping_add(1u32);
+        }
+        return;
+    }
+    let segment = segment_at_polynomial_segment(machine, item.source);
+    loop {
+        let _block = machine.block(line!(), 17);
+        let loaded_8 = j_2;
+        if !(loaded_8 < item.count) {
+            break;
+        }
+        let loaded_9 = j_2;
+        let result = distance_from_middle(machine, item.first, loaded_9);
+        let parameter = result * item.scale + item.offset;
+        let loaded_10 = output;
+        let result_2 = evaluate_polynomial_segment(machine, segment, parameter);
+        let result_3 = canonical(machine, result_2);
+        store(machine, loaded_10, result_3);
+        let loaded_11 = output;
+        output = loaded_11.wrapping_add(stride);
+        let loaded_12 = j_2;
+        j_2 = loaded_12.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_samples_2<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 22);
+    let index = invocation_index(machine, invocation, groups);
+    let loaded = machine.load::<u32>(Global::Dispatch, 5);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
+    if index.wrapping_sub(loaded) >= loaded_2 {
+        return;
+    }
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 0);
+    let sample = sample_at_listed_sample(machine, loaded_3.wrapping_add(index));
+    let is_constant = sample.source & IS_CONSTANT != 0u32;
+    let source = sample.source & 0x7fffffffu32;
+    let constant = constant_at(machine, if is_constant { source } else { 0u32 });
+    let segment = segment_at_polynomial_segment(machine, if is_constant { 0u32 } else { source });
+    let result = evaluate_polynomial_segment(machine, segment, sample.parameter);
+    let value = canonical(machine, result);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 4);
+    store(
+        machine,
+        loaded_4.wrapping_add(index),
+        if is_constant { constant } else { value },
+    );
+}
+
+pub(crate) async fn main_of_coalesced_2<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let lane = machine.ids().local_invocation_index;
+    let mut item: Item<M::F> = Default::default();
+    let mut segment: PolynomialSegment<M::F> = Default::default();
+    let mut row: u32 = 0u32;
+    let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
+    let _block = machine.block(line!(), 1);
+    let corner = corner_of(machine, group, groups, lane);
+    loop {
+        let _block = machine.block(line!(), 23);
+        let loaded = iteration;
+        if !(loaded < SAMPLES_EACH) {
+            break;
+        }
+        let loaded_2 = iteration;
+        let cell = cell_of(machine, corner, loaded_2);
+        let loaded_3 = row;
+        let loaded_4 = item;
+        let result = has(machine, loaded_4, cell.position);
+        if cell.is_inside & !((cell.row == loaded_3) & result) {
+            let _block = machine.block(line!(), 7);
+            let result_2 = item_of(machine, cell);
+            let result_3 = item_at(machine, result_2);
+            item = result_3;
+            let loaded_5 = item;
+            let result_4 = segment_of_polynomial_segment(machine, loaded_5);
+            segment = result_4;
+            row = cell.row;
+        }
+        let loaded_6 = item;
+        let result_5 = has(machine, loaded_6, cell.position);
+        let is_stored = cell.is_inside & result_5;
+        rotation = <[M::F; 4]>::default();
+        if is_stored {
+            let _block = machine.block(line!(), 4);
+            let loaded_7 = item.count;
+            if loaded_7 & IS_CONSTANT != 0u32 {
+                let _block = machine.block(line!(), 3);
+                let loaded_8 = item.source;
+                let result_6 = constant_at(machine, loaded_8);
+                rotation = result_6;
+            } else {
+                let _block = machine.block(line!(), 15);
+                let loaded_9 = item.first;
+                let loaded_10 = item.output;
+                let distance =
+                    distance_from_middle(machine, loaded_9, cell.position.wrapping_sub(loaded_10));
+                let loaded_11 = segment;
+                let loaded_12 = item.scale;
+                let loaded_13 = item.offset;
+                let result_7 = evaluate_polynomial_segment(
+                    machine,
+                    loaded_11,
+                    distance * loaded_12 + loaded_13,
+                );
+                rotation = result_7;
+                let loaded_14 = item.count;
+                if loaded_14 & MAY_BE_TINY != 0u32 {
+                    let _block = machine.block(line!(), 3);
+                    let loaded_15 = rotation;
+                    let result_8 = canonical(machine, loaded_15);
+                    rotation = result_8;
+                }
+            }
+        }
+        let loaded_16 = rotation;
+        finish_2(machine, lane, cell.output, loaded_16, is_stored).await;
+        let loaded_17 = iteration;
+        iteration = loaded_17.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_from_keys<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let mut key: u32 = Default::default();
+    let mut output_index: u32 = Default::default();
+    let mut j: u32 = 0u32;
+    let _block = machine.block(line!(), 33);
+    let loaded = machine.load::<u32>(Global::Rows, 3);
+    let row = invocation[1].wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Rows, 0);
+    let loaded_3 = machine.load::<u32>(Global::Rows, 4);
+    let sample_index = invocation[0].wrapping_sub(row.wrapping_mul(loaded_2) & loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Rows, 0);
+    if sample_index >= loaded_4 {
+        return;
+    }
+    let sample = sample_at_key_sample(machine, sample_index);
+    let is_key = sample.key & IS_KEY != 0u32;
+    let first = sample.key & 0x7fffffffu32;
+    let next = if is_key { 0u32 } else { 1u32 };
+    let all_rows = hoisted_arcs_hoisted(machine, first, first.wrapping_add(next), sample.parameter);
+    let loaded_5 = machine.load::<u32>(Global::Rows, 2);
+    let loaded_6 = machine.load::<u32>(Global::Rows, 3);
+    let is_last = loaded_5 < row.wrapping_add(loaded_6);
+    let loaded_7 = machine.load::<u32>(Global::Rows, 3);
+    let loaded_8 = machine.load::<u32>(Global::Rows, 2);
+    let count = if is_last {
+        loaded_8.wrapping_sub(row)
+    } else {
+        loaded_7
+    };
+    let keys = machine.load::<u32>(Global::Rows, 1);
+    let samples = machine.load::<u32>(Global::Rows, 0);
+    key = row.wrapping_mul(keys).wrapping_add(first);
+    output_index = row.wrapping_mul(samples).wrapping_add(sample_index);
+    loop {
+        let _block = machine.block(line!(), 24);
+        let loaded_9 = j;
+        if !(loaded_9 < count) {
+            break;
+        }
+        let loaded_10 = key;
+        let stored = key_at(machine, loaded_10);
+        let loaded_11 = key;
+        let result = continued(machine, stored);
+        let loaded_12 = key;
+        let result_2 = rotation_between_arcs_hoisted(
+            machine,
+            loaded_11,
+            result,
+            loaded_12.wrapping_add(next),
+            all_rows,
+        );
+        let interpolated = canonical(machine, result_2);
+        let loaded_13 = output_index;
+        let result_3 = as_stored(machine, stored);
+        store(
+            machine,
+            loaded_13,
+            if is_key { result_3 } else { interpolated },
+        );
+        let loaded_14 = key;
+        key = loaded_14.wrapping_add(keys);
+        let loaded_15 = output_index;
+        output_index = loaded_15.wrapping_add(samples);
+        let loaded_16 = j;
+        j = loaded_16.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_from_keys_2<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let mut key: u32 = Default::default();
+    let mut output_index: u32 = Default::default();
+    let mut j: u32 = 0u32;
+    let _block = machine.block(line!(), 33);
+    let loaded = machine.load::<u32>(Global::Rows, 3);
+    let row = invocation[1].wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Rows, 0);
+    let loaded_3 = machine.load::<u32>(Global::Rows, 4);
+    let sample_index = invocation[0].wrapping_sub(row.wrapping_mul(loaded_2) & loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Rows, 0);
+    if sample_index >= loaded_4 {
+        return;
+    }
+    let sample = sample_at_key_sample(machine, sample_index);
+    let is_key = sample.key & IS_KEY != 0u32;
+    let first = sample.key & 0x7fffffffu32;
+    let next = if is_key { 0u32 } else { 1u32 };
+    let all_rows =
+        hoisted_two_keys_hoisted(machine, first, first.wrapping_add(next), sample.parameter);
+    let loaded_5 = machine.load::<u32>(Global::Rows, 2);
+    let loaded_6 = machine.load::<u32>(Global::Rows, 3);
+    let is_last = loaded_5 < row.wrapping_add(loaded_6);
+    let loaded_7 = machine.load::<u32>(Global::Rows, 3);
+    let loaded_8 = machine.load::<u32>(Global::Rows, 2);
+    let count = if is_last {
+        loaded_8.wrapping_sub(row)
+    } else {
+        loaded_7
+    };
+    let keys = machine.load::<u32>(Global::Rows, 1);
+    let samples = machine.load::<u32>(Global::Rows, 0);
+    key = row.wrapping_mul(keys).wrapping_add(first);
+    output_index = row.wrapping_mul(samples).wrapping_add(sample_index);
+    loop {
+        let _block = machine.block(line!(), 24);
+        let loaded_9 = j;
+        if !(loaded_9 < count) {
+            break;
+        }
+        let loaded_10 = key;
+        let stored = key_at(machine, loaded_10);
+        let loaded_11 = key;
+        let result = continued(machine, stored);
+        let loaded_12 = key;
+        let result_2 = rotation_between_two_keys_hoisted(
+            machine,
+            loaded_11,
+            result,
+            loaded_12.wrapping_add(next),
+            all_rows,
+        );
+        let interpolated = canonical(machine, result_2);
+        let loaded_13 = output_index;
+        let result_3 = as_stored(machine, stored);
+        store(
+            machine,
+            loaded_13,
+            if is_key { result_3 } else { interpolated },
+        );
+        let loaded_14 = key;
+        key = loaded_14.wrapping_add(keys);
+        let loaded_15 = output_index;
+        output_index = loaded_15.wrapping_add(samples);
+        let loaded_16 = j;
+        j = loaded_16.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_from_keys_3<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let mut key: u32 = Default::default();
+    let mut output_index: u32 = Default::default();
+    let mut j: u32 = 0u32;
+    let _block = machine.block(line!(), 33);
+    let loaded = machine.load::<u32>(Global::Rows, 3);
+    let row = invocation[1].wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Rows, 0);
+    let loaded_3 = machine.load::<u32>(Global::Rows, 4);
+    let sample_index = invocation[0].wrapping_sub(row.wrapping_mul(loaded_2) & loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Rows, 0);
+    if sample_index >= loaded_4 {
+        return;
+    }
+    let sample = sample_at_key_sample(machine, sample_index);
+    let is_key = sample.key & IS_KEY != 0u32;
+    let first = sample.key & 0x7fffffffu32;
+    let next = if is_key { 0u32 } else { 1u32 };
+    let all_rows =
+        hoisted_cubics_hoisted(machine, first, first.wrapping_add(next), sample.parameter);
+    let loaded_5 = machine.load::<u32>(Global::Rows, 2);
+    let loaded_6 = machine.load::<u32>(Global::Rows, 3);
+    let is_last = loaded_5 < row.wrapping_add(loaded_6);
+    let loaded_7 = machine.load::<u32>(Global::Rows, 3);
+    let loaded_8 = machine.load::<u32>(Global::Rows, 2);
+    let count = if is_last {
+        loaded_8.wrapping_sub(row)
+    } else {
+        loaded_7
+    };
+    let keys = machine.load::<u32>(Global::Rows, 1);
+    let samples = machine.load::<u32>(Global::Rows, 0);
+    key = row.wrapping_mul(keys).wrapping_add(first);
+    output_index = row.wrapping_mul(samples).wrapping_add(sample_index);
+    loop {
+        let _block = machine.block(line!(), 24);
+        let loaded_9 = j;
+        if !(loaded_9 < count) {
+            break;
+        }
+        let loaded_10 = key;
+        let stored = key_at(machine, loaded_10);
+        let loaded_11 = key;
+        let result = continued(machine, stored);
+        let loaded_12 = key;
+        let result_2 = rotation_between_cubics_hoisted(
+            machine,
+            loaded_11,
+            result,
+            loaded_12.wrapping_add(next),
+            all_rows,
+        );
+        let interpolated = canonical(machine, result_2);
+        let loaded_13 = output_index;
+        let result_3 = as_stored(machine, stored);
+        store(
+            machine,
+            loaded_13,
+            if is_key { result_3 } else { interpolated },
+        );
+        let loaded_14 = key;
+        key = loaded_14.wrapping_add(keys);
+        let loaded_15 = output_index;
+        output_index = loaded_15.wrapping_add(samples);
+        let loaded_16 = j;
+        j = loaded_16.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_poses<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 6);
+    let index = invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(POSE_WORKGROUP))
+        .wrapping_add(invocation[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if index < loaded {
+        let _block = machine.block(line!(), 1);
+        pose(machine, index);
+        return;
+    } else {
+        return;
+    }
+}
+
+pub(crate) async fn main_of_crowd<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 6);
+    let index = invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(CROWD_WORKGROUP))
+        .wrapping_add(invocation[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if index < loaded {
+        let _block = machine.block(line!(), 1);
+        crowd_work(machine, index);
+        return;
+    } else {
+        return;
+    }
+}
+
+pub(crate) async fn main_of_walk_all<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let lane = machine.ids().local_invocation_index;
+    let mut row: u32 = Default::default();
+    let mut level: u32 = 0u32;
+    let mut link: u32 = Default::default();
+    let mut row_2: u32 = Default::default();
+    let _block = machine.block(line!(), 9);
+    let instance = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if instance >= loaded {
+        return;
+    }
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let count = loaded_2.wrapping_mul(3u32);
+    row = lane;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded_3 = row;
+        if !(loaded_3 < count) {
+            break;
+        }
+        let loaded_4 = row;
+        let loaded_5 = row;
+        let loaded_6 = machine.load::<[M::F; 4]>(
+            Global::Matrices,
+            4 * (instance.wrapping_mul(count).wrapping_add(loaded_5) as usize),
+        );
+        machine.store::<[M::F; 4]>(Global::Rows, 4 * (loaded_4 as usize), loaded_6);
+        let loaded_7 = row;
+        row = loaded_7.wrapping_add(CROWD_WORKGROUP);
+    }
+    barrier().await;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded_8 = level;
+        let loaded_9 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_8 < loaded_9) {
+            break;
+        }
+        let loaded_10 = machine.load::<u32>(Global::Dispatch, 5);
+        let loaded_11 = level;
+        let bounds = machine.load::<CrowdLink>(
+            Global::Links,
+            2 * (loaded_10.wrapping_add(loaded_11) as usize),
+        );
+        link = bounds.joint.wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 30);
+            let loaded_12 = link;
+            if !(loaded_12 < bounds.parent) {
+                break;
+            }
+            let loaded_13 = link;
+            let loaded_14 = machine.load::<u32>(Global::Links, 2 * (loaded_13 as usize) + 1);
+            let parent = loaded_14.wrapping_mul(3u32);
+            let loaded_15 = link;
+            let loaded_16 = machine.load::<u32>(Global::Links, 2 * (loaded_15 as usize));
+            let joint = loaded_16.wrapping_mul(3u32);
+            let first = machine.load::<[M::F; 4]>(Global::Rows, 4 * (joint as usize));
+            let second =
+                machine.load::<[M::F; 4]>(Global::Rows, 4 * (joint.wrapping_add(1u32) as usize));
+            let third =
+                machine.load::<[M::F; 4]>(Global::Rows, 4 * (joint.wrapping_add(2u32) as usize));
+            let loaded_17 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (parent as usize));
+            let result = row_product(machine, loaded_17, first, second, third);
+            machine.store::<[M::F; 4]>(Global::Rows, 4 * (joint as usize), result);
+            let loaded_18 =
+                machine.load::<[M::F; 4]>(Global::Rows, 4 * (parent.wrapping_add(1u32) as usize));
+            let result_2 = row_product(machine, loaded_18, first, second, third);
+            machine.store::<[M::F; 4]>(
+                Global::Rows,
+                4 * (joint.wrapping_add(1u32) as usize),
+                result_2,
+            );
+            let loaded_19 =
+                machine.load::<[M::F; 4]>(Global::Rows, 4 * (parent.wrapping_add(2u32) as usize));
+            let result_3 = row_product(machine, loaded_19, first, second, third);
+            machine.store::<[M::F; 4]>(
+                Global::Rows,
+                4 * (joint.wrapping_add(2u32) as usize),
+                result_3,
+            );
+            let loaded_20 = link;
+            link = loaded_20.wrapping_add(CROWD_WORKGROUP);
+        }
+        barrier().await;
+        let loaded_21 = level;
+        level = loaded_21.wrapping_add(1u32);
+    }
+    row_2 = lane;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded_22 = row_2;
+        if !(loaded_22 < count) {
+            break;
+        }
+        let loaded_23 = row_2;
+        let loaded_24 = row_2;
+        let loaded_25 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (loaded_24 as usize));
+        machine.store::<[M::F; 4]>(
+            Global::Matrices,
+            4 * (instance.wrapping_mul(count).wrapping_add(loaded_23) as usize),
+            loaded_25,
+        );
+        let loaded_26 = row_2;
+        row_2 = loaded_26.wrapping_add(CROWD_WORKGROUP);
+    }
+}
+
+pub(crate) async fn main_of_whole_rotations<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let lane = machine.ids().local_invocation_index;
+    let mut next: u32 = Default::default();
+    let _block = machine.block(line!(), 15);
+    let loaded = machine.load::<u32>(Global::Dispatch, 10);
+    let first = group[1]
+        .wrapping_mul(groups[0])
+        .wrapping_add(group[0])
+        .wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    if first >= loaded_2 {
+        return;
+    }
+    let instances = instances_from(machine, first);
+    find_positions(machine, instances, lane);
+    barrier().await;
+    let joints = machine.load::<u32>(Global::Dispatch, 2);
+    let first_vector = first.wrapping_mul(joints);
+    let idle = before_in_line(machine, first_vector);
+    let end = idle.wrapping_add(instances.wrapping_mul(joints));
+    next = lane;
+    loop {
+        let _block = machine.block(line!(), 9);
+        let loaded_3 = next;
+        if !(loaded_3 < end) {
+            break;
+        }
+        let loaded_4 = next;
+        if loaded_4 >= idle {
+            let _block = machine.block(line!(), 8);
+            let loaded_5 = next;
+            let index = loaded_5.wrapping_sub(idle);
+            let instance = quotient(index, joints);
+            let result = layered(
+                machine,
+                instance,
+                index.wrapping_sub(instance.wrapping_mul(joints)),
+                ROTATION,
+            );
+            finish_1(machine, first_vector.wrapping_add(index), result);
+        }
+        let loaded_6 = next;
+        next = loaded_6.wrapping_add(CROWD_WORKGROUP);
+    }
+}
+
+pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let lane = machine.ids().local_invocation_index;
+    let mut matrix: u32 = Default::default();
+    let mut level: u32 = 0u32;
+    let mut index: u32 = Default::default();
+    let mut next: u32 = Default::default();
+    let _block = machine.block(line!(), 18);
+    let loaded = machine.load::<u32>(Global::Dispatch, 10);
+    let first = group[1]
+        .wrapping_mul(groups[0])
+        .wrapping_add(group[0])
+        .wrapping_mul(loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    if first >= loaded_2 {
+        return;
+    }
+    let instances = instances_from(machine, first);
+    find_positions(machine, instances, lane);
+    barrier().await;
+    let joints = machine.load::<u32>(Global::Dispatch, 2);
+    let matrices = instances.wrapping_mul(joints);
+    matrix = lane;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded_3 = matrix;
+        if !(loaded_3 < matrices) {
+            break;
+        }
+        let loaded_4 = matrix;
+        let instance = quotient(loaded_4, joints);
+        let loaded_5 = matrix;
+        transform_joint(
+            machine,
+            instance,
+            loaded_5.wrapping_sub(instance.wrapping_mul(joints)),
+        );
+        let loaded_6 = matrix;
+        matrix = loaded_6.wrapping_add(CROWD_WORKGROUP);
+    }
+    barrier().await;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded_7 = level;
+        let loaded_8 = machine.load::<u32>(Global::Dispatch, 11);
+        if !(loaded_7 < loaded_8) {
+            break;
+        }
+        let loaded_9 = machine.load::<u32>(Global::Dispatch, 5);
+        let loaded_10 = level;
+        let bounds = machine.load::<CrowdLink>(
+            Global::Links,
+            2 * (loaded_9.wrapping_add(loaded_10) as usize),
+        );
+        let in_level = bounds.parent.wrapping_sub(bounds.joint);
+        index = lane;
+        loop {
+            let _block = machine.block(line!(), 15);
+            let loaded_11 = index;
+            if !(loaded_11 < instances.wrapping_mul(in_level)) {
+                break;
+            }
+            let loaded_12 = index;
+            let instance_2 = quotient(loaded_12, in_level);
+            let loaded_13 = index;
+            let loaded_14 = machine.load::<CrowdLink>(
+                Global::Links,
+                2 * (bounds
+                    .joint
+                    .wrapping_add(loaded_13.wrapping_sub(instance_2.wrapping_mul(in_level)))
+                    as usize),
+            );
+            walk(machine, instance_2, loaded_14);
+            let loaded_15 = index;
+            index = loaded_15.wrapping_add(CROWD_WORKGROUP);
+        }
+        barrier().await;
+        let loaded_16 = level;
+        level = loaded_16.wrapping_add(1u32);
+    }
+    let first_vector = 3u32.wrapping_mul(first).wrapping_mul(joints);
+    let idle = before_in_line(machine, first_vector);
+    let end = idle.wrapping_add(3u32.wrapping_mul(matrices));
+    next = lane;
+    loop {
+        let _block = machine.block(line!(), 9);
+        let loaded_17 = next;
+        if !(loaded_17 < end) {
+            break;
+        }
+        let loaded_18 = next;
+        if loaded_18 >= idle {
+            let _block = machine.block(line!(), 7);
+            let loaded_19 = next;
+            let loaded_20 = next;
+            let result = row_at(machine, loaded_20.wrapping_sub(idle));
+            finish_1(
+                machine,
+                first_vector.wrapping_add(loaded_19.wrapping_sub(idle)),
+                result,
+            );
+        }
+        let loaded_21 = next;
+        next = loaded_21.wrapping_add(CROWD_WORKGROUP);
+    }
+}
+
+pub(crate) async fn main_of_prepare_arcs<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 24);
+    let index = invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(PREPARE_WORKGROUP))
+        .wrapping_add(invocation[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if index >= loaded {
+        return;
+    }
+    let interval = interval_at(machine, index);
+    let key = interval & KEY_OF_INTERVAL;
+    let result = key_at(machine, key);
+    let start = both(result, [(interval & START_NEGATED) << 1u32; 4], |x, y| {
+        x ^ y
+    });
+    let result_2 = key_at(machine, key.wrapping_add(1u32));
+    let end = both(result_2, [interval & END_NEGATED; 4], |x, y| x ^ y);
+    let arc = arc_between(
+        machine,
+        start.map(|x| M::F::of_bits(x)),
+        end.map(|x| M::F::of_bits(x)),
+    );
+    machine.store::<[M::F; 4]>(
+        Global::Rotations,
+        4 * (2u32.wrapping_mul(index) as usize),
+        arc.middle,
+    );
+    machine.store::<[M::F; 4]>(
+        Global::Rotations,
+        4 * (2u32.wrapping_mul(index).wrapping_add(1u32) as usize),
+        arc.tangent,
+    );
+}
+
+pub(crate) fn matrix_rows<M: Machine>(
+    machine: &M,
+    rotation: [M::F; 4],
+    detail: u32,
+) -> MatrixRows<M::F> {
+    let mut rows: MatrixRows<M::F> = Default::default();
+    let _block = machine.block(line!(), 31);
+    let v = if detail == 1u32 {
+        [rotation[0], rotation[1], rotation[2]].map(|x| -x)
+    } else {
+        [rotation[0], rotation[1], rotation[2]]
+    };
+    let double = both(v, v, |x, y| x + y);
+    let xx = v[0] * double[0];
+    let yy = v[1] * double[1];
+    let zz = v[2] * double[2];
+    let xy = v[0] * double[1];
+    let yz = v[1] * double[2];
+    let zx = v[2] * double[0];
+    let wx = rotation[3] * double[0];
+    let wy = rotation[3] * double[1];
+    let wz = rotation[3] * double[2];
+    rows.first = [M::F::of(1.0) - (yy + zz), xy - wz, zx + wy];
+    rows.second = [xy + wz, M::F::of(1.0) - (xx + zz), yz - wx];
+    rows.third = [zx - wy, yz + wx, M::F::of(1.0) - (xx + yy)];
+    let loaded = rows;
+    loaded
+}
+
+pub(crate) fn norm_squared<M: Machine>(machine: &M, q: [M::F; 4]) -> M::F {
+    let _block = machine.block(line!(), 7);
+    ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]
+}
+
+/// q / |q| for |q| well away from 0.
+pub(crate) fn normalised<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 3);
+    let result = dot4(machine, q, q);
+    let result_2 = reciprocal_root(machine, result);
+    both(q, [result_2; 4], |x, y| x * y)
+}
+
+/// Slerp whose ends are the bits of a and b themselves.
+pub(crate) fn over<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let result = slerp(machine, a, b, t);
+    if t == M::F::of(0.0) {
+        a
+    } else {
+        if t == M::F::of(1.0) { b } else { result }
+    }
+}
+
+pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
+        0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
+        0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => parts_1_of_euler(machine, rotation),
+        1 => parts_1_of_vector(machine, rotation),
+        _ => parts_1_of_euler_2(machine, rotation),
+    }
+}
+
+pub(crate) fn parts_1_of_euler<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let result = euler(machine, rotation, loaded);
+    let angles = canonical(machine, [result[0], result[1], result[2], M::F::of(0.0)]);
+    [angles[0], angles[1], angles[2]]
+}
+
+pub(crate) fn parts_1_of_vector<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
+    [rotation[0], rotation[1], rotation[2]]
+}
+
+pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    let result = euler(machine, rotation, loaded);
+    let angles = canonical(machine, [result[0], result[1], result[2], M::F::of(0.0)]);
+    [angles[0], angles[1], angles[2]]
+}
+
+pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => parts_2_of_matrix3x3(machine, rotation),
+        _ => parts_2_of_matrix3x3_2(machine, rotation),
+    }
+}
+
+pub(crate) fn parts_2_of_matrix3x3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let rows = matrix_rows(machine, rotation, loaded);
+    let first = canonical(
+        machine,
+        [rows.first[0], rows.first[1], rows.first[2], M::F::of(0.0)],
+    );
+    let second = canonical(
+        machine,
+        [
+            rows.second[0],
+            rows.second[1],
+            rows.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    let third = canonical(
+        machine,
+        [rows.third[0], rows.third[1], rows.third[2], M::F::of(0.0)],
+    );
+    [
+        first[0], first[1], first[2], second[0], second[1], second[2], third[0], third[1], third[2],
+    ]
+}
+
+pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    let rows = matrix_rows(machine, rotation, loaded);
+    let first = canonical(
+        machine,
+        [rows.first[0], rows.first[1], rows.first[2], M::F::of(0.0)],
+    );
+    let second = canonical(
+        machine,
+        [
+            rows.second[0],
+            rows.second[1],
+            rows.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    let third = canonical(
+        machine,
+        [rows.third[0], rows.third[1], rows.third[2], M::F::of(0.0)],
+    );
+    [
+        first[0], first[1], first[2], second[0], second[1], second[2], third[0], third[1], third[2],
+    ]
+}
+
+pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => parts_3_of_matrix3x4(machine, rotation),
+        _ => parts_3_of_matrix3x4_2(machine, rotation),
+    }
+}
+
+pub(crate) fn parts_3_of_matrix3x4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
+    let _block = machine.block(line!(), 12);
+    let detail = machine.load::<u32>(Global::Dispatch, 3);
+    let rows = matrix_rows(machine, rotation, detail);
+    let first = canonical(
+        machine,
+        [rows.first[0], rows.first[1], rows.first[2], M::F::of(0.0)],
+    );
+    let second = canonical(
+        machine,
+        [
+            rows.second[0],
+            rows.second[1],
+            rows.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    let third = canonical(
+        machine,
+        [rows.third[0], rows.third[1], rows.third[2], M::F::of(0.0)],
+    );
+    let by_columns = detail == 1u32;
+    [
+        if by_columns {
+            [
+                [first[0], first[1], first[2]][0],
+                [first[0], first[1], first[2]][1],
+                [first[0], first[1], first[2]][2],
+                second[0],
+            ]
+        } else {
+            first
+        },
+        if by_columns {
+            [
+                [second[1], second[2]][0],
+                [second[1], second[2]][1],
+                [third[0], third[1]][0],
+                [third[0], third[1]][1],
+            ]
+        } else {
+            second
+        },
+        if by_columns {
+            [third[2], M::F::of(0.0), M::F::of(0.0), M::F::of(0.0)]
+        } else {
+            third
+        },
+    ]
+}
+
+pub(crate) fn parts_3_of_matrix3x4_2<M: Machine>(
+    machine: &M,
+    rotation: [M::F; 4],
+) -> [[M::F; 4]; 3] {
+    let _block = machine.block(line!(), 12);
+    let detail = machine.load::<u32>(Global::Dispatch, 0);
+    let rows = matrix_rows(machine, rotation, detail);
+    let first = canonical(
+        machine,
+        [rows.first[0], rows.first[1], rows.first[2], M::F::of(0.0)],
+    );
+    let second = canonical(
+        machine,
+        [
+            rows.second[0],
+            rows.second[1],
+            rows.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    let third = canonical(
+        machine,
+        [rows.third[0], rows.third[1], rows.third[2], M::F::of(0.0)],
+    );
+    let by_columns = detail == 1u32;
+    [
+        if by_columns {
+            [
+                [first[0], first[1], first[2]][0],
+                [first[0], first[1], first[2]][1],
+                [first[0], first[1], first[2]][2],
+                second[0],
+            ]
+        } else {
+            first
+        },
+        if by_columns {
+            [
+                [second[1], second[2]][0],
+                [second[1], second[2]][1],
+                [third[0], third[1]][0],
+                [third[0], third[1]][1],
+            ]
+        } else {
+            second
+        },
+        if by_columns {
+            [third[2], M::F::of(0.0), M::F::of(0.0), M::F::of(0.0)]
+        } else {
+            third
+        },
+    ]
+}
+
+/// The coefficients are those of 1, s, s², … s¹⁰. Neighbouring powers are added in pairs (Estrin's
+/// scheme), which makes short chains of operations instead of one long one. The constant comes
+/// last: what is added to it is small, and so are the roundings of what is added.
+pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 22);
+    let z = s * s;
+    let zz = z * z;
+    let third = both(both(c[3], [s; 4], |x, y| x * y), c[2], |x, y| x + y);
+    let fifth = both(both(c[5], [s; 4], |x, y| x * y), c[4], |x, y| x + y);
+    let seventh = both(both(c[7], [s; 4], |x, y| x * y), c[6], |x, y| x + y);
+    let ninth = both(both(c[9], [s; 4], |x, y| x * y), c[8], |x, y| x + y);
+    let high = both(
+        both(
+            both(both(c[10], [z; 4], |x, y| x * y), ninth, |x, y| x + y),
+            [zz; 4],
+            |x, y| x * y,
+        ),
+        both(both(seventh, [z; 4], |x, y| x * y), fifth, |x, y| x + y),
+        |x, y| x + y,
+    );
+    both(
+        c[0],
+        both(
+            both(high, [zz; 4], |x, y| x * y),
+            both(
+                both(third, [z; 4], |x, y| x * y),
+                both(c[1], [s; 4], |x, y| x * y),
+                |x, y| x + y,
+            ),
+            |x, y| x + y,
+        ),
+        |x, y| x + y,
+    )
+}
+
+pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => pose_of_add(machine, sample),
+        1 => pose_of_blend(machine, sample),
+        2 => pose_of_mix(machine, sample),
+        3 => pose_of_smooth(machine, sample),
+        4 => pose_of_steps(machine, sample),
+        _ => pose_of_world(machine, sample),
+    }
+}
+
+pub(crate) fn pose_of_add<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 14);
+    let reference_pose = machine.load::<[M::F; 4]>(Global::Reference, 4 * (index as usize));
+    let inverse = [
+        -reference_pose[0],
+        -reference_pose[1],
+        -reference_pose[2],
+        reference_pose[3],
+    ];
+    let loaded = machine.load::<[M::F; 4]>(Global::Layer, 4 * (index as usize));
+    let result = product(machine, inverse, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    let loaded_3 = machine.load::<M::F>(Global::Reference, 4 * (loaded_2 as usize));
+    let weighted = slerp(
+        machine,
+        [M::F::of(0.0), M::F::of(0.0), M::F::of(0.0), M::F::of(1.0)],
+        result,
+        loaded_3,
+    );
+    let loaded_4 = machine.load::<[M::F; 4]>(Global::Base, 4 * (index as usize));
+    let result_2 = product(machine, loaded_4, weighted);
+    let result_3 = normalised(machine, result_2);
+    let result_4 = canonical(machine, result_3);
+    machine.store::<[M::F; 4]>(Global::Added, 4 * (index as usize), result_4);
+}
+
+/// `dispatch.detail` is the number of layers, which lie one after another.
+pub(crate) fn pose_of_blend<M: Machine>(machine: &M, index: u32) {
+    let mut sum: [M::F; 4] = Default::default();
+    let mut layer: u32 = 1u32;
+    let _block = machine.block(line!(), 13);
+    let first = machine.load::<[M::F; 4]>(Global::Layers, 4 * (index as usize));
+    let loaded = machine.load::<M::F>(Global::Weights, 0);
+    sum = both(first, [loaded; 4], |x, y| x * y);
+    loop {
+        let _block = machine.block(line!(), 22);
+        let loaded_2 = layer;
+        let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+        if !(loaded_2 < loaded_3) {
+            break;
+        }
+        let loaded_4 = layer;
+        let loaded_5 = machine.load::<u32>(Global::Dispatch, 0);
+        let next = machine.load::<[M::F; 4]>(
+            Global::Layers,
+            4 * (loaded_4.wrapping_mul(loaded_5).wrapping_add(index) as usize),
+        );
+        let result = dot4(machine, first, next);
+        let near = if result < M::F::of(0.0) {
+            next.map(|x| -x)
+        } else {
+            next
+        };
+        let loaded_6 = sum;
+        let loaded_7 = layer;
+        let loaded_8 = machine.load::<M::F>(Global::Weights, loaded_7 as usize);
+        sum = both(loaded_6, both(near, [loaded_8; 4], |x, y| x * y), |x, y| {
+            x + y
+        });
+        let loaded_9 = layer;
+        layer = loaded_9.wrapping_add(1u32);
+    }
+    let loaded_10 = sum;
+    let loaded_11 = sum;
+    let result_2 = dot4(machine, loaded_10, loaded_11);
+    let short = result_2 < M::F::of(LEAST_SQUARED_SUM);
+    let loaded_12 = sum;
+    let result_3 = normalised(machine, loaded_12);
+    let result_4 = canonical(machine, if short { first } else { result_3 });
+    machine.store::<[M::F; 4]>(Global::Blended, 4 * (index as usize), result_4);
+}
+
+pub(crate) fn pose_of_mix<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 6);
+    let loaded = machine.load::<[M::F; 4]>(Global::FromLayer, 4 * (index as usize));
+    let loaded_2 = machine.load::<[M::F; 4]>(Global::ToLayer, 4 * (index as usize));
+    let loaded_3 = machine.load::<M::F>(Global::Weights, 0);
+    let result = over(machine, loaded, loaded_2, loaded_3);
+    let result_2 = canonical(machine, result);
+    machine.store::<[M::F; 4]>(Global::Mixed, 4 * (index as usize), result_2);
+}
+
+/// `dispatch.detail` is twice the number of weights, and one more for rotations.
+pub(crate) fn pose_of_smooth<M: Machine>(machine: &M, index: u32) {
+    let mut sum: [M::F; 4] = [M::F::of(0.0); 4];
+    let mut m: u32 = 0u32;
+    let _block = machine.block(line!(), 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    let count = loaded >> 1u32;
+    loop {
+        let _block = machine.block(line!(), 22);
+        let loaded_2 = m;
+        if !(loaded_2 < count) {
+            break;
+        }
+        let loaded_3 = m;
+        let loaded_4 = machine.load::<[M::F; 4]>(
+            Global::Steps,
+            4 * (index.wrapping_add(count).wrapping_add(loaded_3) as usize),
+        );
+        let loaded_5 = m;
+        let loaded_6 = machine.load::<[M::F; 4]>(
+            Global::Steps,
+            4 * (index
+                .wrapping_add(count)
+                .wrapping_sub(1u32)
+                .wrapping_sub(loaded_5) as usize),
+        );
+        let rise = both(loaded_4, loaded_6, |x, y| x - y);
+        let loaded_7 = sum;
+        let loaded_8 = m;
+        let loaded_9 = machine.load::<M::F>(Global::Weights, loaded_8 as usize);
+        sum = both(loaded_7, both(rise, [loaded_9; 4], |x, y| x * y), |x, y| {
+            x + y
+        });
+        let loaded_10 = m;
+        m = loaded_10.wrapping_add(1u32);
+    }
+    let value = machine.load::<[M::F; 4]>(Global::Values, 4 * (index as usize));
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 1);
+    if loaded_11 & 1u32 == 1u32 {
+        let _block = machine.block(line!(), 4);
+        let loaded_12 = sum;
+        let result = rotated_by(machine, value, loaded_12);
+        let result_2 = canonical(machine, result);
+        machine.store::<[M::F; 4]>(Global::Smoothed, 4 * (index as usize), result_2);
+        return;
+    } else {
+        let _block = machine.block(line!(), 4);
+        let loaded_13 = sum;
+        let result_3 = canonical(machine, both(value, loaded_13, |x, y| x + y));
+        machine.store::<[M::F; 4]>(Global::Smoothed, 4 * (index as usize), result_3);
+        return;
+    }
+}
+
+/// `dispatch.detail` is 1 for rotations, 0 for vectors.
+pub(crate) fn pose_of_steps<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 6);
+    let value = machine.load::<[M::F; 4]>(Global::Values, 4 * (index as usize));
+    let next = machine.load::<[M::F; 4]>(Global::Values, 4 * (index.wrapping_add(1u32) as usize));
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    if loaded == 1u32 {
+        let _block = machine.block(line!(), 3);
+        let result = rotation_step(machine, value, next);
+        let result_2 = canonical(machine, result);
+        machine.store::<[M::F; 4]>(Global::Steps, 4 * (index as usize), result_2);
+        return;
+    } else {
+        let _block = machine.block(line!(), 3);
+        let result_3 = canonical(machine, both(next, value, |x, y| x - y));
+        machine.store::<[M::F; 4]>(Global::Steps, 4 * (index as usize), result_3);
+        return;
+    }
+}
+
+/// `sample` is the frame, `dispatch.detail` the number of tracks.
+pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
+    let mut i: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut position: [M::F; 3] = Default::default();
+    let _block = machine.block(line!(), 2);
+    let tracks = machine.load::<u32>(Global::Dispatch, 1);
+    let first = sample.wrapping_mul(tracks);
+    loop {
+        let _block = machine.block(line!(), 23);
+        let loaded = i;
+        if !(loaded < tracks) {
+            break;
+        }
+        let loaded_2 = i;
+        let link = machine.load::<Link<M::F>>(Global::Links, 8 * (loaded_2 as usize));
+        let in_parent =
+            machine.load::<[M::F; 4]>(Global::Local, 4 * (first.wrapping_add(link.track) as usize));
+        rotation = in_parent;
+        position = link.offset;
+        if link.parent != ROOT {
+            let _block = machine.block(line!(), 12);
+            let parent = 2u32.wrapping_mul(first.wrapping_add(link.parent));
+            let above = machine.load::<[M::F; 4]>(Global::World, 4 * (parent as usize));
+            let result = product(machine, above, in_parent);
+            let result_2 = normalised(machine, result);
+            rotation = result_2;
+            let loaded_3 =
+                machine.load::<[M::F; 4]>(Global::World, 4 * (parent.wrapping_add(1u32) as usize));
+            let result_3 = rotated(machine, above, link.offset);
+            position = both([loaded_3[0], loaded_3[1], loaded_3[2]], result_3, |x, y| {
+                x + y
+            });
+        }
+        let there = 2u32.wrapping_mul(first.wrapping_add(link.track));
+        let loaded_4 = rotation;
+        let result_4 = canonical(machine, loaded_4);
+        machine.store::<[M::F; 4]>(Global::World, 4 * (there as usize), result_4);
+        let loaded_5 = position;
+        let result_5 = canonical(
+            machine,
+            [loaded_5[0], loaded_5[1], loaded_5[2], M::F::of(0.0)],
+        );
+        machine.store::<[M::F; 4]>(
+            Global::World,
+            4 * (there.wrapping_add(1u32) as usize),
+            result_5,
+        );
+        let loaded_6 = i;
+        i = loaded_6.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => position_at_of_readers(machine, index),
+        1 => position_at_of_whole(machine, index),
+        _ => position_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn position_at_of_readers<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<CrowdPosition<M::F>>(Global::Positions, 2 * (index as usize));
+    loaded
+}
+
+pub(crate) fn position_at_of_whole<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<u32>(Global::FoundSpans, index as usize);
+    let loaded_2 = machine.load::<M::F>(Global::FoundParameters, index as usize);
+    CrowdPosition {
+        span: loaded,
+        parameter: loaded_2,
+    }
+}
+
+pub(crate) fn position_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
+    let _block = machine.block(line!(), 8);
+    let two = machine.load::<[u32; 4]>(Global::Positions, 4 * (quotient(index, 2u32) as usize));
+    let pair = if index & 1u32 == 1u32 {
+        [two[2], two[3]]
+    } else {
+        [two[0], two[1]]
+    };
+    CrowdPosition {
+        span: pair[0],
+        parameter: M::F::of_bits(pair[1]),
+    }
+}
+
+/// The Hamilton product a b.
+pub(crate) fn product<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 28);
+    [
+        ((a[3] * b[0] + a[0] * b[3]) + a[1] * b[2]) - a[2] * b[1],
+        ((a[3] * b[1] - a[0] * b[2]) + a[1] * b[3]) + a[2] * b[0],
+        ((a[3] * b[2] + a[0] * b[1]) - a[1] * b[0]) + a[2] * b[3],
+        ((a[3] * b[3] - a[0] * b[0]) - a[1] * b[1]) - a[2] * b[2],
+    ]
+}
+
+/// 1/x for x > 0.
+pub(crate) fn reciprocal<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 15);
+    let seed = M::F::of_bits(RECIPROCAL_SEED.wrapping_sub(x.bits()));
+    let first = seed * (M::F::of(2.0) - x * seed);
+    let second = first * (M::F::of(2.0) - x * first);
+    let third = second * (M::F::of(2.0) - x * second);
+    third * (M::F::of(2.0) - x * third)
+}
+
+/// 1/√x for x > 0; large at 0.
+pub(crate) fn reciprocal_root<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 17);
+    let seed = M::F::of_bits(ROOT_SEED.wrapping_sub(x.bits() >> 1u32));
+    let half = M::F::of(0.5) * x;
+    let first = seed * (M::F::of(1.5) - (half * seed) * seed);
+    let second = first * (M::F::of(1.5) - (half * first) * first);
+    second * (M::F::of(1.5) - (half * second) * second)
+}
+
+pub(crate) fn root<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 8);
+    let result = reciprocal_root(machine, x);
+    let near = x * result;
+    let result_2 = reciprocal_root(machine, x);
+    near + (x - near * near) * (M::F::of(0.5) * result_2)
+}
+
+/// q v q*, for a unit quaternion.
+pub(crate) fn rotated<M: Machine>(machine: &M, q: [M::F; 4], v: [M::F; 3]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 22);
+    let once = [
+        q[1] * v[2] - q[2] * v[1],
+        q[2] * v[0] - q[0] * v[2],
+        q[0] * v[1] - q[1] * v[0],
+    ];
+    let twice = both(once, once, |x, y| x + y);
+    let again = [
+        q[1] * twice[2] - q[2] * twice[1],
+        q[2] * twice[0] - q[0] * twice[2],
+        q[0] * twice[1] - q[1] * twice[0],
+    ];
+    both(
+        both(v, both(twice, [q[3]; 3], |x, y| x * y), |x, y| x + y),
+        again,
+        |x, y| x + y,
+    )
+}
+
+/// A rotation, and then that of half a rotation vector; 0, which is no rotation, where that is too long.
+/// One Newton step takes back what rounding does to the length; without a rotation every bit stays.
+pub(crate) fn rotated_by<M: Machine>(machine: &M, q: [M::F; 4], v: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 21);
+    let half = flushed4(machine, v);
+    let square = (half[0] * half[0] + half[1] * half[1]) + half[2] * half[2];
+    let long = square > M::F::of(LONGEST_ANGLE_SQUARE);
+    let z = if long { M::F::of(0.0) } else { square };
+    let sines = sine_cosm1(machine, M::F::of(1.0), z);
+    let more = product(
+        machine,
+        q,
+        [
+            half[0] * sines[0],
+            half[1] * sines[0],
+            half[2] * sines[0],
+            sines[1],
+        ],
+    );
+    let sum = both(q, more, |x, y| x + y);
+    let result = dot4(machine, sum, sum);
+    let unit = both(sum, [M::F::of(1.5) - M::F::of(0.5) * result; 4], |x, y| {
+        x * y
+    });
+    if long {
+        [M::F::of(0.0); 4]
+    } else {
+        if square == M::F::of(0.0) { q } else { unit }
+    }
+}
+
+/// Turns a base on by what a layer differs from its reference: base (reference⁻¹ layer)^weight.
+pub(crate) fn rotation_added<M: Machine>(
+    machine: &M,
+    base: [M::F; 4],
+    layer: [M::F; 4],
+    reference: [M::F; 4],
+    weight: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 8);
+    let inverse = [-reference[0], -reference[1], -reference[2], reference[3]];
+    let result = product(machine, inverse, layer);
+    let weighted = slerp(
+        machine,
+        [M::F::of(0.0), M::F::of(0.0), M::F::of(0.0), M::F::of(1.0)],
+        result,
+        weight,
+    );
+    let result_2 = product(machine, base, weighted);
+    let result_3 = normalised(machine, result_2);
+    let result_4 = canonical(machine, result_3);
+    result_4
+}
+
+pub(crate) fn rotation_between_arcs_hoisted<M: Machine>(
+    machine: &M,
+    key: u32,
+    start: [M::F; 4],
+    next: u32,
+    all_rows: ArcsHoisted<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 3);
+    let result = continued_key_at(machine, next);
+    let result_2 = arc_between(machine, start, result);
+    let result_3 = evaluate_arc_segment(machine, result_2, all_rows.parameter);
+    result_3
+}
+
+/// 0, which is no rotation, where the curve turns too far for the small-angle series: the CPU
+/// prepares that interval and overwrites the sample.
+pub(crate) fn rotation_between_cubics_hoisted<M: Machine>(
+    machine: &M,
+    key: u32,
+    start: [M::F; 4],
+    next: u32,
+    all_rows: CubicsHoisted<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 25);
+    let first = all_rows.first;
+    let last = all_rows.last;
+    let before = continued_key_at(
+        machine,
+        if first.kind == M::F::of(KEY_INNER) {
+            key.wrapping_sub(1u32)
+        } else {
+            key
+        },
+    );
+    let after = continued_key_at(
+        machine,
+        if last.kind == M::F::of(KEY_INNER) {
+            next.wrapping_add(1u32)
+        } else {
+            next
+        },
+    );
+    let result = continued_key_at(machine, next);
+    let curve = small_angle_cubic(machine, before, start, result, after, first, last);
+    let c = curve.powers;
+    let s = all_rows.parameter;
+    let z = s * s;
+    let third = both(both(c[3], [s; 4], |x, y| x * y), c[2], |x, y| x + y);
+    let high = both(
+        both(c[6], [z; 4], |x, y| x * y),
+        both(both(c[5], [s; 4], |x, y| x * y), c[4], |x, y| x + y),
+        |x, y| x + y,
+    );
+    let gain = both(
+        both(high, [z * z; 4], |x, y| x * y),
+        both(
+            both(third, [z; 4], |x, y| x * y),
+            both(c[1], [s; 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+        |x, y| x + y,
+    );
+    if curve.is_valid {
+        both(c[0], gain, |x, y| x + y)
+    } else {
+        [M::F::of(0.0); 4]
+    }
+}
+
+pub(crate) fn rotation_between_two_keys_hoisted<M: Machine>(
+    machine: &M,
+    key: u32,
+    start: [M::F; 4],
+    next: u32,
+    all_rows: TwoKeysHoisted<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let result = continued_key_at(machine, next);
+    let result_2 = arc_between(machine, start, result);
+    let coefficients = constant_velocity(machine, result_2);
+    let result_3 = polynomial(machine, coefficients, all_rows.parameter);
+    result_3
+}
+
+/// The half-rotation vector between two rotations. The vector part of q⁻¹ (q₊ - q) is that of q⁻¹ q₊,
+/// and small steps lose nothing in it.
+pub(crate) fn rotation_step<M: Machine>(
+    machine: &M,
+    from_value: [M::F; 4],
+    to_value: [M::F; 4],
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 25);
+    let result = dot4(machine, from_value, to_value);
+    let near = if result < M::F::of(0.0) {
+        to_value.map(|x| -x)
+    } else {
+        to_value
+    };
+    let inverse = [
+        -from_value[0],
+        -from_value[1],
+        -from_value[2],
+        from_value[3],
+    ];
+    let result_2 = product(machine, inverse, both(near, from_value, |x, y| x - y));
+    let half_step = flushed4(machine, result_2);
+    let square =
+        (half_step[0] * half_step[0] + half_step[1] * half_step[1]) + half_step[2] * half_step[2];
+    let sine = root(machine, square);
+    let result_3 = dot4(machine, from_value, near);
+    let half = arc_tangent(machine, sine, result_3);
+    let result_4 = reciprocal_root(machine, square);
+    let scale = if square == M::F::of(0.0) {
+        M::F::of(0.0)
+    } else {
+        half * result_4
+    };
+    [
+        half_step[0] * scale,
+        half_step[1] * scale,
+        half_step[2] * scale,
+        M::F::of(0.0),
+    ]
+}
+
+/// A row as it is stored.
+pub(crate) fn row_at<M: Machine>(machine: &M, row: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 17);
+    let loaded = machine.load::<u32>(Global::Dispatch, 12);
+    if loaded == 0u32 {
+        let _block = machine.block(line!(), 1);
+        let loaded_2 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
+        return loaded_2;
+    }
+    let matrix = quotient(row, 3u32);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    let instance = quotient(matrix, loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+    let first = matrix
+        .wrapping_sub(instance.wrapping_mul(loaded_4))
+        .wrapping_mul(3u32);
+    let loaded_5 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
+    let loaded_6 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first as usize));
+    let loaded_7 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(1u32) as usize));
+    let loaded_8 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(2u32) as usize));
+    let result = row_product(machine, loaded_5, loaded_6, loaded_7, loaded_8);
+    result
+}
+
+/// A row of the product: this row times the rows of the other matrix.
+pub(crate) fn row_product<M: Machine>(
+    machine: &M,
+    row: [M::F; 4],
+    first: [M::F; 4],
+    second: [M::F; 4],
+    third: [M::F; 4],
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 7);
+    let sum = both(
+        both(
+            both(first, [row[0]; 4], |x, y| x * y),
+            both(second, [row[1]; 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+        both(third, [row[2]; 4], |x, y| x * y),
+        |x, y| x + y,
+    );
+    let result = canonical(machine, [sum[0], sum[1], sum[2], sum[3] + row[3]]);
+    result
+}
+
+pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => sample_at_key_sample_of_readers(machine, index),
+        _ => sample_at_key_sample_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn sample_at_key_sample_of_readers<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> KeySample<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<KeySample<M::F>>(Global::Samples, 2 * (index as usize));
+    loaded
+}
+
+pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> KeySample<M::F> {
+    let _block = machine.block(line!(), 8);
+    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * (quotient(index, 2u32) as usize));
+    let pair = if index & 1u32 == 1u32 {
+        [two[2], two[3]]
+    } else {
+        [two[0], two[1]]
+    };
+    KeySample {
+        key: pair[0],
+        parameter: M::F::of_bits(pair[1]),
+    }
+}
+
+pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => sample_at_listed_sample_of_readers(machine, index),
+        _ => sample_at_listed_sample_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn sample_at_listed_sample_of_readers<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> ListedSample<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<ListedSample<M::F>>(Global::Samples, 2 * (index as usize));
+    loaded
+}
+
+pub(crate) fn sample_at_listed_sample_of_readers_2<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> ListedSample<M::F> {
+    let _block = machine.block(line!(), 8);
+    let two = machine.load::<[u32; 4]>(Global::Samples, 4 * (quotient(index, 2u32) as usize));
+    let pair = if index & 1u32 == 1u32 {
+        [two[2], two[3]]
+    } else {
+        [two[0], two[1]]
+    };
+    ListedSample {
+        source: pair[0],
+        parameter: M::F::of_bits(pair[1]),
+    }
+}
+
+/// A channel where its time base stands.
+pub(crate) fn sampled<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let mut coefficients: [[M::F; 4]; 11] = Default::default();
+    let mut next: u32 = Default::default();
+    let mut power: u32 = 0u32;
+    let _block = machine.block(line!(), 18);
+    let form = channel.form_and_base >> 24u32;
+    let span = at.span & TICKS;
+    let count = channel.count;
+    let s = at.parameter;
+    if form == FORM_CONSTANT {
+        let _block = machine.block(line!(), 1);
+        let result = cell_at(machine, channel.first);
+        return result;
+    }
+    if at.span & ON_KEY != 0u32 {
+        let _block = machine.block(line!(), 3);
+        let result_2 = cell_at(machine, channel.keys.wrapping_add(span.wrapping_mul(count)));
+        return result_2;
+    }
+    if form == FORM_ARC {
+        let _block = machine.block(line!(), 8);
+        let first = channel
+            .first
+            .wrapping_add(span.wrapping_mul(count).wrapping_mul(2u32));
+        let result_3 = cell_at(machine, first);
+        let result_4 = cell_at(machine, first.wrapping_add(count));
+        let result_5 = evaluate_arc_segment(
+            machine,
+            ArcSegment {
+                middle: result_3,
+                tangent: result_4,
+            },
+            s,
+        );
+        let result_6 = canonical(machine, result_5);
+        return result_6;
+    }
+    if form == FORM_CUBIC {
+        let _block = machine.block(line!(), 12);
+        let first_2 = channel
+            .first
+            .wrapping_add(span.wrapping_mul(count).wrapping_mul(4u32));
+        let second = first_2.wrapping_add(count);
+        let third = second.wrapping_add(count);
+        let c0 = cell_at(machine, first_2);
+        let c1 = cell_at(machine, second);
+        let result_7 = cell_at(machine, third);
+        let result_8 = cell_at(machine, third.wrapping_add(count));
+        let result_9 = cubic(machine, c0, c1, result_7, result_8, s);
+        let result_10 = canonical(machine, result_9);
+        return result_10;
+    }
+    next = channel
+        .first
+        .wrapping_add(span.wrapping_mul(count).wrapping_mul(11u32));
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded = power;
+        if !(loaded < 11u32) {
+            break;
+        }
+        let loaded_2 = power;
+        let loaded_3 = next;
+        let result_11 = cell_at(machine, loaded_3);
+        coefficients[loaded_2 as usize] = result_11;
+        let loaded_4 = next;
+        next = loaded_4.wrapping_add(count);
+        let loaded_5 = power;
+        power = loaded_5.wrapping_add(1u32);
+    }
+    let loaded_6 = coefficients;
+    let result_12 = polynomial(machine, loaded_6, s);
+    let result_13 = canonical(machine, result_12);
+    result_13
+}
+
+pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => segment_at_arc_segment_of_readers(machine, index),
+        _ => segment_at_arc_segment_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn segment_at_arc_segment_of_readers<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> ArcSegment<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<ArcSegment<M::F>>(Global::Segments, 8 * (index as usize));
+    loaded
+}
+
+pub(crate) fn segment_at_arc_segment_of_readers_2<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> ArcSegment<M::F> {
+    let _block = machine.block(line!(), 6);
+    let first = 2u32.wrapping_mul(index);
+    let loaded = machine.load::<[u32; 4]>(Global::Segments, 4 * (first as usize));
+    let loaded_2 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(1u32) as usize));
+    ArcSegment {
+        middle: loaded.map(|x| M::F::of_bits(x)),
+        tangent: loaded_2.map(|x| M::F::of_bits(x)),
+    }
+}
+
+pub(crate) fn segment_at_polynomial_segment<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> PolynomialSegment<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => segment_at_polynomial_segment_of_readers(machine, index),
+        _ => segment_at_polynomial_segment_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn segment_at_polynomial_segment_of_readers<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> PolynomialSegment<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<PolynomialSegment<M::F>>(Global::Segments, 44 * (index as usize));
+    loaded
+}
+
+pub(crate) fn segment_at_polynomial_segment_of_readers_2<M: Machine>(
+    machine: &M,
+    index: u32,
+) -> PolynomialSegment<M::F> {
+    let _block = machine.block(line!(), 33);
+    let first = 11u32.wrapping_mul(index);
+    let loaded = machine.load::<[u32; 4]>(Global::Segments, 4 * (first as usize));
+    let loaded_2 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(1u32) as usize));
+    let loaded_3 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(2u32) as usize));
+    let loaded_4 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(3u32) as usize));
+    let loaded_5 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(4u32) as usize));
+    let loaded_6 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(5u32) as usize));
+    let loaded_7 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(6u32) as usize));
+    let loaded_8 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(7u32) as usize));
+    let loaded_9 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(8u32) as usize));
+    let loaded_10 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(9u32) as usize));
+    let loaded_11 =
+        machine.load::<[u32; 4]>(Global::Segments, 4 * (first.wrapping_add(10u32) as usize));
+    PolynomialSegment {
+        coefficients: [
+            loaded.map(|x| M::F::of_bits(x)),
+            loaded_2.map(|x| M::F::of_bits(x)),
+            loaded_3.map(|x| M::F::of_bits(x)),
+            loaded_4.map(|x| M::F::of_bits(x)),
+            loaded_5.map(|x| M::F::of_bits(x)),
+            loaded_6.map(|x| M::F::of_bits(x)),
+            loaded_7.map(|x| M::F::of_bits(x)),
+            loaded_8.map(|x| M::F::of_bits(x)),
+            loaded_9.map(|x| M::F::of_bits(x)),
+            loaded_10.map(|x| M::F::of_bits(x)),
+            loaded_11.map(|x| M::F::of_bits(x)),
+        ],
+    }
+}
+
+/// Constants have no segment; the first one exists in any case.
+pub(crate) fn segment_of_arc_segment<M: Machine>(
+    machine: &M,
+    item: Item<M::F>,
+) -> ArcSegment<M::F> {
+    let _block = machine.block(line!(), 4);
+    let result = segment_at_arc_segment(
+        machine,
+        if item.count & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            item.source
+        },
+    );
+    result
+}
+
+/// Constants have no segment; the first one exists in any case.
+pub(crate) fn segment_of_polynomial_segment<M: Machine>(
+    machine: &M,
+    item: Item<M::F>,
+) -> PolynomialSegment<M::F> {
+    let _block = machine.block(line!(), 4);
+    let result = segment_at_polynomial_segment(
+        machine,
+        if item.count & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            item.source
+        },
+    );
+    result
+}
+
+/// Sine (x) and cosine (y).
+pub(crate) fn sine_cosine<M: Machine>(machine: &M, angle: M::F) -> [M::F; 2] {
+    let _block = machine.block(line!(), 3);
+    let sines = sine_cosm1(machine, angle, angle * angle);
+    [sines[0], sines[1] + M::F::of(1.0)]
+}
+
+/// x sin(a)/a and cos(a) - 1, for an angle |a| <= pi/2 that is given by its square z.
+pub(crate) fn sine_cosm1<M: Machine>(machine: &M, x: M::F, z: M::F) -> [M::F; 2] {
+    let _block = machine.block(line!(), 18);
+    let sine_tail =
+        ((M::F::of(SINE_9) * z + M::F::of(SINE_7)) * z + M::F::of(SINE_5)) * z + M::F::of(SINE_3);
+    let sine = sine_tail * (z * x) + x;
+    let cosine_tail = (((M::F::of(COSINE_10) * z + M::F::of(COSINE_8)) * z + M::F::of(COSINE_6))
+        * z
+        + M::F::of(COSINE_4))
+        * z
+        + M::F::of(COSINE_2);
+    let cosm1 = cosine_tail * z;
+    [sine, cosm1]
+}
+
+pub(crate) fn sine_cosm1_quarter<M: Machine>(machine: &M, x: M::F, z: M::F) -> [M::F; 2] {
+    let _block = machine.block(line!(), 15);
+    let zz = z * z;
+    let sine_low = M::F::of(QUARTER_SINE_5) * z + M::F::of(QUARTER_SINE_3);
+    let sine_tail = M::F::of(QUARTER_SINE_7) * zz + sine_low;
+    let zx = z * x;
+    let sine = sine_tail * zx + x;
+    let cosine_low = M::F::of(QUARTER_COSINE_4) * z + M::F::of(QUARTER_COSINE_2);
+    let cosine_high = M::F::of(QUARTER_COSINE_8) * z + M::F::of(QUARTER_COSINE_6);
+    let cosine_tail = cosine_high * zz + cosine_low;
+    let cosm1 = cosine_tail * z;
+    [sine, cosm1]
+}
+
+/// Slerp about the middle of the arc, the shorter way, for t from 0 to 1.
+pub(crate) fn slerp<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 25);
+    let result = dot4(machine, a, b);
+    let near = if result < M::F::of(0.0) {
+        b.map(|x| -x)
+    } else {
+        b
+    };
+    let sum = both(a, near, |x, y| x + y);
+    let difference = flushed4(machine, both(near, a, |x, y| x - y));
+    let square = dot4(machine, difference, difference);
+    let whole = dot4(machine, sum, sum);
+    let result_2 = root(machine, square);
+    let result_3 = root(machine, whole);
+    let half = arc_tangent(machine, result_2, result_3);
+    let sines = sine_cosine(machine, ((t + t) - M::F::of(1.0)) * half);
+    let result_4 = reciprocal_root(machine, square);
+    let partner = both(
+        difference,
+        [if square == M::F::of(0.0) {
+            M::F::of(0.0)
+        } else {
+            result_4
+        }; 4],
+        |x, y| x * y,
+    );
+    let result_5 = reciprocal_root(machine, whole);
+    both(
+        both(
+            both(sum, [result_5; 4], |x, y| x * y),
+            [sines[1]; 4],
+            |x, y| x * y,
+        ),
+        both(partner, [sines[0]; 4], |x, y| x * y),
+        |x, y| x + y,
+    )
+}
+
+/// The curve between `start` and `end`. Each of the four keys has the sign that is nearer to the
+/// key before it.
+pub(crate) fn small_angle_cubic<M: Machine>(
+    machine: &M,
+    before: [M::F; 4],
+    start: [M::F; 4],
+    end: [M::F; 4],
+    after: [M::F; 4],
+    first: TangentWeights<M::F>,
+    last: TangentWeights<M::F>,
+) -> SmallAngleCubic<M::F> {
+    let _block = machine.block(line!(), 266);
+    let chord_before = both(start, before, |x, y| x - y);
+    let chord = both(end, start, |x, y| x - y);
+    let chord_after = both(after, end, |x, y| x - y);
+    let step = step_vector(machine, start, chord);
+    let result = step_vector(machine, before, chord_before);
+    let log_before = small_log(machine, result);
+    let log = small_log(machine, step);
+    let result_2 = step_vector(machine, end, chord_after);
+    let log_after = small_log(machine, result_2);
+    let first_left = both(log_before, [first.before; 3], |x, y| x * y);
+    let first_right = both(log, [first.after; 3], |x, y| x * y);
+    let last_left = both(log, [last.before; 3], |x, y| x * y);
+    let last_right = both(log_after, [last.after; 3], |x, y| x * y);
+    let result_3 = small_exp(machine, first_left);
+    let result_4 = small_exp(machine, first_right);
+    let result_5 = composed(machine, result_3, result_4);
+    let first_tangent = small_log(machine, result_5.vector);
+    let result_6 = small_exp(machine, last_left);
+    let result_7 = small_exp(machine, last_right);
+    let result_8 = composed(machine, result_6, result_7);
+    let last_tangent = small_log(machine, result_8.vector);
+    let outgoing = both(first_tangent, [first.outgoing; 3], |x, y| x * y);
+    let incoming = both(
+        last_tangent,
+        [M::F::of(THIRD) - last.outgoing; 3],
+        |x, y| x * y,
+    );
+    let parabola = both(log, [M::F::of(TWO_THIRDS); 3], |x, y| x * y);
+    let w1 = if first.kind == M::F::of(KEY_AT_END) {
+        both(parabola, incoming, |x, y| x - y)
+    } else {
+        outgoing
+    };
+    let v3 = if last.kind == M::F::of(KEY_AT_END) {
+        both(parabola, outgoing, |x, y| x - y)
+    } else {
+        incoming
+    };
+    let result_9 = norm_squared(machine, chord);
+    let whole = FromIdentity {
+        vector: step,
+        cosm1: result_9 * M::F::of(-0.5),
+    };
+    let result_10 = small_exp(machine, w1.map(|x| -x));
+    let without_first = composed(machine, result_10, whole);
+    let result_11 = small_exp(machine, v3.map(|x| -x));
+    let result_12 = composed(machine, without_first, result_11);
+    let w2 = small_log(machine, result_12.vector);
+    let result_13 = dot3(machine, w1, w1);
+    let result_14 = dot3(machine, w2, w2);
+    let result_15 = dot3(machine, v3, v3);
+    let squared_extent = (result_13 + result_14) + result_15;
+    let result_16 = norm_squared(machine, chord_before);
+    let result_17 = norm_squared(machine, chord);
+    let result_18 = norm_squared(machine, chord_after);
+    let result_19 = dot3(machine, first_left, first_left);
+    let result_20 = dot3(machine, first_right, first_right);
+    let result_21 = dot3(machine, last_left, last_left);
+    let result_22 = dot3(machine, last_right, last_right);
+    let is_valid = (squared_extent <= M::F::of(SMALL_SQUARED_EXTENT))
+        & (result_16 <= M::F::of(LONGEST_STEP))
+        & (result_17 <= M::F::of(LONGEST_STEP))
+        & (result_18 <= M::F::of(LONGEST_STEP))
+        & (result_19 <= M::F::of(LONGEST_TANGENT_PART))
+        & (result_20 <= M::F::of(LONGEST_TANGENT_PART))
+        & (result_21 <= M::F::of(LONGEST_TANGENT_PART))
+        & (result_22 <= M::F::of(LONGEST_TANGENT_PART))
+        & (first.kind != M::F::of(KEY_UNKNOWN))
+        & (last.kind != M::F::of(KEY_UNKNOWN));
+    let third_step = small_exp(machine, both(v3, [M::F::of(0.125); 3], |x, y| x * y));
+    let result_23 = small_exp(machine, both(w2, [M::F::of(0.5); 3], |x, y| x * y));
+    let second_step = composed(machine, result_23, third_step);
+    let result_24 = small_exp(machine, both(w1, [M::F::of(0.875); 3], |x, y| x * y));
+    let all_steps = composed(machine, result_24, second_step);
+    let result_25 = canonical_product(machine, start, all_steps.vector, all_steps.cosm1);
+    let m = both(result_25, start, |x, y| x + y);
+    let v1 = inverse_rotated(machine, w1, second_step);
+    let v2 = inverse_rotated(machine, w2, third_step);
+    let outer = both(v1, v3, |x, y| x + y);
+    let a = both(
+        both(outer, [M::F::of(0.75); 3], |x, y| x * y),
+        both(v2, [M::F::of(1.5); 3], |x, y| x * y),
+        |x, y| x + y,
+    );
+    let b = both(both(v3, v1, |x, y| x - y), [M::F::of(1.5); 3], |x, y| x * y);
+    let c = both(outer, both(v2, v2, |x, y| x + y), |x, y| x - y);
+    let x12 = cross3(machine, v1, v2);
+    let x23 = cross3(machine, v2, v3);
+    let x13 = cross3(machine, v1, v3);
+    let even = both(x12, x23, |x, y| x + y);
+    let odd = both(x12, x23, |x, y| x - y);
+    let n1 = dot3(machine, v1, v1);
+    let n2 = dot3(machine, v2, v2);
+    let n3 = dot3(machine, v3, v3);
+    let d12 = dot3(machine, v1, v2);
+    let d13 = dot3(machine, v1, v3);
+    let d23 = dot3(machine, v2, v3);
+    let outward = n1 + n3;
+    let difference = n1 - n3;
+    let volume = dot3(machine, v1, x23);
+    let f1 = both(
+        both(
+            both(
+                v1,
+                [((n1 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1)) + n3 * M::F::of(B_133_1))
+                    - d23 * M::F::of(B_123_1); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [((n3 * M::F::of(B_111_1) + n2 * M::F::of(B_122_1)) + n1 * M::F::of(B_133_1))
+                    - d12 * M::F::of(B_123_1); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x + y,
+        ),
+        both(
+            v2,
+            [(outward * M::F::of(B_211_1) + n2 * M::F::of(B_222_1)) + d13 * M::F::of(B_123_1); 3],
+            |x, y| x * y,
+        ),
+        |x, y| x + y,
+    );
+    let f2 = both(
+        both(
+            both(
+                v1,
+                [(n1 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2)) + n3 * M::F::of(B_133_2); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [(n3 * M::F::of(B_111_2) + n2 * M::F::of(B_122_2)) + n1 * M::F::of(B_133_2); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x - y,
+        ),
+        both(v2, [difference * M::F::of(B_211_2); 3], |x, y| x * y),
+        |x, y| x + y,
+    );
+    let f3 = both(
+        both(
+            both(
+                v1,
+                [((n1 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3)) + n3 * M::F::of(B_133_3))
+                    - d23 * M::F::of(B_123_3); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [((n3 * M::F::of(B_111_3) + n2 * M::F::of(B_122_3)) + n1 * M::F::of(B_133_3))
+                    - d12 * M::F::of(B_123_3); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x + y,
+        ),
+        both(
+            v2,
+            [(outward * M::F::of(B_211_3) + n2 * M::F::of(B_222_3)) + d13 * M::F::of(B_123_3); 3],
+            |x, y| x * y,
+        ),
+        |x, y| x + y,
+    );
+    let f4 = both(
+        both(
+            both(
+                v1,
+                [(n1 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4)) + n3 * M::F::of(B_133_4); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [(n3 * M::F::of(B_111_4) + n2 * M::F::of(B_122_4)) + n1 * M::F::of(B_133_4); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x - y,
+        ),
+        both(v2, [difference * M::F::of(B_211_4); 3], |x, y| x * y),
+        |x, y| x + y,
+    );
+    let f5 = both(
+        both(
+            both(
+                v1,
+                [((n1 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5)) + n3 * M::F::of(B_133_5))
+                    - d23 * M::F::of(B_123_5); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [((n3 * M::F::of(B_111_5) + n2 * M::F::of(B_122_5)) + n1 * M::F::of(B_133_5))
+                    - d12 * M::F::of(B_123_5); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x + y,
+        ),
+        both(
+            v2,
+            [(outward * M::F::of(B_211_5) + n2 * M::F::of(B_222_5)) + d13 * M::F::of(B_123_5); 3],
+            |x, y| x * y,
+        ),
+        |x, y| x + y,
+    );
+    let f6 = both(
+        both(
+            both(
+                v1,
+                [(n1 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6)) + n3 * M::F::of(B_133_6); 3],
+                |x, y| x * y,
+            ),
+            both(
+                v3,
+                [(n3 * M::F::of(B_111_6) + n2 * M::F::of(B_122_6)) + n1 * M::F::of(B_133_6); 3],
+                |x, y| x * y,
+            ),
+            |x, y| x - y,
+        ),
+        both(v2, [difference * M::F::of(B_211_6); 3], |x, y| x * y),
+        |x, y| x + y,
+    );
+    let result_26 = canonical(machine, m);
+    let result_27 = canonical_product(
+        machine,
+        m,
+        both(a, f1, |x, y| x + y),
+        -(volume * M::F::of(B_123_1)),
+    );
+    let result_28 = dot3(machine, a, a);
+    let result_29 = canonical_product(
+        machine,
+        m,
+        both(
+            b,
+            both(
+                both(
+                    both(even, [M::F::of(1.125); 3], |x, y| x * y),
+                    both(x13, [M::F::of(0.5625); 3], |x, y| x * y),
+                    |x, y| x + y,
+                ),
+                f2,
+                |x, y| x + y,
+            ),
+            |x, y| x + y,
+        ),
+        result_28 * M::F::of(-0.5),
+    );
+    let result_30 = dot3(machine, a, b);
+    let result_31 = canonical_product(
+        machine,
+        m,
+        both(
+            c,
+            both(both(odd, [M::F::of(-2.25); 3], |x, y| x * y), f3, |x, y| {
+                x + y
+            }),
+            |x, y| x + y,
+        ),
+        -result_30 - volume * M::F::of(B_123_3),
+    );
+    let result_32 = dot3(machine, b, b);
+    let result_33 = dot3(machine, a, c);
+    let result_34 = canonical_product(
+        machine,
+        m,
+        both(both(x13, [M::F::of(-0.75); 3], |x, y| x * y), f4, |x, y| {
+            x + y
+        }),
+        result_32 * M::F::of(-0.5) - result_33,
+    );
+    let result_35 = dot3(machine, b, c);
+    let result_36 = canonical_product(
+        machine,
+        m,
+        both(both(odd, [M::F::of(3.0); 3], |x, y| x * y), f5, |x, y| {
+            x + y
+        }),
+        -result_35 - volume * M::F::of(B_123_5),
+    );
+    let result_37 = dot3(machine, c, c);
+    let result_38 = canonical_product(
+        machine,
+        m,
+        both(
+            both(x13, both(even, even, |x, y| x + y), |x, y| x - y),
+            f6,
+            |x, y| x + y,
+        ),
+        result_37 * M::F::of(-0.5),
+    );
+    SmallAngleCubic {
+        powers: [
+            result_26, result_27, result_29, result_31, result_34, result_36, result_38,
+        ],
+        is_valid,
+    }
+}
+
+/// The exponential of a small half-rotation vector.
+pub(crate) fn small_exp<M: Machine>(machine: &M, v: [M::F; 3]) -> FromIdentity<M::F> {
+    let _block = machine.block(line!(), 9);
+    let x = dot3(machine, v, v);
+    let sinc = (M::F::of(SINC_2) * x + M::F::of(SINC_1)) * x;
+    FromIdentity {
+        vector: both(both(v, [sinc; 3], |x, y| x * y), v, |x, y| x + y),
+        cosm1: (M::F::of(COSM1_2) * x + M::F::of(COSM1_1)) * x,
+    }
+}
+
+/// The logarithm of a small rotation by its vector part, whose length is the sine.
+pub(crate) fn small_log<M: Machine>(machine: &M, v: [M::F; 3]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 10);
+    let x = dot3(machine, v, v);
+    let tail =
+        ((M::F::of(LOG_4) * x + M::F::of(LOG_3)) * x + M::F::of(LOG_2)) * x + M::F::of(LOG_1);
+    both(both(v, [tail * x; 3], |x, y| x * y), v, |x, y| x + y)
+}
+
+/// The last span of a time base that does not start after a tick.
+pub(crate) fn span_at<M: Machine>(machine: &M, base: CrowdBase, tick: u32) -> u32 {
+    let mut found: u32 = 0u32;
+    let mut step: u32 = Default::default();
+    let _block = machine.block(line!(), 2);
+    step = base.step;
+    loop {
+        let _block = machine.block(line!(), 19);
+        let loaded = step;
+        if !(loaded != 0u32) {
+            break;
+        }
+        let loaded_2 = found;
+        let loaded_3 = step;
+        let next = loaded_2.wrapping_add(loaded_3);
+        let inside = next < base.count;
+        let loaded_4 = machine.load::<u32>(
+            Global::Spans,
+            4 * (base.first.wrapping_add(if inside { next } else { 0u32 }) as usize),
+        );
+        let start = loaded_4 & TICKS;
+        let loaded_5 = found;
+        found = if inside & (tick >= start) {
+            next
+        } else {
+            loaded_5
+        };
+        let loaded_6 = step;
+        step = loaded_6 >> 1u32;
+    }
+    let loaded_7 = found;
+    loaded_7
+}
+
+/// The vector part of a⁻¹ (a + chord), the step from a to its next key.
+pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4]) -> [M::F; 3] {
+    let _block = machine.block(line!(), 21);
+    [
+        (a[3] * chord[0] - chord[3] * a[0]) - (a[1] * chord[2] - a[2] * chord[1]),
+        (a[3] * chord[1] - chord[3] * a[1]) - (a[2] * chord[0] - a[0] * chord[2]),
+        (a[3] * chord[2] - chord[3] * a[2]) - (a[0] * chord[1] - a[1] * chord[0]),
+    ]
+}
+
+pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
+        5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
+        3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0, 0, 0,
+        3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5,
+        6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
+        4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => store_of_axis_angle(machine, index, rotation),
+        1 => store_of_euler(machine, index, rotation),
+        2 => store_of_f16(machine, index, rotation),
+        3 => store_of_f32(machine, index, rotation),
+        4 => store_of_matrix3x3(machine, index, rotation),
+        5 => store_of_matrix3x4(machine, index, rotation),
+        6 => store_of_snorm16(machine, index, rotation),
+        _ => store_of_f32_2(machine, index, rotation),
+    }
+}
+
+pub(crate) fn store_of_axis_angle<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let _block = machine.block(line!(), 3);
+    let result = axis_angle(machine, rotation);
+    let result_2 = canonical(machine, result);
+    machine.store::<[M::F; 4]>(Global::Rotations, 4 * (index as usize), result_2);
+}
+
+pub(crate) fn store_of_euler<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let mut all: [M::F; 3] = Default::default();
+    let mut part: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let result = parts_1(machine, rotation);
+    all = result;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded = part;
+        if !(loaded < 3u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let loaded_3 = part;
+        let loaded_4 = all[loaded_3 as usize];
+        machine.store::<M::F>(
+            Global::Rotations,
+            index.wrapping_mul(3u32).wrapping_add(loaded_2) as usize,
+            loaded_4,
+        );
+        let loaded_5 = part;
+        part = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn store_of_f16<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let _block = machine.block(line!(), 6);
+    let half = to_half(machine, rotation);
+    machine.store::<[u32; 2]>(
+        Global::Rotations,
+        2 * (index as usize),
+        [half[0] | (half[1] << 16u32), half[2] | (half[3] << 16u32)],
+    );
+}
+
+pub(crate) fn store_of_f32<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let _block = machine.block(line!(), 1);
+    machine.store::<[M::F; 4]>(Global::Rotations, 4 * (index as usize), rotation);
+}
+
+pub(crate) fn store_of_matrix3x3<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let mut all: [M::F; 9] = Default::default();
+    let mut part: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let result = parts_2(machine, rotation);
+    all = result;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded = part;
+        if !(loaded < 9u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let loaded_3 = part;
+        let loaded_4 = all[loaded_3 as usize];
+        machine.store::<M::F>(
+            Global::Rotations,
+            index.wrapping_mul(9u32).wrapping_add(loaded_2) as usize,
+            loaded_4,
+        );
+        let loaded_5 = part;
+        part = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn store_of_matrix3x4<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut part: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let result = parts_3(machine, rotation);
+    all = result;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded = part;
+        if !(loaded < 3u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let loaded_3 = part;
+        let loaded_4 = all[loaded_3 as usize];
+        machine.store::<[M::F; 4]>(
+            Global::Rotations,
+            4 * (index.wrapping_mul(3u32).wrapping_add(loaded_2) as usize),
+            loaded_4,
+        );
+        let loaded_5 = part;
+        part = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn store_of_snorm16<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let _block = machine.block(line!(), 6);
+    let whole = to_snorm(machine, rotation);
+    machine.store::<[u32; 2]>(
+        Global::Rotations,
+        2 * (index as usize),
+        [
+            whole[0] | (whole[1] << 16u32),
+            whole[2] | (whole[3] << 16u32),
+        ],
+    );
+}
+
+pub(crate) fn store_of_f32_2<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let _block = machine.block(line!(), 2);
+    let result = wide(machine, rotation);
+    machine.store::<[u64; 2]>(Global::Rotations, 4 * (index as usize), result);
+}
+
+/// The tick of the clip at which a layer stands, from 0 to `period`.
+pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
+    let mut now: [u32; 2] = Default::default();
+    let _block = machine.block(line!(), 26);
+    let modes = entry.speed_and_modes;
+    let backwards = modes & RUNS_BACKWARDS != 0u32;
+    let wrap = (modes >> 29u32) & 3u32;
+    let loaded = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 7);
+    let clock = [loaded, loaded_2];
+    let elapsed = wide_difference(
+        machine,
+        clock,
+        [entry.anchor << 8u32, entry.anchor >> 24u32],
+    );
+    let speed = modes & SPEED_MAGNITUDE;
+    let low = wide_product(machine, speed, elapsed[0]);
+    let moved = [
+        low[0],
+        low[1].wrapping_add(speed.wrapping_mul(elapsed[1] & 255u32)),
+    ];
+    let zero = in_parts(machine, START_BIAS);
+    let end = in_parts(machine, period.wrapping_add(START_BIAS));
+    let result = in_parts(machine, entry.start);
+    now = result;
+    if wrap == WRAP_HOLD {
+        let _block = machine.block(line!(), 11);
+        if backwards {
+            let _block = machine.block(line!(), 7);
+            let loaded_3 = now;
+            let result_2 = wide_sum(machine, moved, zero);
+            let held = wide_less(machine, loaded_3, result_2);
+            let loaded_4 = now;
+            let result_3 = wide_difference(machine, loaded_4, moved);
+            now = if held { zero } else { result_3 };
+        } else {
+            let _block = machine.block(line!(), 3);
+            let loaded_5 = now;
+            let result_4 = wide_sum(machine, loaded_5, moved);
+            now = result_4;
+        }
+        let loaded_6 = now;
+        let early = wide_less(machine, loaded_6, zero);
+        let loaded_7 = now;
+        now = if early { zero } else { loaded_7 };
+        let loaded_8 = now;
+        let late = wide_less(machine, end, loaded_8);
+        let loaded_9 = now;
+        now = if late { end } else { loaded_9 };
+    } else {
+        let _block = machine.block(line!(), 15);
+        let whole = in_parts(machine, period << wrap.wrapping_sub(WRAP_LOOP));
+        let along = wide_remainder(machine, moved, whole);
+        let loaded_10 = now;
+        let result_5 = wide_difference(machine, whole, along);
+        let on = wide_sum(machine, loaded_10, if backwards { result_5 } else { along });
+        let result_6 = wide_difference(machine, on, zero);
+        let into = wide_remainder(machine, result_6, whole);
+        let result_7 = wide_sum(machine, into, zero);
+        now = result_7;
+        let loaded_11 = now;
+        let result_8 = wide_less(machine, end, loaded_11);
+        if result_8 {
+            let _block = machine.block(line!(), 5);
+            let result_9 = in_parts(machine, period << 1u32);
+            let result_10 = wide_sum(machine, result_9, zero);
+            let result_11 = wide_difference(machine, result_10, into);
+            now = result_11;
+        }
+    }
+    let loaded_12 = now;
+    let found = wide_difference(machine, loaded_12, zero);
+    (found[0] >> 16u32) | (found[1] << 16u32)
+}
+
+/// As `to_half`, for values of any magnitude.
+pub(crate) fn to_any_half<M: Machine>(machine: &M, value: [M::F; 4]) -> [u32; 4] {
+    let _block = machine.block(line!(), 9);
+    let bits = value.map(|x| x.bits());
+    let large = both(
+        both(bits, [0x7fffffffu32; 4], |x, y| x & y),
+        [0x477ff000u32; 4],
+        |x, y| x >= y,
+    );
+    let sign = both(
+        both(bits, [16u32; 4], |x, y| x >> y),
+        [0x8000u32; 4],
+        |x, y| x & y,
+    );
+    let small = choose(large, [M::F::of(0.0); 4], value);
+    let result = to_half(machine, small);
+    choose(large, both(sign, [0x7c00u32; 4], |x, y| x | y), result)
+}
+
+/// The bits of each component as a half, for |component| < 2.
+pub(crate) fn to_half<M: Machine>(machine: &M, value: [M::F; 4]) -> [u32; 4] {
+    let _block = machine.block(line!(), 17);
+    let bits = value.map(|x| x.bits());
+    let sign = both(
+        both(bits, [16u32; 4], |x, y| x >> y),
+        [0x8000u32; 4],
+        |x, y| x & y,
+    );
+    let magnitude = both(bits, [0x7fffffffu32; 4], |x, y| x & y);
+    let odd = both(
+        both(magnitude, [13u32; 4], |x, y| x >> y),
+        [1u32; 4],
+        |x, y| x & y,
+    );
+    let normal = both(
+        both(
+            both(
+                both(magnitude, [0xfffu32; 4], |x, y| x.wrapping_add(y)),
+                odd,
+                |x, y| x.wrapping_add(y),
+            ),
+            [0x38000000u32; 4],
+            |x, y| x.wrapping_sub(y),
+        ),
+        [13u32; 4],
+        |x, y| x >> y,
+    );
+    let small = both(
+        both(
+            magnitude.map(|x| M::F::of_bits(x)),
+            [M::F::of(0.5); 4],
+            |x, y| x + y,
+        )
+        .map(|x| x.bits()),
+        [0x3f000000u32; 4],
+        |x, y| x.wrapping_sub(y),
+    );
+    both(
+        sign,
+        choose(
+            both(magnitude, [0x38800000u32; 4], |x, y| x < y),
+            small,
+            normal,
+        ),
+        |x, y| x | y,
+    )
+}
+
+/// The whole number of each component, for |component| < 1 + 2^-16.
+pub(crate) fn to_snorm<M: Machine>(machine: &M, value: [M::F; 4]) -> [u32; 4] {
+    let _block = machine.block(line!(), 4);
+    both(
+        both(
+            both(value, [M::F::of(32767.0); 4], |x, y| x * y),
+            [M::F::of(12582912.0); 4],
+            |x, y| x + y,
+        )
+        .map(|x| x.bits()),
+        [0xffffu32; 4],
+        |x, y| x & y,
+    )
+}
+
+/// Evaluates a joint in its parent's frame.
+pub(crate) fn transform_joint<M: Machine>(machine: &M, instance: u32, joint: u32) {
+    let _block = machine.block(line!(), 16);
+    let result = layered(machine, instance, joint, ROTATION);
+    let axes = matrix_rows(machine, result, 0u32);
+    let moved = layered(machine, instance, joint, TRANSLATION);
+    let scale = layered(machine, instance, joint, SCALE);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let row = instance
+        .wrapping_mul(loaded)
+        .wrapping_add(joint)
+        .wrapping_mul(3u32);
+    let result_2 = transform_row(machine, axes.first, scale, moved[0]);
+    machine.store::<[M::F; 4]>(Global::Rows, 4 * (row as usize), result_2);
+    let result_3 = transform_row(machine, axes.second, scale, moved[1]);
+    machine.store::<[M::F; 4]>(
+        Global::Rows,
+        4 * (row.wrapping_add(1u32) as usize),
+        result_3,
+    );
+    let result_4 = transform_row(machine, axes.third, scale, moved[2]);
+    machine.store::<[M::F; 4]>(
+        Global::Rows,
+        4 * (row.wrapping_add(2u32) as usize),
+        result_4,
+    );
+}
+
+/// A row of R with the columns scaled, and the translation behind it.
+pub(crate) fn transform_row<M: Machine>(
+    machine: &M,
+    axis: [M::F; 3],
+    scale: [M::F; 4],
+    moved: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let row = canonical(machine, [axis[0], axis[1], axis[2], M::F::of(0.0)]);
+    let result = canonical(
+        machine,
+        [
+            row[0] * scale[0],
+            row[1] * scale[1],
+            row[2] * scale[2],
+            moved,
+        ],
+    );
+    result
+}
+
+/// Makes the matrix of a joint one in the model, where its parent's is one.
+pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
+    let _block = machine.block(line!(), 26);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let above = instance
+        .wrapping_mul(loaded)
+        .wrapping_add(link.parent)
+        .wrapping_mul(3u32);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let row = instance
+        .wrapping_mul(loaded_2)
+        .wrapping_add(link.joint)
+        .wrapping_mul(3u32);
+    let first = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
+    let second = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row.wrapping_add(1u32) as usize));
+    let third = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row.wrapping_add(2u32) as usize));
+    let loaded_3 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (above as usize));
+    let result = row_product(machine, loaded_3, first, second, third);
+    machine.store::<[M::F; 4]>(Global::Rows, 4 * (row as usize), result);
+    let loaded_4 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (above.wrapping_add(1u32) as usize));
+    let result_2 = row_product(machine, loaded_4, first, second, third);
+    machine.store::<[M::F; 4]>(
+        Global::Rows,
+        4 * (row.wrapping_add(1u32) as usize),
+        result_2,
+    );
+    let loaded_5 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (above.wrapping_add(2u32) as usize));
+    let result_3 = row_product(machine, loaded_5, first, second, third);
+    machine.store::<[M::F; 4]>(
+        Global::Rows,
+        4 * (row.wrapping_add(2u32) as usize),
+        result_3,
+    );
+}
+
+pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
+    const OF_KERNELS: [u8; 161] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => weights_at_of_readers(machine, index),
+        _ => weights_at_of_readers_2(machine, index),
+    }
+}
+
+pub(crate) fn weights_at_of_readers<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<TangentWeights<M::F>>(Global::Weights, 4 * (index as usize));
+    loaded
+}
+
+pub(crate) fn weights_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<[u32; 4]>(Global::Weights, 4 * (index as usize));
+    let all = loaded.map(|x| M::F::of_bits(x));
+    TangentWeights {
+        before: all[0],
+        after: all[1],
+        outgoing: all[2],
+        kind: all[3],
+    }
+}
+
+/// A rotation as two words of 64 bits: lavapipe stores word by word and lane by lane, so half as
+/// many words take half the time.
+pub(crate) fn wide<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [u64; 2] {
+    let _block = machine.block(line!(), 9);
+    let words = rotation.map(|x| x.bits());
+    [
+        u64::from(words[0]) | (u64::from(words[1]) << 32u32),
+        u64::from(words[2]) | (u64::from(words[3]) << 32u32),
+    ]
+}
+
+pub(crate) fn wide_difference<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
+    let _block = machine.block(line!(), 5);
+    [
+        a[0].wrapping_sub(b[0]),
+        a[1].wrapping_sub(b[1])
+            .wrapping_sub(if a[0] < b[0] { 1u32 } else { 0u32 }),
+    ]
+}
+
+/// Whole numbers of 64 bits: the lower word, the upper word.
+pub(crate) fn wide_less<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> bool {
+    let _block = machine.block(line!(), 4);
+    if a[1] != b[1] {
+        a[1] < b[1]
+    } else {
+        a[0] < b[0]
+    }
+}
+
+/// The product of two numbers of 32 bits.
+pub(crate) fn wide_product<M: Machine>(machine: &M, a: u32, b: u32) -> [u32; 2] {
+    let _block = machine.block(line!(), 22);
+    let al = a & 0xffffu32;
+    let ah = a >> 16u32;
+    let bl = b & 0xffffu32;
+    let bh = b >> 16u32;
+    let low = al.wrapping_mul(bl);
+    let left = ah.wrapping_mul(bl);
+    let right = al.wrapping_mul(bh);
+    let middle = (low >> 16u32)
+        .wrapping_add(left & 0xffffu32)
+        .wrapping_add(right & 0xffffu32);
+    let high = ah
+        .wrapping_mul(bh)
+        .wrapping_add(left >> 16u32)
+        .wrapping_add(right >> 16u32)
+        .wrapping_add(middle >> 16u32);
+    [(low & 0xffffu32) | (middle << 16u32), high]
+}
+
+/// x modulo q, for x below 2^63 and q from 1 on: multiples of q by powers of 2 are taken away.
+pub(crate) fn wide_remainder<M: Machine>(machine: &M, x: [u32; 2], q: [u32; 2]) -> [u32; 2] {
+    let mut rest: [u32; 2] = Default::default();
+    let mut multiple: [u32; 2] = Default::default();
+    let _block = machine.block(line!(), 3);
+    rest = x;
+    multiple = q;
+    loop {
+        let _block = machine.block(line!(), 16);
+        let loaded = rest;
+        let loaded_2 = multiple;
+        let result = wide_less(machine, loaded, loaded_2);
+        let loaded_3 = multiple[1];
+        if !(!result & (loaded_3 < 0x40000000u32)) {
+            break;
+        }
+        let loaded_4 = multiple[0];
+        let loaded_5 = multiple[1];
+        let loaded_6 = multiple[0];
+        multiple = [loaded_4 << 1u32, (loaded_5 << 1u32) | (loaded_6 >> 31u32)];
+    }
+    loop {
+        let _block = machine.block(line!(), 17);
+        let loaded_7 = multiple;
+        let result_2 = wide_less(machine, loaded_7, q);
+        if !!result_2 {
+            break;
+        }
+        let loaded_8 = rest;
+        let loaded_9 = multiple;
+        let result_3 = wide_less(machine, loaded_8, loaded_9);
+        if !result_3 {
+            let _block = machine.block(line!(), 4);
+            let loaded_10 = rest;
+            let loaded_11 = multiple;
+            let result_4 = wide_difference(machine, loaded_10, loaded_11);
+            rest = result_4;
+        }
+        let loaded_12 = multiple[0];
+        let loaded_13 = multiple[1];
+        let loaded_14 = multiple[1];
+        multiple = [
+            (loaded_12 >> 1u32) | (loaded_13 << 31u32),
+            loaded_14 >> 1u32,
+        ];
+    }
+    let loaded_15 = rest;
+    loaded_15
+}
+
+pub(crate) fn wide_sum<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
+    let _block = machine.block(line!(), 5);
+    let low = a[0].wrapping_add(b[0]);
+    [
+        low,
+        a[1].wrapping_add(b[1])
+            .wrapping_add(if low < a[0] { 1u32 } else { 0u32 }),
+    ]
+}
+
+/// An angle brought into -pi to pi.
+pub(crate) fn wrapped<M: Machine>(machine: &M, angle: M::F) -> M::F {
+    let _block = machine.block(line!(), 8);
+    let low = if angle < M::F::of(-3.1415927) {
+        (angle + M::F::of(6.2831855)) + M::F::of(-1.7484555e-7)
+    } else {
+        angle
+    };
+    if low > M::F::of(PI) {
+        (low - M::F::of(6.2831855)) - M::F::of(-1.7484555e-7)
+    } else {
+        low
+    }
+}
