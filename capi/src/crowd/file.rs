@@ -87,8 +87,7 @@ fn authored_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
     let found = ChannelMethods::AUTHORED.moving_method_of(motion);
     found.map_err(|[first, second]| {
         refused(format!(
-            "clip {clip} has rotations by {} and by {}; give one interpolation for all",
-            first.name, second.name
+            "clip {clip} has rotations by {first} and by {second}; give one interpolation for all"
         ))
     })
 }

@@ -104,6 +104,7 @@ impl ChannelMethods {
     }
 
     /// The method for the rotations of each track.
+    #[must_use]
     pub fn methods<'a>(&self, clip: &'a Motion) -> impl ExactSizeIterator<Item = Method> + use<'a> {
         let (this, resting) = (*self, self.resting_method(clip));
         (0..clip.set.track_count())
@@ -133,8 +134,8 @@ impl ChannelMethods {
     /// The one method for all rotations that change; [`method::SLERP`] if none does.
     ///
     /// # Errors
-    /// The first two methods, where there are several.
-    pub fn moving_method_of(&self, clip: &Motion) -> Result<Method, [Method; 2]> {
+    /// The names of the first two methods, where there are several.
+    pub fn moving_method_of(&self, clip: &Motion) -> Result<Method, [&'static str; 2]> {
         let moves = |track: usize| {
             let track = clip.set.get(track);
             track.is_some_and(|track| track.keys.iter().any(|key| *key != track.keys[0]))
@@ -145,7 +146,7 @@ impl ChannelMethods {
             .map(|(_, method)| method);
         let first = moving.next().unwrap_or(method::SLERP);
         match moving.find(|method| *method != first) {
-            Some(second) => Err([first, second]),
+            Some(second) => Err([first.name, second.name]),
             None => Ok(first),
         }
     }
