@@ -58,11 +58,13 @@ impl Clip {
     }
 
     /// The engine to which the clip was uploaded.
+    #[must_use]
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
 
     /// Number of tracks.
+    #[must_use]
     pub fn track_count(&self) -> usize {
         match &self.tracks {
             ClipTracks::Alike(uploaded) => uploaded.data().track_count(),
