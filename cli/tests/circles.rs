@@ -15,7 +15,7 @@ const KNOWN: &[(&str, &str)] = &[
     ("formats/src", ""),
     ("cli/src", ""),
     ("python/src", ""),
-    ("npm/src", "calls.rs sampling.rs"),
+    ("npm/src", ""),
     ("capi/src", ""),
 ];
 

@@ -15,12 +15,12 @@ use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
 use tumble_formats::world::{world, world_matrices};
 
-use crate::calls::{Answer, Array, Fault};
+use crate::answer::{Answer, Array, Fault};
 
-/// What is asked for. Decimal numbers come as text, which keeps all their digits.
+/// The header of a call for samples. Decimal numbers come as text, which keeps all their digits.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Request {
+pub(crate) struct SampleCall {
     pub(crate) clip: usize,
     quantity: Sampled,
     /// Of frames; the numbers are their start and end then, and else the times.
@@ -61,7 +61,7 @@ fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
     parsed.map_err(D::Error::custom)
 }
 
-impl Request {
+impl SampleCall {
     fn method(&self) -> Result<MethodChoice, UnknownNameError> {
         let name = self.method.as_deref();
         name.map_or(Ok(MethodChoice::AUTHORED), str::parse)
@@ -121,17 +121,17 @@ impl Request {
 /// becomes of them, in both orders.
 const SAMPLE: f64 = 200.0;
 
-/// What a clip is at the times of a request.
+/// What a clip is at the times of a call.
 pub(crate) fn sample(
     engine: &Engine,
     clip: &Motion,
-    request: &Request,
+    call: &SampleCall,
     numbers: &[u8],
 ) -> Result<Answer, Fault> {
     let (numbers, _) = numbers.as_chunks();
     let numbers: Vec<f64> = numbers.iter().copied().map(f64::from_le_bytes).collect();
     let tracks = clip.set.track_count();
-    let frames = request.frames(&numbers)?;
+    let frames = call.frames(&numbers)?;
     let timeline = frames.resolve(tracks, clip.set.time_span())?;
     let bytes = tracks as f64 * timeline.len() as f64 * SAMPLE;
     // The platform does not say how much memory there is; reserving it does.
@@ -145,20 +145,21 @@ pub(crate) fn sample(
         )));
     }
     let methods = ChannelMethods {
-        method: request.method()?,
-        options: request.options()?,
+        method: call.method()?,
+        options: call.options()?,
     };
     let samples = timeline.len();
-    let mut arrays = match request.quantity {
+    let mut arrays = match call.quantity {
         Sampled::Velocities | Sampled::Accelerations => {
-            let rates = methods.rates(engine, clip, &frames, Layout::FrameMajor)?;
+            let layout = call.layout.unwrap_or(Layout::TrackMajor);
+            let rates = methods.rates(engine, clip, &frames, layout)?;
             let rates: Vec<Vec3> = rates.iter().map(|rate| rate.truncate()).collect();
-            vec![("values", Array::Vectors(request.ordered(rates, tracks)))]
+            vec![("values", Array::Vectors(rates))]
         }
-        Sampled::Pose => pose(methods.sample(engine, clip, &frames)?, request, tracks),
+        Sampled::Pose => pose(methods.sample(engine, clip, &frames)?, call, tracks),
         Sampled::World => {
             let poses = world(clip, &methods.sample(engine, clip, &frames)?)?;
-            let poses = request.ordered(poses, tracks);
+            let poses = call.ordered(poses, tracks);
             let positions = poses.iter().flat_map(|pose| pose.position.to_array());
             let rotations: Vec<Quat> = poses.iter().map(|pose| pose.rotation).collect();
             vec![
@@ -168,7 +169,7 @@ pub(crate) fn sample(
         }
         Sampled::Matrices => {
             let matrices = world_matrices(clip, &methods.sample(engine, clip, &frames)?)?;
-            let matrices = request.ordered(matrices, tracks);
+            let matrices = call.ordered(matrices, tracks);
             let columns = matrices.iter().flat_map(|matrix| {
                 let [x, y, z] = matrix.matrix3.to_cols_array_2d();
                 let at = matrix.translation;
@@ -181,7 +182,7 @@ pub(crate) fn sample(
             vec![("matrices", Array::F32(columns.collect()))]
         }
     };
-    if request.rate.is_some() {
+    if call.rate.is_some() {
         arrays.push(("times", Array::F64(timeline.times(0).collect())));
     }
     Ok(Answer::new(
@@ -190,15 +191,15 @@ pub(crate) fn sample(
     ))
 }
 
-fn pose(samples: Samples, request: &Request, tracks: usize) -> Vec<(&'static str, Array)> {
-    let rotations = request.ordered(samples.rotations, tracks);
+fn pose(samples: Samples, call: &SampleCall, tracks: usize) -> Vec<(&'static str, Array)> {
+    let rotations = call.ordered(samples.rotations, tracks);
     let mut arrays = vec![("rotations", Array::Quats(rotations))];
     for (name, vectors) in [
         ("translations", samples.translations),
         ("scales", samples.scales),
     ] {
         if !vectors.is_empty() {
-            arrays.push((name, Array::Vectors(request.ordered(vectors, tracks))));
+            arrays.push((name, Array::Vectors(call.ordered(vectors, tracks))));
         }
     }
     arrays

@@ -21,13 +21,13 @@ use crate::arrays::Order;
 use crate::device_array::DeviceArray;
 use crate::engine::MIN_DEVICE_ROTATIONS;
 use crate::errors::{device, guarded, input, of_engine, warn};
-use crate::options::{Request, SampleRequest};
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::output::{array, array_of, filled, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct OutputRequest {
+pub(crate) struct OutputForm {
     pub(crate) quantity: Quantity,
     pub(crate) encoding: Encoding,
     pub(crate) layout: Layout,
@@ -45,7 +45,7 @@ pub(crate) struct OutputRequest {
     pub(crate) is_one_track: bool,
 }
 
-impl Default for OutputRequest {
+impl Default for OutputForm {
     /// Rotations, x y z w, `[track][frame]`.
     fn default() -> Self {
         Self {
@@ -68,20 +68,20 @@ impl Default for OutputRequest {
 struct Work<'a> {
     engine: &'a Engine,
     clip: &'a Motion,
-    request: &'a Request,
+    request: &'a EvaluationKeywords,
     frames: &'a SampleTimes,
     /// Samples of a track.
     count: usize,
 }
 
-impl OutputRequest {
+impl OutputForm {
     /// Evaluates a clip into an array of NumPy's.
     pub(crate) fn of<'py>(
         &self,
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -101,18 +101,14 @@ impl OutputRequest {
         if self.on_card {
             self.check_on_card(samples, out.is_some(), along_skeleton)?;
         }
-        if along_skeleton
-            && matches!(
-                samples,
-                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
-            )
+        if along_skeleton && matches!(samples, SampleChoice::Each { .. } | SampleChoice::Ragged(_))
         {
             return Err(input(
                 "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
                  give one list of times for all tracks, or take the parent's axes",
             ));
         }
-        if let SampleRequest::Ragged(lists) = samples {
+        if let SampleChoice::Ragged(lists) = samples {
             if out.is_some() || self.layout == Layout::FrameMajor || lists.len() != tracks {
                 return Err(input(format!(
                     "at: lists of different lengths for {} tracks of {tracks}; their results are \
@@ -165,12 +161,12 @@ impl OutputRequest {
     /// The axes of a result whose values have the shape `each`.
     fn shape(
         &self,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         tracks: usize,
         count: usize,
         each: &[usize],
     ) -> Vec<usize> {
-        let is_one_time = matches!(samples, SampleRequest::Shared { is_one: true, .. });
+        let is_one_time = matches!(samples, SampleChoice::Shared { is_one: true, .. });
         let axes = match self.layout {
             Layout::TrackMajor => [(tracks, self.is_one_track), (count, is_one_time)],
             Layout::FrameMajor => [(count, is_one_time), (tracks, self.is_one_track)],
@@ -185,7 +181,7 @@ impl OutputRequest {
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -194,7 +190,7 @@ impl OutputRequest {
             ..*self
         };
         let samples = request.samples()?;
-        if matches!(samples, SampleRequest::Ragged(_)) {
+        if matches!(samples, SampleChoice::Ragged(_)) {
             let lists = rotations.of(py, engine, clip, request, out, inputs)?;
             let results = PyList::empty(py);
             for list in lists.try_iter()? {
@@ -216,12 +212,12 @@ impl OutputRequest {
     /// Refuses what is done on the host after the engine, or needs the host's memory.
     fn check_on_card(
         &self,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         has_out: bool,
         along_skeleton: bool,
     ) -> PyResult<()> {
         let refused = match samples {
-            SampleRequest::Ragged(_) => {
+            SampleChoice::Ragged(_) => {
                 "lists of times of different lengths give a list of arrays of NumPy's"
             }
             _ if has_out => "`out` is memory of the host's; leave it out",
@@ -404,7 +400,7 @@ impl OutputRequest {
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         lists: &[Vec<f64>],
     ) -> PyResult<Bound<'py, PyAny>> {
         let count: usize = lists.iter().map(Vec::len).sum();
@@ -422,7 +418,7 @@ impl OutputRequest {
                     let (of_track, rest) = bytes.split_at_mut(list.len() * size);
                     bytes = rest;
                     let one = track_of(clip, track)?;
-                    let samples = SampleRequest::Shared {
+                    let samples = SampleChoice::Shared {
                         times: list.as_slice().into(),
                         is_one: false,
                     };
@@ -538,7 +534,7 @@ const KEYS_OF_A_SAMPLE: usize = 2048;
 fn curve_warnings(
     py: Python<'_>,
     clip: &Arc<Motion>,
-    request: &Request,
+    request: &EvaluationKeywords,
     samples: usize,
 ) -> PyResult<Vec<Diagnostic>> {
     let rotations = samples.saturating_mul(clip.set.track_count());

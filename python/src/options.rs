@@ -21,7 +21,7 @@ use crate::names::{option_of, text, unknown_name, unknown_value};
 
 /// Which samples.
 #[derive(Debug, Clone)]
-pub(crate) enum SampleRequest {
+pub(crate) enum SampleChoice {
     /// Frames at a rate.
     Rate(FrameRate, Option<f64>, Option<f64>),
     /// One list of times for all tracks; a single time stands for a result without an axis of
@@ -35,15 +35,15 @@ pub(crate) enum SampleRequest {
 
 /// The keywords of an evaluation.
 #[derive(Debug, Clone)]
-pub(crate) struct Request {
+pub(crate) struct EvaluationKeywords {
     /// `None` without a rate and times.
-    pub(crate) samples: Option<SampleRequest>,
+    pub(crate) samples: Option<SampleChoice>,
     pub(crate) method: MethodChoice,
     options: InterpolationOptions,
     outside: Outside,
 }
 
-impl Request {
+impl EvaluationKeywords {
     /// Reads the keywords.
     pub(crate) fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut request = Self {
@@ -84,11 +84,8 @@ impl Request {
         request.options.after = request.outside.after.wrap_mode();
         request.samples = samples(rate, times, start, end)?;
         let leaves_out = request.outside.leaves_out();
-        let is_of_each = |samples: &SampleRequest| {
-            matches!(
-                samples,
-                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
-            )
+        let is_of_each = |samples: &SampleChoice| {
+            matches!(samples, SampleChoice::Each { .. } | SampleChoice::Ragged(_))
         };
         if leaves_out != [false; 2] && request.samples.as_ref().is_some_and(is_of_each) {
             let keyword = if leaves_out[0] { "before" } else { "after" };
@@ -101,7 +98,7 @@ impl Request {
     }
 
     /// The samples, of which there must be some.
-    pub(crate) fn samples(&self) -> PyResult<&SampleRequest> {
+    pub(crate) fn samples(&self) -> PyResult<&SampleChoice> {
         self.samples.as_ref().ok_or_else(none_asked_for)
     }
 
@@ -110,11 +107,11 @@ impl Request {
         self.outside
     }
 
-    /// As [`SampleRequest::frames`], without the times that are left out.
+    /// As [`SampleChoice::frames`], without the times that are left out.
     pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         let samples = self.samples()?;
         let rate = match samples {
-            &SampleRequest::Rate(rate, ..) => Some(rate),
+            &SampleChoice::Rate(rate, ..) => Some(rate),
             _ => None,
         };
         let kept = (self.outside()).kept(samples.frames(clip, tracks)?, rate, clip);
@@ -161,7 +158,7 @@ fn set_option(
     })
 }
 
-impl SampleRequest {
+impl SampleChoice {
     /// The samples of some tracks of a clip as the engine takes them.
     pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         let set = &clip.set;
@@ -219,7 +216,7 @@ pub(crate) fn samples_of(
     at: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<SampleRequest> {
+) -> PyResult<SampleChoice> {
     let finite = |name: &str, number: Option<f64>| match number {
         Some(number) if !number.is_finite() => {
             Err(input(format!("{name}: {number} is not finite")))
@@ -240,13 +237,13 @@ fn samples(
     times: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<Option<SampleRequest>> {
+) -> PyResult<Option<SampleChoice>> {
     match (rate, times) {
         (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
         (None, Some(_)) if start.is_some() || end.is_some() => {
             Err(input("`start` and `end` need `fps`; `at` lists all times"))
         }
-        (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
+        (Some(rate), None) => Ok(Some(SampleChoice::Rate(rate, start, end))),
         (None, Some(times)) => sample_times(&times).map(Some),
         (None, None) if start.is_some() || end.is_some() => {
             Err(input("`start` and `end` need `fps`; give it too"))
@@ -256,7 +253,7 @@ fn samples(
 }
 
 /// The times of `at`.
-pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleRequest> {
+pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleChoice> {
     if let Some(parts) = parts(value)? {
         let mut lists = Vec::with_capacity(parts.len());
         for part in &parts {
@@ -270,23 +267,23 @@ pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleRequest> 
         }
         let count = lists.first().map_or(0, Vec::len);
         if lists.iter().any(|list| list.len() != count) {
-            return Ok(SampleRequest::Ragged(lists));
+            return Ok(SampleChoice::Ragged(lists));
         }
         let times: Arc<[f64]> = lists.concat().into();
-        return Ok(SampleRequest::Each { times, count });
+        return Ok(SampleChoice::Each { times, count });
     }
     let ArrayValues { shape, values } = doubles(value, "at")?;
     let times: Arc<[f64]> = values.into();
     match *shape {
-        [] => Ok(SampleRequest::Shared {
+        [] => Ok(SampleChoice::Shared {
             times,
             is_one: true,
         }),
-        [_] => Ok(SampleRequest::Shared {
+        [_] => Ok(SampleChoice::Shared {
             times,
             is_one: false,
         }),
-        [_, count] => Ok(SampleRequest::Each { times, count }),
+        [_, count] => Ok(SampleChoice::Each { times, count }),
         _ => Err(input(format!(
             "at: its shape is {shape:?}; give one time, (frames,), or (tracks, frames)"
         ))),

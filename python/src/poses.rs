@@ -15,7 +15,7 @@ use tumble_formats::world::world;
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine};
-use crate::options::{Request, SampleRequest};
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::run::interruptible;
 
 /// Translations, rotations and scales relative to the parents.
@@ -92,12 +92,12 @@ fn samples(
     clip: &Bound<'_, Clip>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Samples, usize)> {
-    let request = Request::new(options)?;
+    let request = EvaluationKeywords::new(options)?;
     let motion = &clip.get().motion;
     let requested = request.samples()?;
     if !matches!(
         requested,
-        SampleRequest::Rate(..) | SampleRequest::Shared { .. }
+        SampleChoice::Rate(..) | SampleChoice::Shared { .. }
     ) {
         return Err(input("at: poses need the same times for all tracks"));
     }

@@ -34,7 +34,7 @@ use crate::engine::{default_engine, layout_named};
 use crate::errors::{expected, input, of_engine, of_output, of_write, warn};
 use crate::file::{File, format_named};
 use crate::names::option_named;
-use crate::options::{Request, SampleRequest};
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::run::interruptible;
 
 /// Rotations evaluated at once.
@@ -89,7 +89,7 @@ pub(crate) fn save(
     engine: Option<&Bound<'_, crate::engine::Engine>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<()> {
-    let request = Request::new(options)?;
+    let request = EvaluationKeywords::new(options)?;
     let clips = clips_of(clips)?;
     let ending = path.extension().and_then(|ending| ending.to_str());
     let Some(name) = format.or(ending) else {
@@ -206,16 +206,20 @@ struct Save {
     layout: Layout,
     end_frame: Option<EndFrame>,
     engine: Py<crate::engine::Engine>,
-    request: Request,
+    request: EvaluationKeywords,
     clips: Vec<Clip>,
     path: PathBuf,
 }
 
 /// The samples of a clip that are asked for.
-fn requested(clip: &Motion, request: &Request, end_frame: EndFrame) -> PyResult<FramesToEnd> {
+fn requested(
+    clip: &Motion,
+    request: &EvaluationKeywords,
+    end_frame: EndFrame,
+) -> PyResult<FramesToEnd> {
     let frames = request.frames(clip, None)?;
     let found = match *request.samples()? {
-        SampleRequest::Rate(rate, _, end) => {
+        SampleChoice::Rate(rate, _, end) => {
             let end = end.map(|end| clip.time_in_set(end));
             let end = request.outside().end(end, clip);
             FramesToEnd::new(clip, RateFrames { frames, rate, end }, end_frame)
@@ -265,12 +269,12 @@ impl Save {
                 None => self.keys(out, times),
             };
         };
-        if self.end_frame.is_some() && !matches!(samples, SampleRequest::Rate(..)) {
+        if self.end_frame.is_some() && !matches!(samples, SampleChoice::Rate(..)) {
             return Err(input("`end_frame` needs `fps`; `at` lists all times"));
         }
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
-            let SampleRequest::Rate(rate, None, None) = *samples else {
+            let SampleChoice::Rate(rate, None, None) = *samples else {
                 return Err(input(
                     "the animations of a file that is kept keep their lengths; leave out `at`, \
                      `start` and `end`, or write another format",

@@ -12,7 +12,7 @@ use tumble_formats::motion::Motion;
 
 use crate::arrays::{Order, numpy};
 use crate::errors::{input, of_engine};
-use crate::options::Request;
+use crate::options::EvaluationKeywords;
 use crate::output::{array, filled};
 use crate::run::{Job, stoppable};
 use crate::values::{Pickled, Value, pickled};
@@ -70,7 +70,7 @@ impl Chunks {
     pub(crate) fn new(
         engine: Engine,
         motion: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         chunk: usize,
         (order, layout): (Order, Layout),
     ) -> PyResult<Self> {

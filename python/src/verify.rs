@@ -6,7 +6,7 @@ use tumble::{Engine, Quantity, TrackGroup};
 use tumble_formats::motion::Motion;
 
 use crate::errors::of_engine;
-use crate::options::Request;
+use crate::options::EvaluationKeywords;
 use crate::values::{Pickled, pickled, value};
 
 /// What `Engine.verify` found.
@@ -52,7 +52,11 @@ value!(Verification {
 
 impl Verification {
     /// Verifies the tracks of each method, and puts together what was found.
-    pub(crate) fn of(engine: &Engine, clip: &Motion, request: &Request) -> PyResult<Self> {
+    pub(crate) fn of(
+        engine: &Engine,
+        clip: &Motion,
+        request: &EvaluationKeywords,
+    ) -> PyResult<Self> {
         let mut all = Self {
             method: request.method.name().to_owned(),
             device: None,

@@ -203,7 +203,7 @@ enum WorkSource<'g> {
     /// Segments for any sample times.
     Prepared(Cow<'g, Timeline>),
     /// Segments for the samples of the window.
-    PreparedWindow(PreparedWindow),
+    PreparedWindow(Box<PreparedWindow>),
     Planned(SetRequest<'g>, Plan),
 }
 
@@ -272,7 +272,7 @@ impl GroupedTracks {
             }
         }
         let limits = engine.machine.limits();
-        let plans = Plan::of_groups(&requests, window.layout, encoding, chunk, &limits);
+        let plans = Plan::of_groups(&requests, window, encoding, chunk, &limits);
         let planned = planned.into_iter().zip(requests).zip(plans);
         let planned = planned.map(|((group, request), plan)| GroupWork {
             group,
@@ -320,7 +320,7 @@ impl GroupedTracks {
                 && plan.chunks == Chunks::PreparedOnce
             {
                 let prepared = PreparedWindow::whole(&engine.machine, request);
-                *source = WorkSource::PreparedWindow(prepared.map_err(of_tracks)?);
+                *source = WorkSource::PreparedWindow(Box::new(prepared.map_err(of_tracks)?));
             }
         }
         let fill = |window: &Window, output: &mut [Quat]| {

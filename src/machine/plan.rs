@@ -178,31 +178,25 @@ impl Plan {
         Self::new(request, layout, encoding, stream, limits)
     }
 
-    /// Decides how the parts of a request are evaluated that have different interpolations: each has its plan. With
-    /// `chunk`, as a stream in chunks of so many values of all parts.
+    /// Decides how tracks with different interpolations are evaluated, which are some or all of a result: each request
+    /// has its plan. With `chunk`, the whole result is a stream in chunks of so many values.
     pub(crate) fn of_groups(
         requests: &[SetRequest<'_>],
-        layout: Layout,
+        whole: &Window,
         encoding: Encoding,
         chunk: Option<usize>,
         limits: &Limits,
     ) -> Vec<Self> {
-        let tracks: usize = requests.iter().map(|request| request.tracks.len()).sum();
-        let values: usize = requests.iter().map(SetRequest::len).sum();
-        let chunk = chunk.filter(|&chunk| chunk < values);
+        let chunk = chunk.filter(|&chunk| chunk < whole.len());
         // The segments of all groups exist at the same time.
         let bytes = requests.iter().map(bytes_of);
         let segment_bytes = bytes.fold(0, usize::saturating_add);
         let plan = |request: &SetRequest<'_>| {
             let stream = chunk.map(|chunk| Stream {
-                chunk: match layout {
-                    Layout::TrackMajor => chunk,
-                    // The group's part of the frames in a chunk.
-                    Layout::FrameMajor => (chunk / tracks.max(1)).max(1) * request.tracks.len(),
-                },
+                chunk,
                 segment_bytes,
             });
-            let mut plan = Self::new(request, layout, encoding, stream, limits);
+            let mut plan = Self::new(request, whole.layout, encoding, stream, limits);
             let are_many = request.tracks.len() > tracks_at_once(request.samples.len());
             if plan.chunks == Chunks::Single && are_many {
                 (plan.chunks, plan.pieces) = (Chunks::SomeTracks, Vec::new());

@@ -309,7 +309,7 @@ impl Clip {
     /// >>> clip.frames("30000/1001")
     /// 60
     fn frames(&self, fps: &Bound<'_, PyAny>) -> PyResult<usize> {
-        let rate = crate::options::SampleRequest::Rate(frame_rate(fps)?, None, None);
+        let rate = crate::options::SampleChoice::Rate(frame_rate(fps)?, None, None);
         Ok(rate.resolved(&self.motion)?.1)
     }
 

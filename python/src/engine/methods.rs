@@ -18,10 +18,10 @@ use crate::engine::{
     sequence_named,
 };
 use crate::errors::{guarded, input, of_engine};
-use crate::evaluate::OutputRequest;
+use crate::evaluate::OutputForm;
 use crate::follow;
 use crate::names::option_named;
-use crate::options::{Request, method_named, request_arrays, samples_of};
+use crate::options::{EvaluationKeywords, method_named, request_arrays, samples_of};
 use crate::output::{encoding_named, quaternions_of};
 use crate::poses;
 use crate::run::{interruptible, stoppable};
@@ -164,13 +164,13 @@ impl Engine {
         device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             order: Order::named(order)?,
             layout: layout_named(layout)?,
             as_rotation,
             on_card: device_array,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -195,13 +195,13 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = OutputRequest {
+        let result = OutputForm {
             quantity: Quantity::Velocity(axes),
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -223,13 +223,13 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = OutputRequest {
+        let result = OutputForm {
             quantity: Quantity::Acceleration(axes),
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -253,7 +253,7 @@ impl Engine {
         device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: match columns {
                 3 => Encoding::Matrix3x3(MatrixOrder::RowMajor),
                 4 => Encoding::Matrix3x4(MatrixOrder::RowMajor),
@@ -261,7 +261,7 @@ impl Engine {
             },
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -282,11 +282,11 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: Encoding::AxisAngle,
             radians: !degrees,
             layout: layout_named(layout)?,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -309,11 +309,11 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: Encoding::Euler(sequence_named(sequence)?),
             radians: !degrees,
             layout: layout_named(layout)?,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -333,10 +333,10 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = OutputRequest {
+        let result = OutputForm {
             as_vectors: true,
             layout: layout_named(layout)?,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -371,12 +371,12 @@ impl Engine {
             order: option_named(major, "major")?,
             sequence: sequence_named(sequence)?,
         };
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: encoding_named(encoding, with)?,
             radians: !degrees,
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -688,7 +688,7 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Chunks> {
-        let request = Request::new(options)?;
+        let request = EvaluationKeywords::new(options)?;
         let form = (Order::named(order)?, layout_named(layout)?);
         let motion = &clip.get().motion;
         let engine = self.engine_for(chunk)?;
@@ -759,7 +759,7 @@ impl Engine {
         clip: &Bound<'_, Clip>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Verification> {
-        let request = Request::new(options)?;
+        let request = EvaluationKeywords::new(options)?;
         let motion = &clip.get().motion;
         let (_, count) = request.resolved(motion)?;
         let engine = self.engine_for(motion.set.track_count() * count)?;
@@ -774,12 +774,12 @@ impl Engine {
     fn result<'py>(
         &self,
         clip: &Bound<'py, Clip>,
-        result: &OutputRequest,
+        result: &OutputForm,
         out: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         guarded(|| {
-            let request = Request::new(options)?;
+            let request = EvaluationKeywords::new(options)?;
             let engine = |rotations| self.engine_for(rotations);
             let inputs = request_arrays(options)?;
             let inputs: Vec<_> = inputs.iter().collect();

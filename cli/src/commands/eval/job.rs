@@ -21,7 +21,7 @@ use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
-use crate::arguments::time::{ClipFrames, SampleRequest};
+use crate::arguments::time::{ClipFrames, SampleChoice};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
@@ -68,7 +68,7 @@ impl EvaluationReport {
 /// Evaluates all that a pipeline has; gives the number of rotations in the results that are kept.
 pub(super) fn evaluate_all(
     arguments: &Arguments,
-    samples: &SampleRequest,
+    samples: &SampleChoice,
     device: &mut OpenedDevice,
     pipeline: &mut Pipeline<'_>,
 ) -> u64 {
@@ -95,7 +95,7 @@ pub(super) fn evaluate_all(
 struct EvaluationJob<'a> {
     arguments: &'a Arguments,
     device: &'a mut OpenedDevice,
-    samples: &'a SampleRequest,
+    samples: &'a SampleChoice,
     work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
@@ -363,7 +363,7 @@ impl EvaluationJob<'_> {
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (
             Some(document),
-            &SampleRequest::Rate {
+            &SampleChoice::Rate {
                 rate,
                 start: None,
                 end: None,

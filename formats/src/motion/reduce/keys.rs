@@ -6,9 +6,9 @@ use tumble::reduce::{
 };
 use tumble::{Channel, Layout, SampleTimes, TrackError, TrackSet};
 
+use crate::motion::reduce::{ReduceMotionError, Reduction, Tolerances};
+use crate::motion::sample::ChannelMethods;
 use crate::motion::{ChannelInterpolation, Channels, Motion};
-use crate::reduce::{ReduceMotionError, Reduction, Tolerances};
-use crate::sample::ChannelMethods;
 
 /// The largest error in radians that an f32 evaluation adds to an angle.
 const ROUNDING: f64 = 4e-7;

@@ -1,8 +1,8 @@
 //! Which rule for the end a result has: the one that is asked for, if the result can store it, or the default.
 
-use crate::end_frame::EndFrame;
 use crate::feature::Feature;
 use crate::format::{Document, Format, FormatOption};
+use crate::motion::end_frame::EndFrame;
 
 /// A new result of samples.
 #[derive(Debug, Clone, Copy)]

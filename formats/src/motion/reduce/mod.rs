@@ -15,9 +15,9 @@ use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError};
 
 use crate::format::Quantization;
+use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::world::{HierarchyError, WorldPose, parents_first, world};
 use crate::motion::{ChannelInterpolation, Motion, carry_key_data};
-use crate::sample::{ChannelMethods, Samples};
-use crate::world::{HierarchyError, WorldPose, parents_first, world};
 
 /// The bounds and options of a reduction.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,9 +3,9 @@
 use glam::Vec3;
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet, signs_differ};
 
+use crate::motion::sample::ChannelMethods;
 use crate::motion::{Motion, carry_key_data};
 use crate::rate::{Precision, on_frames};
-use crate::sample::ChannelMethods;
 
 /// Why a part of a clip cannot be cut out.
 #[derive(Debug, thiserror::Error)]

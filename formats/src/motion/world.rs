@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3, Quat, Vec3};
 
 use crate::motion::Motion;
-use crate::sample::Samples;
+use crate::motion::sample::Samples;
 
 /// A joint's pose in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]

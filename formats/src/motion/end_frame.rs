@@ -14,8 +14,8 @@ use tumble::{Engine, Error, FrameRate, Layout, SampleTimes, Timeline};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::Motion;
-use crate::sample::{ChannelMethods, Samples};
-use crate::signs::continue_signs;
+use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::signs::continue_signs;
 
 pub use result::{EndFrameError, SampledKind, SampledResult};
 

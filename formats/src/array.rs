@@ -1,6 +1,6 @@
-//! The header of an NPY array: element type, order and shape.
+//! Arrays of numbers, and the header of an NPY array: element type, order and shape.
 //!
-//! It is parsed here, not by a crate, because the header of a damaged or hostile file can contain anything: the crate
+//! The header is parsed here, not by a crate, because the header of a damaged or hostile file can contain anything: the crate
 //! `npyz` multiplies shapes without checking their size, allocates memory by the length that a header claims for
 //! itself, and parses nested brackets twice at each level. Tests read the written headers with it.
 
@@ -11,6 +11,15 @@ const LONGEST: usize = 1 << 16;
 
 /// The largest number of bytes before the numbers.
 pub(crate) const LONGEST_START: usize = LONGEST + 12;
+
+/// The numbers of an NPY file, without their meaning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NumberArray {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// All numbers; the last axis is the fastest.
+    pub values: Vec<f64>,
+}
 
 /// The type, order and shape of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,9 +4,9 @@ use glam::DQuat;
 use serde::Serialize;
 use tumble::reference::angle_between;
 
-use crate::compare::CompareError;
-use crate::compare::tally::{Spread, Tally};
-use crate::npz::NumberArray;
+use crate::array::NumberArray;
+use crate::motion::compare::CompareError;
+use crate::motion::compare::tally::{Spread, Tally};
 
 /// Largest difference from 1 of the norm of a rotation: results in 16 bits still count as rotations.
 const UNIT: f64 = 1e-2;

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec3};
 use tumble::{Channel, JointMatchError, JointPairs, Joints, TrackError, TrackSet};
 
-use crate::adjust::{OffsetsError, set_offsets};
+use crate::motion::adjust::{OffsetsError, set_offsets};
 use crate::motion::{Joint, Motion, Transform};
 
 /// The joints of a library of clips.

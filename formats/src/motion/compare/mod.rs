@@ -7,17 +7,17 @@ mod tally;
 
 use tumble::{Error, JointMatchError};
 
-use crate::world::HierarchyError;
+use crate::motion::world::HierarchyError;
 
-pub use crate::compare::arrays::ArrayDifference;
-pub use crate::compare::clips::{
+pub use crate::motion::compare::arrays::ArrayDifference;
+pub use crate::motion::compare::clips::{
     ChannelDifference, ClipDifference, ClipPair, CommonTimes, JointDifference, MatchedTracks,
     TimedSpread,
 };
-pub use crate::compare::paths::{
+pub use crate::motion::compare::paths::{
     AlignmentSummary, PathDifference, PathErrors, PathMeasure, PathStatistics,
 };
-pub use crate::compare::tally::Spread;
+pub use crate::motion::compare::tally::Spread;
 
 fn hint(near: Option<&[String; 2]>) -> String {
     near.map_or_else(String::new, |[first, second]| {

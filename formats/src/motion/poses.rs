@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use glam::DVec3;
 use tumble::{Timeline, TrackSet};
 
+use crate::array::{ArrayHeader, Element};
 use crate::decimal::time_text;
-use crate::npz::header::{ArrayHeader, Element};
-use crate::origin::coordinate;
+use crate::motion::origin::coordinate;
 use crate::text::cell::text_cell;
 
 /// Names of the components of a local transform: translation, rotation, scale.

@@ -3,14 +3,14 @@
 use serde::Serialize;
 use tumble::{Engine, SampleTimes, method};
 
-use crate::compare::CompareError;
-use crate::compare::clips::check_known_parents;
 use crate::motion::Motion;
-use crate::sample::ChannelMethods;
-use crate::trajectory::{
+use crate::motion::compare::CompareError;
+use crate::motion::compare::clips::check_known_parents;
+use crate::motion::sample::ChannelMethods;
+use crate::motion::trajectory::{
     Align, Alignment, Associate, Errors, Pose, Statistics, Step, Undetermined,
 };
-use crate::world::world;
+use crate::motion::world::world;
 
 /// How an estimate is compared with its reference.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -5,9 +5,9 @@ use tumble::{Channel, Device, Engine, Error};
 
 use crate::feature::Feature;
 use crate::format::Format;
+use crate::motion::sample::Samples;
+use crate::motion::signs::continue_signs;
 use crate::motion::{ChannelInterpolation, Motion};
-use crate::sample::Samples;
-use crate::signs::continue_signs;
 
 /// Why the keys of a clip cannot serve as samples.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -5,8 +5,8 @@ use tumble::{
     SmoothingKernel, TrackError, Vectors,
 };
 
+use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::{ChannelInterpolation, Motion};
-use crate::sample::{ChannelMethods, Samples};
 
 /// Why a clip cannot be smoothed.
 #[derive(Debug, thiserror::Error)]

@@ -7,12 +7,12 @@ use serde::Serialize;
 use tumble::reference::angle_between;
 use tumble::{Channel, Engine, FrameRate, JointMatchError, JointPairs, Joints, SampleTimes};
 
-use crate::compare::CompareError;
-use crate::compare::tally::{Spread, Tally};
 use crate::motion::Motion;
+use crate::motion::compare::CompareError;
+use crate::motion::compare::tally::{Spread, Tally};
+use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::world::world;
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
-use crate::sample::{ChannelMethods, Samples};
-use crate::world::world;
 
 /// Time spans whose ends differ by less than this are equal, in seconds: f32 times of some hours are not more exact.
 const SAME_END: f64 = 1e-3;

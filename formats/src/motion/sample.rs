@@ -9,8 +9,8 @@ use tumble::{
     Method, PerTrack, SampleTimes, UnknownNameError, VectorMethod, method,
 };
 
+use crate::motion::signs::continue_signs;
 use crate::motion::{ChannelInterpolation, Channels, Motion, SampledClip};
-use crate::signs::continue_signs;
 
 /// A method for every channel that is not STEP; `None`: as each channel's sampler says, and
 /// [`method::BESSEL_OVERHAUSER`] where the file names none.

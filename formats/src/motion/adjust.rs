@@ -97,7 +97,7 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
 pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, TrackError> {
     let mut adjusted = clip.without_tracks();
     let ends = adjusted
-        .bvh
+        .written_joints
         .iter_mut()
         .flat_map(|joint| &mut joint.end_sites);
     for end in ends {

@@ -1,21 +1,21 @@
-//! The BVH data of joints that their rotations and translations do not determine.
+//! How a file wrote a joint, as far as its rotations and translations do not determine it.
 
 use std::fmt;
 
 use glam::Vec3;
 
-/// The BVH channels and End Sites of a joint.
+/// The channels and End Sites of a joint, as BVH has them.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct BvhJoint {
+pub struct WrittenJoint {
     /// The channels of the joint, in the order of their numbers in the row of a frame.
-    pub channels: Vec<BvhChannel>,
+    pub channels: Vec<WrittenChannel>,
     /// The positions of its End Sites relative to the joint, in the file's units.
     pub end_sites: Vec<Vec3>,
 }
 
-/// A BVH channel, one number of a row. Its axis is 0 for x, 1 for y, 2 for z.
+/// A channel of a joint, one number of a row of BVH. Its axis is 0 for x, 1 for y, 2 for z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum BvhChannel {
+pub enum WrittenChannel {
     /// `Xposition`, a coordinate.
     Position(usize),
     /// `Xrotation`, an angle in degrees.
@@ -24,7 +24,7 @@ pub enum BvhChannel {
 
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 
-impl BvhChannel {
+impl WrittenChannel {
     /// The channel with this name; case is ignored.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
@@ -49,7 +49,7 @@ impl BvhChannel {
     }
 }
 
-impl fmt::Display for BvhChannel {
+impl fmt::Display for WrittenChannel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (axis, kind) = match self {
             Self::Position(axis) => (axis, "position"),
@@ -59,7 +59,7 @@ impl fmt::Display for BvhChannel {
     }
 }
 
-impl BvhJoint {
+impl WrittenJoint {
     /// The names of the channels in one text: `Zrotation Xrotation Yrotation`.
     pub(crate) fn channels_text(&self) -> String {
         let names: Vec<String> = self.channels.iter().map(ToString::to_string).collect();
@@ -67,10 +67,10 @@ impl BvhJoint {
     }
 
     /// Parses the names of channels; `None` if a name is unknown or occurs twice.
-    pub(crate) fn channels_of(text: &str) -> Option<Vec<BvhChannel>> {
+    pub(crate) fn channels_of(text: &str) -> Option<Vec<WrittenChannel>> {
         let mut channels = Vec::new();
         for name in text.split_ascii_whitespace() {
-            let channel = BvhChannel::named(name)?;
+            let channel = WrittenChannel::named(name)?;
             if channels.contains(&channel) {
                 return None;
             }
