@@ -222,7 +222,7 @@ pub mod vulkan {
 
     pub use crate::device::VulkanDevice;
     #[cfg(feature = "prove")]
-    pub use crate::gpu::engine::choices::EngineChoices;
+    pub use crate::gpu::engine::figures::EngineChoices;
     #[cfg(feature = "prove")]
     pub use crate::gpu::physical::details::{
         DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
@@ -235,11 +235,11 @@ pub mod vulkan {
     pub use crate::shader::kernels;
     #[cfg(feature = "vulkan")]
     pub use crate::{
-        gpu::clip_target::ClipTarget,
+        gpu::clip::ClipTarget,
         gpu::crowd::CrowdTarget,
-        gpu::exported::ExportedResult,
+        gpu::external::ExportedResult,
         gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue},
-        gpu::pass_target::PassTarget,
+        gpu::passes::PassTarget,
         pose::pass::{PassRequest, PosePass},
     };
 

@@ -8,7 +8,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanHandles;
-use crate::gpu::recovery::Opened;
+use crate::gpu::opened::Opened;
 use crate::machine::options::EngineOptions;
 
 impl Engine {

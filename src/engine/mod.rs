@@ -21,7 +21,7 @@ use crate::error::Error;
 use crate::evaluate;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
-use crate::gpu::engine::choices::EngineChoices;
+use crate::gpu::engine::figures::EngineChoices;
 #[cfg(feature = "prove")]
 use crate::gpu::physical::details::DeviceDetails;
 use crate::machine::Machine;

@@ -41,11 +41,14 @@ pub(crate) enum Uploaded {
     /// Prepared for any timeline.
     Prepared(Box<dyn MachineClip>),
     /// A set that every evaluation prepares anew, because its segments exceed the engine's memory limit.
-    Unprepared {
-        set: TrackSet,
-        /// What is known without segments.
-        data: ClipData,
-    },
+    Unprepared(Box<UnpreparedSet>),
+}
+
+/// A set without segments.
+pub(crate) struct UnpreparedSet {
+    set: TrackSet,
+    /// What is known without segments.
+    data: ClipData,
 }
 
 impl Uploaded {
@@ -78,14 +81,14 @@ impl Uploaded {
         interpolation: Interpolation,
     ) -> Result<Self, EvaluateError> {
         let data = ClipData::unprepared(&set, interpolation).map_err(SetError::from)?;
-        Ok(Self::Unprepared { set, data })
+        Ok(Self::Unprepared(Box::new(UnpreparedSet { set, data })))
     }
 
     /// The segments, or what is known without them.
     pub(crate) fn data(&self) -> &ClipData {
         match self {
             Self::Prepared(clip) => clip.data(),
-            Self::Unprepared { data, .. } => data,
+            Self::Unprepared(unprepared) => &unprepared.data,
         }
     }
 
@@ -93,7 +96,7 @@ impl Uploaded {
     pub(crate) fn unprepared(&self) -> Option<&TrackSet> {
         match self {
             Self::Prepared(_) => None,
-            Self::Unprepared { set, .. } => Some(set),
+            Self::Unprepared(unprepared) => Some(&unprepared.set),
         }
     }
 
@@ -101,7 +104,8 @@ impl Uploaded {
     pub(crate) fn prepared(&self) -> Result<&dyn MachineClip, EvaluateError> {
         match self {
             Self::Prepared(clip) => Ok(&**clip),
-            Self::Unprepared { set, data } => {
+            Self::Unprepared(unprepared) => {
+                let UnpreparedSet { set, data } = &**unprepared;
                 let needed = segment_bytes(set, &data.interpolation);
                 Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into())
             }

@@ -13,7 +13,7 @@
 //! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands,
 //!   a fence and a recording that are reused;
 //! * [`VulkanEngine`](engine::VulkanEngine): a device with its pipelines, and buffers kept for the next call;
-//! * [`Opened`](recovery::Opened): the device for the rest of the crate, a [`Machine`](crate::machine::Machine). It has
+//! * [`Opened`](opened::Opened): the device for the rest of the crate, a [`Machine`](crate::machine::Machine). It has
 //!   the current `VulkanEngine`, opens a lost device again, and repeats work that ran out of memory in smaller windows.
 //!
 //! # Steps
@@ -22,8 +22,8 @@
 //!    ([`ClipBuffers`](clip::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
-//! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples, or a grid;
-//!    [`kept_lists`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
+//! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples,
+//!    or a grid; [`clip`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
 //! 4. The copies of the lists and a dispatch for each group of segments become a
 //!    [`Recording`](crate::work::recording::Recording), which [`recorded`] writes into commands with the barriers that
 //!    it needs; [`submission`] submits them.
@@ -31,18 +31,17 @@
 //!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
-//! tables and targets ([`crowd`]).
-//! [`clip_target`] records a clip into an application's commands, and [`pass_target`] records passes over poses from
-//! buffer to buffer.
+//! tables and targets ([`crowd`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands;
+//! [`passes`] runs passes over poses, or records them from buffer to buffer.
 //!
 //! # Memory
 //!
 //! | what | memory |
 //! |---|---|
 //! | segments, constants, tables of crowds | device memory |
-//! | lists and keys | device memory if the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied to it, or read in host memory |
-//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else device memory, copied by the second queue beside later kernels |
-//! | results for CUDA | device memory, exported as a file descriptor ([`exported`]) |
+//! | lists and keys | device memory if the host can write it ([`UploadMemory`](upload::UploadMemory)), else copied to it, or read in host memory |
+//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`external`]); else device memory, copied by the second queue beside later kernels |
+//! | results for CUDA | device memory, exported as a file descriptor ([`external`]) |
 //!
 //! Small buffers share allocations of 4 MiB ([`SharedMemory`](shared_memory::SharedMemory)).
 //!
@@ -52,29 +51,21 @@
 //! stored ([`cache`](crate::machine::cache)).
 #![allow(unsafe_code)]
 
-#[cfg(feature = "prove")]
-pub(crate) mod application;
 pub(crate) mod buffer;
 pub(crate) mod clip;
-pub(crate) mod clip_target;
 pub(crate) mod crowd;
 pub(crate) mod device;
-pub(crate) mod device_queue;
 pub(crate) mod engine;
-pub(crate) mod exported;
+pub(crate) mod external;
 pub(crate) mod handles;
-pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
-pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
-mod machine;
-pub(crate) mod pass_target;
+pub(crate) mod opened;
+pub(crate) mod passes;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
-pub(crate) mod pipeline_cache;
 pub(crate) mod recorded;
-pub(crate) mod recovery;
 pub(crate) mod run_once;
 pub(crate) mod self_test;
 pub(crate) mod shared_memory;

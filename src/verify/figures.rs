@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use crate::device::VulkanDevice;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::gpu::application::{ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::gpu::physical::DeviceKind;
 use crate::machine::options::EngineOptions;
 use crate::method::{self, Method};
@@ -14,6 +13,7 @@ use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::time::frames::SampleTimes;
+use crate::verify::application::{ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::verify::golden::GoldenError;
 use crate::verify::renderer::{Renderer, record, record_clip};
 use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, shared_set};
@@ -155,7 +155,7 @@ impl Bench {
     fn rate(
         &mut self,
         bytes: u64,
-        commands: impl Fn(&crate::gpu::application::Application, ash::vk::CommandBuffer),
+        commands: impl Fn(&crate::verify::application::Application, ash::vk::CommandBuffer),
     ) -> Result<f64, Error> {
         let application = &mut self.renderer.application;
         let (_, runs) = measured(|| {

@@ -2,6 +2,8 @@
 //!
 //! Verification does not rely on the engine's reports about itself. The reference shares no code with the kernels.
 
+#[cfg(feature = "prove")]
+mod application;
 mod comparison;
 #[cfg(feature = "prove")]
 pub mod figures;

@@ -9,12 +9,11 @@ use glam::Quat;
 
 use crate::from_keys::KeyCurve;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::imported_memory::ImportedMemory;
+use crate::gpu::external::ImportedMemory;
 use crate::gpu::in_flight::{Finish, InFlight, Target};
-use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::Binding;
-use crate::gpu::upload::Upload;
+use crate::gpu::upload::{KernelReads, Upload};
 use crate::machine::error::EvaluateError;
 use crate::output::encoding::Encoding;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};

@@ -2,12 +2,9 @@
 
 mod arcs;
 #[cfg(feature = "prove")]
-pub(crate) mod choices;
+pub(crate) mod figures;
 pub(crate) mod from_keys;
-mod poses;
 pub(crate) mod run;
-#[cfg(feature = "prove")]
-pub(crate) mod write_rates;
 
 use std::mem::take;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,22 +15,18 @@ use glam::Quat;
 
 use crate::cpu::engine::CpuEngine;
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::clip::{ClipBuffers, Job};
-use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::device_queue::DeviceQueue;
+use crate::gpu::clip::{ClipBuffers, Job, WorkLists};
+use crate::gpu::device::{DeviceQueue, LogicalDevice, QueueLane};
 use crate::gpu::engine::from_keys::KeyUploads;
 use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
-use crate::gpu::kept_lists::WorkLists;
 use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::physical::PhysicalDevice;
-use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::gpu::pipeline_cache::PipelineCache;
+use crate::gpu::pipeline::{Exactness, Pipeline, PipelineCache};
 use crate::gpu::submission::Submission;
-use crate::gpu::upload::writable;
+use crate::gpu::upload::{KernelReads, writable};
 use crate::machine::error::calls::Named as _;
 use crate::machine::error::{EvaluateError, VulkanError};
 use crate::machine::options::{EngineOptions, Timings, Transfer};

@@ -4,7 +4,7 @@
 
 use crate::error::Error;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::pass_target::PassTarget;
+use crate::gpu::passes::PassTarget;
 use crate::pose::pass::PassRequest;
 
 impl PassRequest<'_> {

@@ -7,8 +7,8 @@ use glam::Quat;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::pass_target::{PassJob, PassShape, VALUE};
-use crate::gpu::recovery::Opened;
+use crate::gpu::opened::Opened;
+use crate::gpu::passes::{PassJob, PassShape, VALUE};
 use crate::output::pose_error::{
     OFFSET_STEP, PassOperand, PoseError, check_fraction, check_references, check_skeleton,
     check_weights,
@@ -21,7 +21,7 @@ use crate::pose::skeleton::Skeleton;
 ///
 /// Each input is a range of a buffer with four f32 for each rotation, as
 /// [`Request::to_buffer`](crate::engine::clip::request::Request::to_buffer) and
-/// [`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record) write it. Ranges start at multiples of 256
+/// [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record) write it. Ranges start at multiples of 256
 /// bytes, layers of a blend at multiples of 16. Layers of a blend that are contiguous in one buffer, from a multiple
 /// of 256 bytes on, are read directly; others are copied into one buffer first.
 #[derive(Debug, Clone, Copy)]
@@ -100,7 +100,7 @@ impl Engine {
     ///
     /// [`PassRequest::to_buffer`] runs it at once. [`PassRequest::target`] prepares it for recording into the
     /// application's commands, after the samples of clips
-    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)) and before the draw calls.
+    /// ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)) and before the draw calls.
     /// `examples/application_device.rs` evaluates two clips, mixes them and evaluates their skeleton in one
     /// submission.
     pub fn pass<'a>(

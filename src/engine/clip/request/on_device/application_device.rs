@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use crate::engine::clip::request::{Request, RequestPart};
 use crate::error::Error;
-use crate::gpu::clip::Job;
-use crate::gpu::clip_target::ClipTarget;
+use crate::gpu::clip::{ClipTarget, Job};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::machine::error::VulkanError;

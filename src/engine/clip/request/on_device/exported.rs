@@ -6,7 +6,7 @@ use crate::engine::clip::request::Request;
 use crate::error::Error;
 use crate::gpu::clip::Job;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::exported::{Exported, ExportedResult};
+use crate::gpu::external::{Exported, ExportedResult};
 use crate::gpu::in_flight::Target;
 use crate::machine::error::EvaluateError;
 use crate::memory::OutOfMemoryError;

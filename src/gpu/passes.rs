@@ -1,9 +1,9 @@
-//! Passes over poses, recorded from buffers of an application into another of its buffers, with all resources
-//! prepared once.
+//! Passes over poses on a device: of the host, and recorded from buffers of an application into another of its buffers.
 
 use std::sync::Arc;
 
 use ash::vk;
+use bytemuck::cast_slice;
 use glam::Quat;
 
 use crate::gpu::buffer::{Buffer, Residence};
@@ -11,12 +11,15 @@ use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::gpu::run_once::run_once;
 use crate::gpu::submission::Submission;
 use crate::machine::error::{EvaluateError, VulkanError};
+use crate::machine::poses::{Pass, PassRunner, SampleRows};
 use crate::memory::reserved;
 use crate::output::pose_error::{OFFSET_STEP, PoseError, check_fraction, check_weights};
 use crate::output::rotations::Layout;
 use crate::shader::{Kernel, Link, PoseDispatch};
+use crate::smooth::rows::{SampleRow, SmoothingPass};
 use crate::work::recording::{Resource, Slice, workgroups};
 
 /// Bytes of a rotation, and of every other value that passes read or write.
@@ -293,7 +296,7 @@ impl PassTarget {
     /// Recording neither waits nor allocates. It records the weights, whose values stay in the commands, and one
     /// dispatch; for poses that are added frame by frame one dispatch for each 65 536 values; and before a blend a
     /// copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of a clip
-    /// ([`ClipTarget::record`](crate::gpu::clip_target::ClipTarget::record)): the pass waits for all commands
+    /// ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)): the pass waits for all commands
     /// recorded before it, and later commands see the result. The commands may be submitted any number of times.
     ///
     /// # Safety
@@ -335,6 +338,143 @@ impl std::fmt::Debug for PassTarget {
             .field("bytes", &self.bytes)
             .finish_non_exhaustive()
     }
+}
+
+impl PassRunner for VulkanEngine {
+    fn window(&self) -> usize {
+        self.window()
+    }
+
+    fn run(&self, pass: &Pass<'_>, output: &mut [[f32; 4]]) -> Result<(), EvaluateError> {
+        let count = output.len();
+        Ok(match *pass {
+            Pass::Blend { layers, weights } => {
+                let inputs = [cast_slice(layers), cast_slice(weights)];
+                run_pass(
+                    self,
+                    Kernel::PosesBlend,
+                    &inputs,
+                    [count, weights.len()],
+                    output,
+                )
+            }
+            Pass::Mix { from, to, weight } => {
+                let weight = [weight];
+                let inputs = [cast_slice(from), cast_slice(to), cast_slice(&weight)];
+                run_pass(self, Kernel::PosesMix, &inputs, [count, 0], output)
+            }
+            Pass::Add {
+                base,
+                layer,
+                references,
+            } => {
+                let inputs = [base, layer, references].map(cast_slice);
+                run_pass(self, Kernel::PosesAdd, &inputs, [count, 0], output)
+            }
+            Pass::World { local, links } => {
+                let inputs = [cast_slice(local), cast_slice(links)];
+                let counts = [local.len() / links.len(), links.len()];
+                run_pass(self, Kernel::PosesWorld, &inputs, counts, output)
+            }
+        }?)
+    }
+
+    /// Smooths as many tracks at once as one pass can process. The host writes the steps outside the ends of rows.
+    fn smooth(
+        &self,
+        all: &SampleRows<'_>,
+        pass: &SmoothingPass<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), EvaluateError> {
+        if pass.weights.is_empty() {
+            return self.host.smooth(all, pass, output);
+        }
+        let (limit, radius) = (self.window().max(2), pass.weights.len());
+        let detail = usize::from(pass.are_rotations);
+        let stride = all.samples - 1 + 2 * radius;
+        // Between rows that are smoothed at once the kernel runs over the values beyond their ends too:
+        // more than the rows themselves where it is wider than they are long.
+        let each = match 2 * radius > all.samples {
+            true => 1,
+            false => (limit / stride).max(1),
+        };
+        for first in (0..all.tracks).step_by(each) {
+            let rows: Vec<SampleRow<'_>> = (first..all.tracks.min(first + each))
+                .map(|track| all.row(track))
+                .collect();
+            let samples = rows
+                .iter()
+                .flat_map(|row| (0..row.count).map(|i| row.get(i)));
+            let values: Vec<[f32; 4]> = samples.collect();
+            // A step from one row to the next is found too, and not used.
+            let mut steps = vec![[0.0; 4]; values.len() - 1];
+            for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
+                let values = &values[first..=first + output.len()];
+                let counts = [output.len(), detail];
+                run_pass(
+                    self,
+                    Kernel::PosesSteps,
+                    &[cast_slice(values)],
+                    counts,
+                    output,
+                )?;
+            }
+            let mut padded = Vec::with_capacity(rows.len() * stride);
+            let mut spaced = Vec::with_capacity(rows.len() * stride);
+            for (values, first) in values.chunks(all.samples).zip((0..).step_by(all.samples)) {
+                let before = (0..stride).map(|step| step as isize - radius as isize);
+                padded.extend(before.map(|step| steps[first + pass.step_at(step, all.samples)]));
+                spaced.extend_from_slice(values);
+                spaced.resize(padded.len(), [0.0; 4]);
+            }
+            let mut found = vec![[0.0; 4]; spaced.len() - stride + all.samples];
+            let block = limit.saturating_sub(2 * radius).max(1);
+            for (first, output) in (0..).step_by(block).zip(found.chunks_mut(block)) {
+                let steps = &padded[first..first + output.len() + 2 * radius - 1];
+                let values = &spaced[first..first + output.len()];
+                let inputs = [
+                    cast_slice(values),
+                    cast_slice(steps),
+                    cast_slice(pass.weights),
+                ];
+                let counts = [output.len(), 2 * radius + detail];
+                run_pass(self, Kernel::PosesSmooth, &inputs, counts, output)?;
+            }
+            for (row, start) in rows.iter().zip((0..).step_by(stride)) {
+                for sample in 0..all.samples {
+                    let mut value = found[start + sample];
+                    if pass.are_rotations && value == [0.0; 4] {
+                        let center = (start + sample + radius) as isize;
+                        value = pass.smoothed_in_f64(row.get(sample), |step| {
+                            let [x, y, z, _] = padded[(center + step) as usize];
+                            [x, y, z]
+                        });
+                    }
+                    output[row.first + sample * row.stride] = value;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Runs the kernel of a pass with these inputs, each of at most as many values of 16 bytes as a window has
+/// rotations. The kernel has `count` invocations and the parameter `detail`.
+fn run_pass(
+    engine: &VulkanEngine,
+    kernel: Kernel,
+    inputs: &[&[u8]],
+    [count, detail]: [usize; 2],
+    output: &mut [[f32; 4]],
+) -> Result<(), VulkanError> {
+    let output = bytemuck::cast_slice_mut(output);
+    for bytes in inputs.iter().copied().chain([&*output]) {
+        engine.check_size("poses", bytes)?;
+    }
+    let [count, detail] = [count as u32, detail as u32];
+    let (pipeline, groups) = (engine.pipeline(kernel)?, workgroups(count));
+    let pass = PoseDispatch { count, detail };
+    run_once(&pipeline, inputs, bytemuck::bytes_of(&pass), groups, output)
 }
 
 #[cfg(test)]

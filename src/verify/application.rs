@@ -1,6 +1,7 @@
 //! A device as an application makes it: an instance of Vulkan 1.1, a queue that computes, a queue that only copies
 //! (if the device has one), and the application's buffers and commands. The proof of a device
-//! ([`verify::renderer`](crate::verify::renderer)) runs the engine on it, and measures with its time stamps.
+//! ([`renderer`](crate::verify::renderer)) runs the engine on it, and measures with its time stamps.
+#![allow(unsafe_code)]
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
