@@ -136,6 +136,9 @@ struct Places {
 /// Trials with a mistake before functions are called with it; most mistakes are found by the first one.
 const TRIALS_FIRST: usize = 8;
 
+/// Functions that are called with a mistake, the simplest ones in which it is.
+const FUNCTIONS: usize = 3;
+
 /// The check's inputs and the functions' arguments reach every part of every kernel: a mistake anywhere is found.
 #[test]
 fn a_mistake_anywhere_is_found() {
@@ -174,7 +177,7 @@ fn a_mistake_anywhere_is_found() {
         let (first, others) = places
             .trials
             .split_at(places.trials.len().min(TRIALS_FIRST));
-        let mut called = places.functions.iter();
+        let mut called = places.functions.iter().take(FUNCTIONS);
         first.iter().any(differs)
             || called.any(|&i| returns_else(rule, &functions[i], &returned[i]))
             || others.iter().any(differs)
