@@ -22,7 +22,7 @@ module() {
 
 # What decides the module's border and its bits; a test of the program compares it (cli/tests/view_live.rs).
 sources() {
-    cat npm/Cargo.toml npm/src/*.rs formats/src/packed.rs formats/src/sample.rs formats/src/world.rs \
+    cat npm/Cargo.toml npm/src/*.rs formats/src/motion/{packed,sample,world}.rs \
         src/verify/golden.txt | sha1sum | cut -d ' ' -f 1
 }
 if [ "${1:-}" = --page ]; then

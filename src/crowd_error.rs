@@ -1,7 +1,7 @@
 //! Errors of crowds. Indices count from 0.
 
 use crate::curve::options::InterpolationError;
-use crate::gpu::error::VulkanError;
+use crate::machine::error::VulkanError;
 use crate::memory::OutOfMemoryError;
 use crate::output::pose_error::OFFSET_STEP;
 use crate::prepare::error::SetError;

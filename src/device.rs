@@ -1,8 +1,12 @@
 //! Devices on which engines evaluate.
 
-use crate::gpu;
-use crate::gpu::error::VulkanError;
-use crate::gpu::physical::{DeviceInfo, DeviceKind, PhysicalDevice};
+use std::sync::Arc;
+
+#[cfg(feature = "vulkan")]
+use crate::gpu::physical::listed;
+use crate::machine::ListedDevice;
+use crate::machine::error::VulkanError;
+use crate::machine::reports::{DeviceInfo, DeviceKind};
 
 /// The device on which an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
@@ -16,14 +20,14 @@ pub enum Device {
 /// A Vulkan device, not yet opened.
 #[derive(Clone)]
 pub struct VulkanDevice {
-    pub(crate) physical: Box<PhysicalDevice>,
+    pub(crate) listed: Arc<dyn ListedDevice>,
 }
 
 impl VulkanDevice {
     /// Name, kind and limits.
     #[must_use]
     pub fn info(&self) -> &DeviceInfo {
-        &self.physical.info
+        self.listed.info()
     }
 }
 
@@ -63,12 +67,8 @@ impl Device {
     /// # Errors
     /// As [`Device::list`]; also when the layer is not installed.
     pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
-        let vulkan = |physical| {
-            let physical = Box::new(physical);
-            Self::Vulkan(VulkanDevice { physical })
-        };
-        let devices = gpu::physical::list(validation)?;
-        Ok(devices.into_iter().map(vulkan).collect())
+        let vulkan = |listed| Self::Vulkan(VulkanDevice { listed });
+        Ok(listed(validation)?.into_iter().map(vulkan).collect())
     }
 
     /// Name, kind and limits of a Vulkan device; `None` for the CPU.
@@ -103,4 +103,9 @@ impl std::fmt::Debug for Device {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_tuple("Device").field(&self.name()).finish()
     }
+}
+
+#[cfg(not(feature = "vulkan"))]
+fn listed(_validation: bool) -> Result<Vec<Arc<dyn ListedDevice>>, VulkanError> {
+    Err(VulkanError::NotBuilt)
 }

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::crowd_error::CrowdError;
-use crate::curve::options::InterpolationError;
-use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::curve::options::{InterpolationError, Quantity};
+use crate::machine::error::{EvaluateError, VulkanError};
 use crate::memory::OutOfMemoryError;
 use crate::names::UnknownNameError;
 use crate::output::encoding::Encoding;
@@ -16,6 +16,7 @@ use crate::threads::OutOfThreadsError;
 use crate::threads::stop::StoppedError;
 use crate::time::error::SampleTimesError;
 use crate::tracks::error::TrackError;
+use crate::tracks::per_track::PerTrackCountError;
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
@@ -74,6 +75,26 @@ pub enum Error {
         /// The numbers of tracks and of samples.
         whole: (usize, usize),
     },
+    /// A list of interpolations or of methods is not as long as the list of tracks.
+    #[error(transparent)]
+    PerTrackCount(#[from] PerTrackCountError),
+    /// The interpolations of tracks have different quantities, whose values no single result can hold.
+    #[error(
+        "the quantity of track 0 is {}, and of track {track} {}; ask for one of them at a time", first.name(), other.name()
+    )]
+    MixedQuantities {
+        /// The quantity of the first track.
+        first: Quantity,
+        /// The first track that has another quantity.
+        track: usize,
+        /// The quantity of that track.
+        other: Quantity,
+    },
+    /// A result that stays on the device is requested of tracks with several interpolations.
+    #[error(
+        "the tracks have several interpolations, whose results are put together in the host's memory; give one for all tracks to leave the result on the device"
+    )]
+    SeveralInterpolations,
     /// There is not enough memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemoryError),
@@ -146,6 +167,21 @@ pub enum Error {
     Stopped(#[from] StoppedError),
 }
 
+impl Error {
+    /// The same error of a set of which `tracks` were selected: it names a track by its index in the set.
+    pub(crate) fn of_tracks(mut self, tracks: &[usize]) -> Self {
+        if let Self::Interpolation(
+            InterpolationError::Antipodal { track, .. }
+            | InterpolationError::OpenLoop { track, .. },
+        ) = &mut self
+            && let Some(&index) = tracks.get(*track)
+        {
+            *track = index;
+        }
+        self
+    }
+}
+
 impl From<SetError> for Error {
     fn from(error: SetError) -> Self {
         match error {
@@ -161,7 +197,7 @@ impl From<SetError> for Error {
 impl From<EvaluateError> for Error {
     fn from(error: EvaluateError) -> Self {
         match error {
-            EvaluateError::Vulkan(error) => Self::Vulkan(error),
+            EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => Self::Vulkan(error),
             EvaluateError::Set(error) => error.into(),
         }
     }

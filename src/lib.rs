@@ -73,8 +73,6 @@
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-// What only Vulkan uses lies beside what the CPU does too.
-#![cfg_attr(not(feature = "vulkan"), allow(dead_code, unused_imports))]
 
 mod checks;
 mod cpu;
@@ -89,9 +87,7 @@ mod fit;
 mod from_keys;
 #[cfg(feature = "vulkan")]
 mod gpu;
-#[cfg(not(feature = "vulkan"))]
-#[path = "gpu/absent.rs"]
-mod gpu;
+mod machine;
 mod math;
 mod memory;
 pub mod method;
@@ -103,6 +99,8 @@ mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
+// Devices alone run kernels.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod shader;
 mod simd;
 mod smooth;
@@ -110,8 +108,11 @@ mod stream;
 mod threads;
 mod time;
 mod tracks;
+// Checks of devices run twins that the CPU has no use for.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod twin;
 pub mod verify;
+#[cfg(feature = "vulkan")]
 mod work;
 
 pub use crate::curve::options::{
@@ -122,10 +123,13 @@ pub use crate::engine::Engine;
 pub use crate::engine::clip::Clip;
 pub use crate::engine::clip::request::Request;
 pub use crate::error::Error;
-pub use crate::gpu::options::{CacheFiles, EngineOptions};
+pub use crate::machine::options::{CacheFiles, EngineOptions};
 pub use crate::memory::{OutOfMemoryError, available_memory};
 pub use crate::method::interpolation::Interpolation;
-pub use crate::method::vector_method::VectorMethod;
+pub use crate::method::interpolation_options::{
+    InterpolationOption, InterpolationOptions, OptionValue, OptionValueError,
+};
+pub use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 pub use crate::method::{METHODS, Method};
 pub use crate::names::UnknownNameError;
 pub use crate::output::buffer::OutputBuffer;
@@ -134,6 +138,7 @@ pub use crate::output::encoding::{Encoding, EncodingLengthError, EncodingOptions
 pub use crate::output::euler::{EulerSequence, EulerSequenceError};
 pub use crate::output::pose_error::{PassOperand, PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
+pub use crate::output::scalars::Scalars;
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::output::value::OutputValue;
 pub use crate::pose::local_to_model::ModelMatrices;
@@ -152,8 +157,10 @@ pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::error::{NORM_TOLERANCE, TrackError};
 pub use crate::tracks::joints::{JointMatchError, JointPairs, Joints};
+pub use crate::tracks::per_track::{PerTrack, PerTrackCountError, TrackGroup};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
+pub use crate::tracks::set::scalars::ScalarKeys;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};
 pub use crate::tracks::set::{Track, TrackSet, UNIT_TOLERANCE};
 
@@ -214,36 +221,35 @@ pub mod vulkan {
     //! application's device do not exist.
 
     pub use crate::device::VulkanDevice;
-    #[cfg(feature = "vulkan")]
-    pub use crate::gpu::clip_target::ClipTarget;
-    #[cfg(feature = "vulkan")]
-    pub use crate::gpu::crowd::CrowdTarget;
     #[cfg(feature = "prove")]
     pub use crate::gpu::engine::choices::EngineChoices;
-    pub use crate::gpu::error::VulkanError;
-    #[cfg(feature = "vulkan")]
-    pub use crate::gpu::exported::ExportedResult;
-    #[cfg(feature = "vulkan")]
-    pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
-    pub use crate::gpu::options::Timings;
-    #[cfg(feature = "vulkan")]
-    pub use crate::gpu::pass_target::PassTarget;
     #[cfg(feature = "prove")]
     pub use crate::gpu::physical::details::{
         DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
     };
-    pub use crate::gpu::reports::{
+    pub use crate::machine::error::VulkanError;
+    pub use crate::machine::options::Timings;
+    pub use crate::machine::reports::{
         DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
     };
-    #[cfg(feature = "vulkan")]
-    pub use crate::pose::pass::{PassRequest, PosePass};
     pub use crate::shader::kernels;
+    #[cfg(feature = "vulkan")]
+    pub use crate::{
+        gpu::clip_target::ClipTarget,
+        gpu::crowd::CrowdTarget,
+        gpu::exported::ExportedResult,
+        gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue},
+        gpu::pass_target::PassTarget,
+        pose::pass::{PassRequest, PosePass},
+    };
 
     pub mod tuning {
         //! How an engine uses its device, for measurements and tests. Every choice gives the same bits, and
         //! `Automatic`, the default of each, is right for programs.
 
-        pub use crate::gpu::options::{Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads};
+        pub use crate::machine::options::{
+            Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads,
+        };
     }
 }
 

@@ -27,8 +27,10 @@ mod names;
 mod numbers;
 mod original;
 mod outside;
+mod per_track;
 mod poses;
 mod reduce;
+mod scalars;
 mod sparse_samples;
 #[cfg(feature = "vulkan")]
 mod speed;

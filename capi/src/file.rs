@@ -62,12 +62,8 @@ pub unsafe extern "C" fn tumble_file_load(
         let path = system_path(unsafe { CStr::from_ptr(path) })?;
         let loaded = Format::open_detected(Path::new(path), &ReadOptions::default())?;
         let clips = loaded.clips.into_iter().map(|motion| {
-            let mut methods = vec![CString::default(); motion.set.track_count()];
-            for (method, tracks) in ChannelMethods::AUTHORED.groups_of(&motion) {
-                for track in tracks {
-                    methods[track] = c_text(method.name);
-                }
-            }
+            let methods = ChannelMethods::AUTHORED.methods(&motion);
+            let methods = methods.map(|method| c_text(method.name)).collect();
             Clip {
                 name: c_text(motion.name.as_deref().unwrap_or_default()),
                 methods,

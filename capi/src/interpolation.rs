@@ -5,7 +5,8 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 use tumble::{
-    Ends, Interpolation, KeySigns, METHODS, Method, Quantity, Speed, Tcb, WrapMode, method,
+    Ends, Interpolation, InterpolationOptions, KeySigns, METHODS, Method, Quantity, Speed, Tcb,
+    WrapMode, method,
 };
 
 use crate::arguments::{option, sized, text};
@@ -169,10 +170,9 @@ impl TumbleInterpolation {
             ends => ends,
         });
         let ends = [&[method.ends], &named[..]].concat();
-        Ok(Interpolation {
-            method,
-            signs: method.signs.unwrap_or(path),
-            ends: option(self.ends, &ends, "interpolation->ends")?,
+        let options = InterpolationOptions {
+            signs: Some(path),
+            ends: Some(option(self.ends, &ends, "interpolation->ends")?),
             tcb: Tcb {
                 tension: self.tension,
                 continuity: self.continuity,
@@ -182,7 +182,8 @@ impl TumbleInterpolation {
             speed: option(self.speed, &Speed::ALL, "interpolation->speed")?,
             before: option(self.before, &WrapMode::ALL, "interpolation->before")?,
             after: option(self.after, &WrapMode::ALL, "interpolation->after")?,
-        })
+        };
+        Ok(options.with(method))
     }
 }
 

@@ -22,7 +22,7 @@ use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::batch::shards::run::Shard;
 use crate::batch::{entry, output_plan, result_names, target};
 use crate::commands::eval::Arguments;
-use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
+use crate::commands::eval::shards::{EvaluationOptions, Evaluator, size};
 use crate::host::Refused;
 use crate::messages::exit::{ALL_INPUTS, Failure, USAGE};
 use crate::messages::words;
@@ -116,7 +116,7 @@ impl LibraryPlan {
     ) -> Result<Self, Refused> {
         let arguments = parse(line)?;
         let shard_bytes = words::parse_bytes(shard_bytes).map_err(Failure::usage)?;
-        let mut request = EvaluationRequest::new(&arguments)?;
+        let mut request = EvaluationOptions::new(&arguments)?;
         if into != "files" {
             request.options.text += &format!(" into={into}");
         }

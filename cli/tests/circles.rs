@@ -10,7 +10,14 @@ use std::fs;
 use std::path::Path;
 
 /// The circles that are still there, one a line: files of a package's folder. The table can only shrink.
-const KNOWN: &[(&str, &str)] = &[("src", ""), ("formats/src", ""), ("cli/src", "")];
+const KNOWN: &[(&str, &str)] = &[
+    ("src", ""),
+    ("formats/src", ""),
+    ("cli/src", ""),
+    ("python/src", ""),
+    ("npm/src", ""),
+    ("capi/src", ""),
+];
 
 /// A module's path, without `crate`.
 type ModulePath = Vec<String>;
@@ -197,7 +204,7 @@ fn files_import_in_one_direction() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let faults = KNOWN.iter().flat_map(|(package, known)| {
         let sources = sources(&root.join(package));
-        assert!(sources.len() > 50, "{package}: {} files", sources.len());
+        assert!(sources.len() > 3, "{package}: {} files", sources.len());
         let faults = faults(&sources, known).into_iter();
         faults.map(move |fault| format!("{package}: {fault}"))
     });

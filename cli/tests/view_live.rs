@@ -23,7 +23,8 @@ fn the_page_s_engine_is_built_from_its_sources() {
         .collect();
     names.sort();
     names.insert(0, "npm/Cargo.toml".to_owned());
-    let others = ["packed.rs", "sample.rs", "world.rs"].map(|name| format!("formats/src/{name}"));
+    let others =
+        ["packed.rs", "sample.rs", "world.rs"].map(|name| format!("formats/src/motion/{name}"));
     names.extend(others);
     names.push("src/verify/golden.txt".to_owned());
     let mut hash = Sha1::new();

@@ -140,7 +140,7 @@ mod tests {
 
     use super::*;
     use crate::diagnostic::Code;
-    use crate::keyed::keyed;
+    use crate::motion::keyed::keyed;
 
     const TEXT: &str = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n\
         1403636580838555648,4.688319,-1.786938,0.783338,0.8,-0.6,0,0,-0.027876\n\

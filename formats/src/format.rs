@@ -12,20 +12,20 @@ use std::sync::Arc;
 use glam::{DVec3, Quat};
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
-use crate::carried_mesh::CarriedMesh;
 use crate::decimal::LARGEST_SECONDS;
 use crate::diagnostic::Diagnostic;
-use crate::end_frame::{EndFrame, RateFrames};
 use crate::feature::Feature;
 pub use crate::format::write_clips::left_behind;
 pub(crate) use crate::format::write_clips::{check_times, no_offsets};
 pub use crate::gltf::quantized::Quantization;
-use crate::keys::Duplicates;
 use crate::limits::Limits;
+use crate::motion::carried_mesh::CarriedMesh;
+use crate::motion::end_frame::{EndFrame, RateFrames};
+use crate::motion::keys::Duplicates;
+use crate::motion::poses::Poses;
+use crate::motion::signs::Signs;
 use crate::motion::{Motion, SampledClip};
-use crate::poses::Poses;
 use crate::quaternion::ComponentOrder;
-use crate::signs::Signs;
 use crate::times::FrameTimes;
 
 /// A file format.
@@ -269,9 +269,9 @@ pub struct Loaded {
 /// How the clips of a file differ from the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Adjustment {
-    /// They were converted to another unit or up axis ([`adjust_all`](crate::adjust::adjust_all)).
+    /// They were converted to another unit or up axis ([`adjust_all`](crate::motion::adjust::adjust_all)).
     Space,
-    /// Their joints have other offsets ([`set_all_offsets`](crate::adjust::set_all_offsets)).
+    /// Their joints have other offsets ([`set_all_offsets`](crate::motion::adjust::set_all_offsets)).
     Offsets,
 }
 

@@ -307,8 +307,8 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::keyed::keyed;
     use crate::motion::Motion;
+    use crate::motion::keyed::keyed;
 
     #[test]
     fn rows_of_matrices_are_poses_at_a_rate() {

@@ -5,33 +5,29 @@
 //! The modules from the bottom up; each may use those before it:
 //!
 //! - inputs and errors in them: [`diagnostic`], [`budget`], [`beneath`], and the private modules `source` and `text`;
-//! - the contents of files: [`motion`], [`feature`], [`carried_mesh`], [`poses`];
-//! - [`format`](mod@format): the description of a format, and the options of reading and writing;
+//! - [`motion`]: clips, the contents of files, and what is done with them: [`sample`], [`reduce`](mod@reduce),
+//!   [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`], [`skeleton`] and others;
+//! - [`format`](mod@format): the description of a format, and the options of reading and writing; [`feature`]: what
+//!   formats can store;
 //! - the formats: [`dat`], [`bvh`], [`gltf`] and others; CSV, Parquet and Arrow share the private module `table`;
 //! - [`FORMATS`], the table of all formats, and [`format::registry`], which searches it.
 //!
 //! Formats of other files have tables of the same kind: [`SURFACES`] for meshes and nets of control points
 //! ([`surface`]), and [`PATHS`] for paths ([`path`]).
-//!
-//! Operations on clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`],
-//! [`skeleton`].
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
-pub mod adjust;
+mod array;
 #[cfg(feature = "parquet")]
 pub mod arrow;
 pub mod beneath;
 pub mod budget;
 pub mod bvh;
-pub mod carried_mesh;
-pub mod compare;
 pub mod csv;
 pub mod dat;
 mod decimal;
 pub mod diagnostic;
-pub mod end_frame;
 pub mod euroc;
 #[cfg(feature = "fbx")]
 pub mod fbx;
@@ -42,8 +38,6 @@ pub mod format;
 pub mod generate;
 pub mod gltf;
 pub mod guarded;
-pub mod keyed;
-pub mod keys;
 pub mod kitti;
 mod limits;
 pub mod map;
@@ -53,42 +47,34 @@ pub mod motion;
 mod names;
 pub mod npy;
 pub mod npz;
-pub mod origin;
 pub mod output;
-pub mod outside;
-pub mod packed;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod path;
-pub mod poses;
 pub mod printable;
 pub mod quaternion;
 mod rate;
-pub mod reduce;
 pub mod referred;
 pub mod robot;
 pub mod rotation_form;
 mod rotation_matrix;
-pub mod sample;
-pub mod signs;
-pub mod skeleton;
-pub mod smooth;
 mod source;
 pub mod surface;
 mod table;
 mod text;
 mod time_order;
 pub mod times;
-pub mod trajectory;
-pub mod trim;
 pub mod tum;
 mod warnings;
-pub mod world;
 
 pub use crate::diagnostic::{Code, Diagnostic, Location, Severity};
 pub use crate::feature::Feature;
 pub use crate::format::{Format, Loaded, ReadOptions};
 pub use crate::limits::Limits;
+pub use crate::motion::{
+    adjust, carried_mesh, compare, end_frame, keyed, keys, origin, outside, packed, poses, reduce,
+    sample, signs, skeleton, smooth, trajectory, trim, world,
+};
 use crate::path::PathFormat;
 pub use crate::source::file_kind;
 use crate::surface::SurfaceFormat;

@@ -1,8 +1,28 @@
-//! Clips of motion files: keys of joints over a skeleton.
+//! Clips of motion files: keys of joints over a skeleton. The modules below are what is done with clips: they are
+//! sampled, reduced, compared, trimmed and so on. None of them knows a format; formats and programs use them.
 
+pub mod adjust;
+pub mod carried_mesh;
+pub mod compare;
 mod dense;
+pub mod end_frame;
 pub(crate) mod grid;
+pub mod keyed;
+pub mod keys;
+pub mod origin;
+pub mod outside;
+pub mod packed;
+pub mod poses;
+pub mod reduce;
+pub mod sample;
 mod select;
+pub mod signs;
+pub mod skeleton;
+pub mod smooth;
+pub mod trajectory;
+pub mod trim;
+pub mod world;
+mod written_joint;
 
 use std::io;
 use std::ops::Range;
@@ -10,10 +30,10 @@ use std::ops::Range;
 use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
-use crate::bvh::joint::BvhJoint;
 use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
+use crate::motion::origin::{coordinate, origin_at_rest, relative};
+pub use crate::motion::written_joint::{WrittenChannel, WrittenJoint};
 use crate::names::same_named;
-use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
 ///
@@ -44,8 +64,9 @@ pub struct Motion {
     pub origins: Vec<DVec3>,
     /// Why poses in the world cannot be computed; `None` if they can.
     pub no_world: Option<String>,
-    /// How BVH stores each track; empty if the file does not contain it.
-    pub bvh: Vec<BvhJoint>,
+    /// How the file wrote the joint of each track, which a file in its format repeats; empty if the file does not
+    /// contain it.
+    pub written_joints: Vec<WrittenJoint>,
     /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
 }
@@ -71,7 +92,7 @@ impl Motion {
             channels: self.channels.clone(),
             origins: self.origins.clone(),
             no_world: self.no_world.clone(),
-            bvh: self.bvh.clone(),
+            written_joints: self.written_joints.clone(),
             body: self.body.clone(),
             ..*self
         }
@@ -249,7 +270,7 @@ impl Motion {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Body {
     /// The position of the pelvis when `trans` is 0, in the clip's units and axes. It is included in the translations
-    /// of the first track, but not in the file's `trans`. It is 0 until [`set_offsets`](crate::adjust::set_offsets)
+    /// of the first track, but not in the file's `trans`. It is 0 until [`set_offsets`](crate::motion::adjust::set_offsets)
     /// sets it.
     pub pelvis: Vec3,
     /// The shape, as the file specifies it.

@@ -7,12 +7,13 @@ use std::io::{self, Write};
 use glam::Quat;
 use tumble::{ComponentType, Encoding, Layout};
 
+use crate::array::NumberArray;
+use crate::array::{ArrayHeader, Element};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npz::array::Array;
-use crate::npz::header::{ArrayHeader, Element};
-use crate::npz::{NumberArray, open_npy, read_npy};
+use crate::npz::{open_npy, read_npy};
 use crate::quaternion::ComponentOrder;
 
 /// The NPY format: array files of `NumPy`.

@@ -14,7 +14,7 @@ use crate::PATHS;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::motion::Motion;
-use crate::origin::origin_of;
+use crate::motion::origin::origin_of;
 use crate::source::Source;
 
 /// A file format of paths.

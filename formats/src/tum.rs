@@ -14,8 +14,8 @@ use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
 };
-use crate::keys::{Origin, select};
 use crate::motion::grid::restore;
+use crate::motion::keys::{Origin, select};
 use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::TRAJECTORY_TRACK;
 use crate::quaternion::ComponentOrder;

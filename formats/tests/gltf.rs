@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use proptest::prelude::*;
 use serde_json::Value;
-use tumble::{Channel, Device, Engine, Interpolation, NORM_TOLERANCE, SampleTimes};
+use tumble::{Channel, Device, Engine, NORM_TOLERANCE, SampleTimes};
 use tumble_formats::gltf::{open_gltf, read_gltf};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::{ChannelInterpolation, Motion};
@@ -35,10 +35,7 @@ pub(crate) fn raw() -> ReadOptions {
 /// A clip's channels at these times, each by its own sampler.
 pub(crate) fn sample(clip: &Motion, times: Vec<f64>) -> Samples {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method| Interpolation::from(method),
-    };
+    let methods = ChannelMethods::AUTHORED;
     methods
         .sample(&engine, clip, &SampleTimes::at(times))
         .unwrap()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
 use tumble::reduce::ReducedCurve;
-use tumble::{Channel, Device, Engine, Interpolation, SampleTimes};
+use tumble::{Channel, Device, Engine, SampleTimes};
 use tumble_formats::format::{MotionOptions, Quantization};
 use tumble_formats::motion::{
     ChannelInterpolation, Channels, Joint, Motion, SampledClip, Transform,
@@ -31,10 +31,7 @@ fn options(curve: ReducedCurve) -> ReduceOptions {
 
 fn poses(clip: &Motion, times: &[f64]) -> Vec<WorldPose> {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method| Interpolation::from(method),
-    };
+    let methods = ChannelMethods::AUTHORED;
     let samples = methods
         .sample(&engine, clip, &SampleTimes::at(times.to_vec()))
         .unwrap();

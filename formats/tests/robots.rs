@@ -1,4 +1,4 @@
-//! Robots: against MuJoCo and pinocchio, where the sample files are there, and files that are refused.
+//! Robots: against MuJoCo and pinocchio, and their scalars against SciPy, where the sample files are there, and files that are refused.
 
 use std::fs;
 use std::io::Read;
@@ -11,6 +11,8 @@ use tumble::trees::{
     BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
     Siblings, Tree,
 };
+use tumble::{Device, Ends, Engine, Interpolation, Layout, SampleTimes, ScalarQuantity, TrackSet};
+use tumble::{VectorMethod, method};
 use tumble_formats::npy::read_numbers;
 use tumble_formats::robot::{Robot, RobotFormat};
 use tumble_formats::{Code, Diagnostic, Location};
@@ -290,6 +292,69 @@ fn a_robot_is_the_same_in_mjcf_and_in_urdf() {
     }
 }
 
+#[test]
+fn scalars_are_those_of_scipy() {
+    let Some(data) = shared_data() else { return };
+    let text = fs::read_to_string(data.join("robots/scalars/curves.json")).unwrap();
+    let data: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let list = |value: &serde_json::Value| -> Vec<f64> {
+        value
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect()
+    };
+    let keys: Vec<f32> = list(&data["keys"]).iter().map(|&key| key as f32).collect();
+    let tangents = data["tangents"].as_array().unwrap().iter().map(|both| {
+        let both = list(both);
+        [both[0] as f32, both[1] as f32]
+    });
+    let (times, tangents) = (list(&data["times"]), tangents.collect::<Vec<_>>());
+    let mut set = TrackSet::new();
+    set.push_scalar("", &times, &keys, &tangents).unwrap();
+    let frames = SampleTimes::at(list(&data["at"]));
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let curves = data["curves"].as_object().unwrap();
+    assert_eq!(curves.len(), 11);
+    for (name, curve) in curves {
+        let (how, ends) = name.split_once('/').unwrap_or((name, "parabolic"));
+        let how = if how == "hermite" { "gltf-cubic" } else { how };
+        let interpolation = Interpolation {
+            ends: match ends {
+                "natural" => Ends::Natural,
+                "clamped" => Ends::Clamped {
+                    start: DVec3::ZERO,
+                    end: DVec3::ZERO,
+                },
+                "secant" => Ends::Secant,
+                _ => Ends::Parabolic,
+            },
+            ..method::SLERP.into()
+        };
+        let how: VectorMethod = how.parse().unwrap();
+        for (quantity, list_name) in
+            ScalarQuantity::ALL
+                .into_iter()
+                .zip(["values", "velocities", "accelerations"])
+        {
+            let right = list(&curve[list_name]);
+            let layout = Layout::TrackMajor;
+            let found = engine
+                .scalars(&set, quantity, how, interpolation, &frames, layout)
+                .unwrap();
+            let largest = right.iter().fold(1e-9, |all: f64, x| all.max(x.abs()));
+            for (value, right) in found.as_slice().iter().zip(right) {
+                let bound = 2e-7 * largest;
+                assert!(
+                    (f64::from(*value) - right).abs() <= bound,
+                    "{name} {quantity}: {value}, {right}"
+                );
+            }
+        }
+    }
+}
+
 /// Reads a robot whose file has this text, beside other files.
 fn read(text: &str, others: &[(&str, &str)]) -> Result<Robot, Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
@@ -327,7 +392,7 @@ fn names_poses_and_couplings_are_read() {
 }
 
 #[test]
-fn bodies_that_mujoco_merges_are_told() {
+fn bodies_that_mujoco_merges_are_named() {
     let text = "<mujoco>\n<compiler fusestatic='true'/><worldbody><body/></worldbody></mujoco>";
     let warnings = read(text, &[]).unwrap().warnings;
     assert_eq!(warnings[0].code, Code::RobotMerged);

@@ -5,10 +5,10 @@ use std::collections::HashSet;
 
 use glam::{Quat, Vec3};
 use tumble::{Channel, FrameRate, TrackSet};
-use tumble_formats::bvh::{BvhChannel, BvhJoint};
 use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
+use tumble_formats::motion::{WrittenChannel, WrittenJoint};
 use tumble_formats::sample::Samples;
 use tumble_formats::world::world;
 use tumble_formats::{Code, Diagnostic, FORMATS, Feature, Format, ReadOptions};
@@ -147,16 +147,16 @@ fn clip(numbers: &mut Numbers) -> Motion {
         });
         if from_bvh {
             let axes = [[2, 0, 1], [0, 1, 2], [1, 2, 0]][numbers.below(3)];
-            let positions = (0..3).map(BvhChannel::Position);
+            let positions = (0..3).map(WrittenChannel::Position);
             let all = positions.filter(|_| is_moved || numbers.coin());
-            motion.bvh.push(BvhJoint {
-                channels: all.chain(axes.map(BvhChannel::Rotation)).collect(),
+            motion.written_joints.push(WrittenJoint {
+                channels: all.chain(axes.map(WrittenChannel::Rotation)).collect(),
                 end_sites: (0..numbers.below(2)).map(|_| numbers.vector(3.0)).collect(),
             });
         }
     }
     // In BVH a joint has no positions, or all three.
-    for joint in &mut motion.bvh {
+    for joint in &mut motion.written_joints {
         let count = joint.channels.len();
         if count < 6 {
             joint.channels.drain(..count - 3);
@@ -328,7 +328,7 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
             for (track, (before, after)) in rests.enumerate() {
                 let is_kept = before.rest.translation == after.rest.translation
                     // BVH without positions has the position of the joint there.
-                    || format.name == "bvh" && clip.bvh.is_empty();
+                    || format.name == "bvh" && clip.written_joints.is_empty();
                 assert!(is_kept, "{case}: {track}: {before:?} {after:?}");
             }
         }
@@ -397,12 +397,12 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
         );
     }
     if supports(Feature::Bvh) && !clip.is_world {
-        if !clip.bvh.is_empty() {
-            assert_eq!(found.bvh, clip.bvh, "{case}");
+        if !clip.written_joints.is_empty() {
+            assert_eq!(found.written_joints, clip.written_joints, "{case}");
         }
     } else {
         assert!(
-            clip.bvh.is_empty() || clip.is_world || is_reported("End Sites"),
+            clip.written_joints.is_empty() || clip.is_world || is_reported("End Sites"),
             "{case}"
         );
     }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::Vec3;
-use tumble::{Device, Engine, FrameRate, Interpolation, SampleTimes};
+use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::end_frame::FramesToEnd;
 use tumble_formats::format::{FormatOption, MotionOptions, TimeUnit, WriteError};
 use tumble_formats::keyed::keyed;
@@ -247,10 +247,7 @@ fn kept(loaded: &Loaded, format: &Format) -> Vec<Option<Code>> {
         return Vec::new();
     };
     let engine = Engine::new(Device::Cpu).expect("the CPU");
-    let methods = ChannelMethods {
-        method: None,
-        with: &|method| Interpolation::from(method),
-    };
+    let methods = ChannelMethods::AUTHORED;
     let rate = FrameRate::new(7, 1).expect("a rate");
     let sampled = loaded.clips.iter().filter_map(|clip| {
         let frames = document.frames(clip.index, rate).ok()?;

@@ -73,7 +73,7 @@ function numbers(value, kind, components, what) {
   return array;
 }
 
-/** Bytes of a track's numbers in the order of formats/src/packed.rs, and its header. */
+/** Bytes of a track's numbers in the order of formats/src/motion/packed.rs, and its header. */
 function packedTrack(track, index, before) {
   const what = (name) => `track ${index}${track.name ? ` (${track.name})` : ""}: ${name}`;
   const known = ["name", "times", "rotations", "translations", "scales", "parent", "rest", "interpolation", "tangents"];
@@ -126,7 +126,7 @@ function packedTrack(track, index, before) {
   return { header, parts, times };
 }
 
-/** Tracks in one piece, as formats/src/packed.rs has them. */
+/** Tracks in one piece, as formats/src/motion/packed.rs has them. */
 function packed(tracks, { name = null, isWorld = false } = {}) {
   if (!Array.isArray(tracks)) throw new TumbleError("tracks are no array");
   let before = null;

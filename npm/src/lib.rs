@@ -9,6 +9,7 @@
 // Names that JavaScript finds; there is no block of unsafe code.
 #![allow(unsafe_code)]
 
+mod answer;
 mod calls;
 mod sampling;
 #[cfg(test)]
@@ -16,7 +17,8 @@ mod tests;
 
 use std::cell::RefCell;
 
-use crate::calls::{Answer, Calls};
+use crate::answer::Answer;
+use crate::calls::Calls;
 
 /// What lies between the two sides.
 #[derive(Default)]

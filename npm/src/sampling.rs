@@ -1,5 +1,6 @@
 //! What clips are at times: the samples that JavaScript asks for.
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use glam::{Quat, Vec3};
@@ -7,19 +8,19 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::json;
 use tumble::{
-    Axes, Ends, Engine, FrameRate, Interpolation, KeySigns, Layout, METHODS, Method, Quantity,
-    SampleTimes, Speed, Tcb, UnknownNameError, WrapMode,
+    Axes, Engine, FrameRate, InterpolationOption, InterpolationOptions, Layout, OptionValue,
+    Quantity, SampleTimes, UnknownNameError,
 };
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
 use tumble_formats::world::{world, world_matrices};
 
-use crate::calls::{Answer, Array, Fault};
+use crate::answer::{Answer, Array, Fault};
 
-/// What is asked for. Decimal numbers come as text, which keeps all their digits.
+/// The header of a call for samples. Decimal numbers come as text, which keeps all their digits.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub(crate) struct Request {
+#[serde(rename_all = "camelCase")]
+pub(crate) struct SampleCall {
     pub(crate) clip: usize,
     quantity: Sampled,
     /// Of frames; the numbers are their start and end then, and else the times.
@@ -30,19 +31,9 @@ pub(crate) struct Request {
     layout: Option<Layout>,
     #[serde(default, deserialize_with = "option")]
     axes: Option<Axes>,
-    #[serde(default, deserialize_with = "option")]
-    ends: Option<Ends>,
-    #[serde(default, deserialize_with = "option")]
-    path: Option<KeySigns>,
-    #[serde(default, deserialize_with = "option")]
-    speed: Option<Speed>,
-    #[serde(default, deserialize_with = "option")]
-    before: Option<WrapMode>,
-    #[serde(default, deserialize_with = "option")]
-    after: Option<WrapMode>,
-    tension: Option<String>,
-    continuity: Option<String>,
-    bias: Option<String>,
+    /// The options of [`InterpolationOption`] by their names.
+    #[serde(flatten)]
+    options: BTreeMap<String, Option<String>>,
 }
 
 /// What is sampled.
@@ -70,20 +61,25 @@ fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
     parsed.map_err(D::Error::custom)
 }
 
-impl Request {
-    fn method(&self) -> Result<Option<Method>, Fault> {
-        let name = match self.method.as_deref() {
-            None | Some("authored") => return Ok(None),
-            Some(name) => name,
+impl SampleCall {
+    fn method(&self) -> Result<MethodChoice, UnknownNameError> {
+        let name = self.method.as_deref();
+        name.map_or(Ok(MethodChoice::AUTHORED), str::parse)
+    }
+
+    fn options(&self) -> Result<InterpolationOptions, Fault> {
+        let mut options = InterpolationOptions {
+            quantity: self.quantity(),
+            ..InterpolationOptions::default()
         };
-        let unknown = || {
-            let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
-            let names = names.join(", ");
-            Fault::new(format!(
-                "there is no method `{name}`; there are authored, {names}"
-            ))
-        };
-        Method::named(name).map(Some).ok_or_else(unknown)
+        for (name, value) in &self.options {
+            let option = InterpolationOption::named(name)
+                .ok_or_else(|| Fault::new(format!("there is no option `{name}`")))?;
+            if let Some(value) = value {
+                option.set(&mut options, OptionValue::Text(value))?;
+            }
+        }
+        Ok(options)
     }
 
     fn frames(&self, numbers: &[f64]) -> Result<SampleTimes, Fault> {
@@ -96,20 +92,6 @@ impl Request {
             [] => Ok(SampleTimes::rate(rate)),
             _ => Err(Fault::new("frames have a start and an end")),
         }
-    }
-
-    fn tcb(&self) -> Result<Tcb, Fault> {
-        let number = |name: &str, text: &Option<String>| match text {
-            None => Ok(0.0),
-            Some(text) => text
-                .parse()
-                .map_err(|_| Fault::new(format!("{name} is `{text}`, no number"))),
-        };
-        Ok(Tcb {
-            tension: number("tension", &self.tension)?,
-            continuity: number("continuity", &self.continuity)?,
-            bias: number("bias", &self.bias)?,
-        })
     }
 
     fn quantity(&self) -> Quantity {
@@ -139,20 +121,20 @@ impl Request {
 /// becomes of them, in both orders.
 const SAMPLE: f64 = 200.0;
 
-/// What a clip is at the times of a request.
+/// What a clip is at the times of a call.
 pub(crate) fn sample(
     engine: &Engine,
     clip: &Motion,
-    request: &Request,
+    call: &SampleCall,
     numbers: &[u8],
 ) -> Result<Answer, Fault> {
     let (numbers, _) = numbers.as_chunks();
     let numbers: Vec<f64> = numbers.iter().copied().map(f64::from_le_bytes).collect();
     let tracks = clip.set.track_count();
-    let frames = request.frames(&numbers)?;
+    let frames = call.frames(&numbers)?;
     let timeline = frames.resolve(tracks, clip.set.time_span())?;
     let bytes = tracks as f64 * timeline.len() as f64 * SAMPLE;
-    // To ask is to know: what is there is not said.
+    // The platform does not say how much memory there is; reserving it does.
     let has_room = bytes < usize::MAX as f64 / 2.0
         && Vec::<u8>::new().try_reserve_exact(bytes as usize).is_ok();
     if !has_room {
@@ -162,32 +144,22 @@ pub(crate) fn sample(
             bytes / 1e6
         )));
     }
-    let (tcb, quantity) = (request.tcb()?, request.quantity());
-    let with = |method: Method| Interpolation {
-        method,
-        signs: method.signs.or(request.path).unwrap_or_default(),
-        ends: request.ends.unwrap_or(method.ends),
-        tcb,
-        quantity,
-        speed: request.speed.unwrap_or_default(),
-        before: request.before.unwrap_or_default(),
-        after: request.after.unwrap_or_default(),
-    };
     let methods = ChannelMethods {
-        method: request.method()?,
-        with: &with,
+        method: call.method()?,
+        options: call.options()?,
     };
     let samples = timeline.len();
-    let mut arrays = match request.quantity {
+    let mut arrays = match call.quantity {
         Sampled::Velocities | Sampled::Accelerations => {
-            let rates = methods.rates(engine, clip, &frames, Layout::FrameMajor)?;
+            let layout = call.layout.unwrap_or(Layout::TrackMajor);
+            let rates = methods.rates(engine, clip, &frames, layout)?;
             let rates: Vec<Vec3> = rates.iter().map(|rate| rate.truncate()).collect();
-            vec![("values", Array::Vectors(request.ordered(rates, tracks)))]
+            vec![("values", Array::Vectors(rates))]
         }
-        Sampled::Pose => pose(methods.sample(engine, clip, &frames)?, request, tracks),
+        Sampled::Pose => pose(methods.sample(engine, clip, &frames)?, call, tracks),
         Sampled::World => {
             let poses = world(clip, &methods.sample(engine, clip, &frames)?)?;
-            let poses = request.ordered(poses, tracks);
+            let poses = call.ordered(poses, tracks);
             let positions = poses.iter().flat_map(|pose| pose.position.to_array());
             let rotations: Vec<Quat> = poses.iter().map(|pose| pose.rotation).collect();
             vec![
@@ -197,7 +169,7 @@ pub(crate) fn sample(
         }
         Sampled::Matrices => {
             let matrices = world_matrices(clip, &methods.sample(engine, clip, &frames)?)?;
-            let matrices = request.ordered(matrices, tracks);
+            let matrices = call.ordered(matrices, tracks);
             let columns = matrices.iter().flat_map(|matrix| {
                 let [x, y, z] = matrix.matrix3.to_cols_array_2d();
                 let at = matrix.translation;
@@ -210,7 +182,7 @@ pub(crate) fn sample(
             vec![("matrices", Array::F32(columns.collect()))]
         }
     };
-    if request.rate.is_some() {
+    if call.rate.is_some() {
         arrays.push(("times", Array::F64(timeline.times(0).collect())));
     }
     Ok(Answer::new(
@@ -219,15 +191,15 @@ pub(crate) fn sample(
     ))
 }
 
-fn pose(samples: Samples, request: &Request, tracks: usize) -> Vec<(&'static str, Array)> {
-    let rotations = request.ordered(samples.rotations, tracks);
+fn pose(samples: Samples, call: &SampleCall, tracks: usize) -> Vec<(&'static str, Array)> {
+    let rotations = call.ordered(samples.rotations, tracks);
     let mut arrays = vec![("rotations", Array::Quats(rotations))];
     for (name, vectors) in [
         ("translations", samples.translations),
         ("scales", samples.scales),
     ] {
         if !vectors.is_empty() {
-            arrays.push((name, Array::Vectors(request.ordered(vectors, tracks))));
+            arrays.push((name, Array::Vectors(call.ordered(vectors, tracks))));
         }
     }
     arrays

@@ -6,7 +6,8 @@ use tumble::{Device, Engine, METHODS, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::packed;
 
-use crate::calls::{Answer, Calls};
+use crate::answer::Answer;
+use crate::calls::Calls;
 
 fn clip() -> Motion {
     let mut set = TrackSet::new();

@@ -1,8 +1,6 @@
 //! What comes in: arrays of NumPy's, whatever they look like in memory, lists, and objects that
 //! NumPy makes arrays of.
 
-use std::sync::Arc;
-
 use glam::{DQuat, Quat};
 use numpy::{
     PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -17,7 +15,7 @@ use pyo3::types::{PyFloat, PyInt, PyList, PyString, PyTuple};
 use tumble_formats::quaternion::{ComponentOrder, nearest_unit};
 
 use crate::errors::{expected, has_attribute, input};
-use crate::options::{SampleRequest, option_named};
+use crate::names::option_named;
 
 /// The order of a quaternion's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -320,42 +318,4 @@ pub(crate) fn has_arrays(parts: &[Bound<'_, PyAny>]) -> PyResult<bool> {
         }
     }
     Ok(false)
-}
-
-/// The times of `at`.
-pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleRequest> {
-    if let Some(parts) = parts(value)? {
-        let mut lists = Vec::with_capacity(parts.len());
-        for part in &parts {
-            let ArrayValues { shape, values } = doubles(part, "at")?;
-            if shape.len() != 1 {
-                return Err(input(format!(
-                    "at: a part of the list has shape {shape:?}; give a list of times for each track"
-                )));
-            }
-            lists.push(values);
-        }
-        let count = lists.first().map_or(0, Vec::len);
-        if lists.iter().any(|list| list.len() != count) {
-            return Ok(SampleRequest::Ragged(lists));
-        }
-        let times: Arc<[f64]> = lists.concat().into();
-        return Ok(SampleRequest::Each { times, count });
-    }
-    let ArrayValues { shape, values } = doubles(value, "at")?;
-    let times: Arc<[f64]> = values.into();
-    match *shape {
-        [] => Ok(SampleRequest::Shared {
-            times,
-            is_one: true,
-        }),
-        [_] => Ok(SampleRequest::Shared {
-            times,
-            is_one: false,
-        }),
-        [_, count] => Ok(SampleRequest::Each { times, count }),
-        _ => Err(input(format!(
-            "at: its shape is {shape:?}; give one time, (frames,), or (tracks, frames)"
-        ))),
-    }
 }

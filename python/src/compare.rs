@@ -12,7 +12,8 @@ use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, option_named, samples_of};
+use crate::names::option_named;
+use crate::options::{SampleChoice, samples_of};
 use crate::run::{interruptible, work};
 use crate::values::{Pickled, pickled, value};
 
@@ -485,7 +486,7 @@ fn of_arrays(py: Python<'_>, arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDi
 fn of_clips(
     engine: &tumble::Engine,
     clips: [Arc<Motion>; 2],
-    samples: Option<SampleRequest>,
+    samples: Option<SampleChoice>,
     world: bool,
 ) -> PyResult<(ClipDifference, Vec<String>)> {
     let pair = ClipPair {
@@ -497,10 +498,10 @@ fn of_clips(
     // The times are those of the first clip.
     let frames = match samples {
         None => pair.keys(&common),
-        Some(SampleRequest::Rate(rate, start, end)) => {
+        Some(SampleChoice::Rate(rate, start, end)) => {
             (pair.frames(&common, rate, start, end)).map_err(of_compare)?
         }
-        Some(SampleRequest::Shared { times, .. }) => {
+        Some(SampleChoice::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;
             pair.at(&common, &times).map_err(of_compare)?

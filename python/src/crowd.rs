@@ -14,7 +14,8 @@ use crate::errors::{guarded, input, warn_of};
 use crate::motions::{
     ChosenSkeleton, ListedClip, SharedSkeleton, of_crowd, order_assumption, push,
 };
-use crate::options::{method_named, one_of, option_named};
+use crate::names::{one_of, option_named};
+use crate::options::method_named;
 use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
 use crate::samples::matrices;

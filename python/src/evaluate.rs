@@ -1,6 +1,5 @@
 //! Results of clips: rotations, what follows from them, and whole poses.
 
-use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -9,27 +8,26 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
-use tumble::method::{C2, SLERP};
+use tumble::method::C2;
 use tumble::{
-    ComponentType, Encoding, Engine, Interpolation, Layout, Method, Quantity, SampleTimes, TrackSet,
+    ComponentType, Encoding, Engine, Interpolation, Layout, Method, Quantity, SampleTimes,
 };
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::rotation_vector;
-use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
 use crate::device_array::DeviceArray;
 use crate::engine::MIN_DEVICE_ROTATIONS;
 use crate::errors::{device, guarded, input, of_engine, warn};
-use crate::options::{Request, SampleRequest};
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::output::{array, array_of, filled, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct OutputRequest {
+pub(crate) struct OutputForm {
     pub(crate) quantity: Quantity,
     pub(crate) encoding: Encoding,
     pub(crate) layout: Layout,
@@ -47,7 +45,7 @@ pub(crate) struct OutputRequest {
     pub(crate) is_one_track: bool,
 }
 
-impl Default for OutputRequest {
+impl Default for OutputForm {
     /// Rotations, x y z w, `[track][frame]`.
     fn default() -> Self {
         Self {
@@ -65,45 +63,25 @@ impl Default for OutputRequest {
     }
 }
 
-/// Tracks that one method interpolates; `None` for all of them.
-type TrackGroup = (Method, Option<Vec<usize>>);
-
-/// The tracks of a clip by their methods.
-fn groups(clip: &Motion, method: Option<Method>) -> Vec<TrackGroup> {
-    let methods = ChannelMethods {
-        method,
-        with: &Interpolation::from,
-    };
-    match methods.method_of(clip) {
-        Some(method) => vec![(method, None)],
-        None => methods
-            .groups_of(clip)
-            .into_iter()
-            .map(|(method, tracks)| (method, Some(tracks)))
-            .collect(),
-    }
-}
-
 /// What is evaluated: a clip, on an engine, at some times of each track.
 #[derive(Clone, Copy)]
 struct Work<'a> {
     engine: &'a Engine,
     clip: &'a Motion,
-    request: &'a Request,
-    samples: &'a SampleRequest,
+    request: &'a EvaluationKeywords,
     frames: &'a SampleTimes,
     /// Samples of a track.
     count: usize,
 }
 
-impl OutputRequest {
+impl OutputForm {
     /// Evaluates a clip into an array of NumPy's.
     pub(crate) fn of<'py>(
         &self,
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -123,18 +101,14 @@ impl OutputRequest {
         if self.on_card {
             self.check_on_card(samples, out.is_some(), along_skeleton)?;
         }
-        if along_skeleton
-            && matches!(
-                samples,
-                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
-            )
+        if along_skeleton && matches!(samples, SampleChoice::Each { .. } | SampleChoice::Ragged(_))
         {
             return Err(input(
                 "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
                  give one list of times for all tracks, or take the parent's axes",
             ));
         }
-        if let SampleRequest::Ragged(lists) = samples {
+        if let SampleChoice::Ragged(lists) = samples {
             if out.is_some() || self.layout == Layout::FrameMajor || lists.len() != tracks {
                 return Err(input(format!(
                     "at: lists of different lengths for {} tracks of {tracks}; their results are \
@@ -152,15 +126,11 @@ impl OutputRequest {
                 engine: &engine,
                 clip,
                 request,
-                samples,
                 frames: &frames,
                 count,
             };
             let array = self.card_array(py, work, shape)?;
-            warn(
-                py,
-                &curve_warnings(py, clip, request, self.quantity, count)?,
-            )?;
+            warn(py, &curve_warnings(py, clip, request, count)?)?;
             return Ok(array.into_any());
         }
         let array = array_of(py, self.encoding.component_type(), &shape, out, inputs)?;
@@ -171,7 +141,6 @@ impl OutputRequest {
                     engine: &engine,
                     clip,
                     request,
-                    samples,
                     frames: &frames,
                     count,
                 };
@@ -182,10 +151,7 @@ impl OutputRequest {
                 Ok(())
             })
         })?;
-        warn(
-            py,
-            &curve_warnings(py, clip, request, self.quantity, count)?,
-        )?;
+        warn(py, &curve_warnings(py, clip, request, count)?)?;
         match self.as_rotation {
             true => self.rotation(&array, self.is_one_track),
             false => Ok(array),
@@ -195,12 +161,12 @@ impl OutputRequest {
     /// The axes of a result whose values have the shape `each`.
     fn shape(
         &self,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         tracks: usize,
         count: usize,
         each: &[usize],
     ) -> Vec<usize> {
-        let is_one_time = matches!(samples, SampleRequest::Shared { is_one: true, .. });
+        let is_one_time = matches!(samples, SampleChoice::Shared { is_one: true, .. });
         let axes = match self.layout {
             Layout::TrackMajor => [(tracks, self.is_one_track), (count, is_one_time)],
             Layout::FrameMajor => [(count, is_one_time), (tracks, self.is_one_track)],
@@ -215,7 +181,7 @@ impl OutputRequest {
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -224,7 +190,7 @@ impl OutputRequest {
             ..*self
         };
         let samples = request.samples()?;
-        if matches!(samples, SampleRequest::Ragged(_)) {
+        if matches!(samples, SampleChoice::Ragged(_)) {
             let lists = rotations.of(py, engine, clip, request, out, inputs)?;
             let results = PyList::empty(py);
             for list in lists.try_iter()? {
@@ -246,12 +212,12 @@ impl OutputRequest {
     /// Refuses what is done on the host after the engine, or needs the host's memory.
     fn check_on_card(
         &self,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         has_out: bool,
         along_skeleton: bool,
     ) -> PyResult<()> {
         let refused = match samples {
-            SampleRequest::Ragged(_) => {
+            SampleChoice::Ragged(_) => {
                 "lists of times of different lengths give a list of arrays of NumPy's"
             }
             _ if has_out => "`out` is memory of the host's; leave it out",
@@ -286,18 +252,25 @@ impl OutputRequest {
                  leave out `device_array`",
             ));
         }
-        let Some(method) = uniform(work.clip, work.request) else {
+        let interpolations = work
+            .request
+            .methods(self.quantity)
+            .interpolations(work.clip);
+        if interpolations
+            .uniform(work.clip.set.track_count())
+            .is_none()
+        {
             return Err(input(
                 "device_array: the file has other methods for some tracks than for others, and such results are put \
                  together on the host; name one `method` for all",
             ));
-        };
+        }
         let array = py.detach(|| {
             guarded(|| {
                 let job = Job {
                     engine: work.engine,
                     set: &work.clip.set,
-                    interpolation: work.request.with(self.quantity)(method),
+                    interpolations: &interpolations,
                     frames: work.frames,
                     samples: work.count,
                     layout: self.layout,
@@ -310,64 +283,19 @@ impl OutputRequest {
     }
 
     fn fill(&self, work: Work<'_>, bytes: &mut [u8]) -> PyResult<()> {
-        let Work {
-            engine,
-            clip,
-            request,
-            samples,
-            frames,
-            count,
-        } = work;
-        let with = request.with(self.quantity);
         let job = Job {
-            engine,
-            set: &clip.set,
-            interpolation: with(SLERP),
-            frames,
-            samples: count,
+            engine: work.engine,
+            set: &work.clip.set,
+            interpolations: &work
+                .request
+                .methods(self.quantity)
+                .interpolations(work.clip),
+            frames: work.frames,
+            samples: work.count,
             layout: self.layout,
             encoding: self.encoding,
         };
-        let tracks = clip.set.track_count();
-        let size = self.encoding.bytes();
-        for (method, group) in groups(clip, request.method) {
-            let Some(group) = group else {
-                let job = Job {
-                    interpolation: with(method),
-                    ..job
-                };
-                job.write(bytes)?;
-                continue;
-            };
-            // Tracks of other methods lie between these.
-            let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
-            let frames = match samples {
-                SampleRequest::Each { .. } => Cow::Owned(samples.frames(clip, Some(&group))?),
-                _ => Cow::Borrowed(frames),
-            };
-            // As the results in NumPy's memory are aligned.
-            let mut found = vec![0_u32; (group.len() * count * size).div_ceil(4)];
-            let found: &mut [u8] = bytemuck::cast_slice_mut(&mut found);
-            let found = &mut found[..group.len() * count * size];
-            let job = Job {
-                set: &set,
-                frames: &frames,
-                interpolation: with(method),
-                ..job
-            };
-            job.write(found)?;
-            for (row, &track) in group.iter().enumerate() {
-                for sample in 0..count {
-                    let from = self.layout.index(row, sample, group.len(), count);
-                    let to = self.layout.index(track, sample, tracks, count);
-                    let (Some(from), Some(to)) = (from, to) else {
-                        continue;
-                    };
-                    let (from, to) = (from * size, to * size);
-                    bytes[to..to + size].copy_from_slice(&found[from..from + size]);
-                }
-            }
-        }
+        job.write(bytes)?;
         self.finish(bytes);
         Ok(())
     }
@@ -472,7 +400,7 @@ impl OutputRequest {
         py: Python<'py>,
         engine: impl FnOnce(usize) -> PyResult<Engine>,
         clip: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         lists: &[Vec<f64>],
     ) -> PyResult<Bound<'py, PyAny>> {
         let count: usize = lists.iter().map(Vec::len).sum();
@@ -490,7 +418,7 @@ impl OutputRequest {
                     let (of_track, rest) = bytes.split_at_mut(list.len() * size);
                     bytes = rest;
                     let one = track_of(clip, track)?;
-                    let samples = SampleRequest::Shared {
+                    let samples = SampleChoice::Shared {
                         times: list.as_slice().into(),
                         is_one: false,
                     };
@@ -499,7 +427,6 @@ impl OutputRequest {
                         engine: &engine,
                         clip: &one,
                         request,
-                        samples: &samples,
                         frames: &frames,
                         count: list.len(),
                     };
@@ -607,21 +534,17 @@ const KEYS_OF_A_SAMPLE: usize = 2048;
 fn curve_warnings(
     py: Python<'_>,
     clip: &Arc<Motion>,
-    request: &Request,
-    quantity: Quantity,
+    request: &EvaluationKeywords,
     samples: usize,
 ) -> PyResult<Vec<Diagnostic>> {
     let rotations = samples.saturating_mul(clip.set.track_count());
     let has_warnings = |method: &Method| method.name == C2.name;
-    let method = request.method.filter(has_warnings);
+    let method = request.method.0.filter(has_warnings);
     let is_sparse = rotations.saturating_mul(KEYS_OF_A_SAMPLE) < clip.set.key_count();
     let (Some(method), false) = (method, is_sparse) else {
         return Ok(Vec::new());
     };
-    let interpolation = Interpolation {
-        quantity: Quantity::Rotation,
-        ..request.with(quantity)(method)
-    };
+    let interpolation = request.methods(Quantity::Rotation).options.with(method);
     let mut known = CHECKED_CURVES
         .lock()
         .unwrap_or_else(PoisonError::into_inner);
@@ -662,29 +585,4 @@ fn track_of(clip: &Motion, track: usize) -> PyResult<Motion> {
 
 fn of_tracks(error: tumble::TrackError) -> PyErr {
     of_engine(&error.into())
-}
-
-/// The one set and method of a clip whose tracks are all interpolated alike.
-pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
-    match groups(clip, request.method)[..] {
-        [(method, None)] => Some(method),
-        _ => None,
-    }
-}
-
-/// The tracks of one method as a set, and their indices in the clip; `None` where these are all.
-pub(crate) type MethodTracks = (Method, TrackSet, Option<Vec<usize>>);
-
-/// The sets of a clip by their methods.
-pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<MethodTracks>> {
-    groups(clip, request.method)
-        .into_iter()
-        .map(|(method, group)| match group {
-            None => Ok((method, clip.set.clone(), None)),
-            Some(tracks) => {
-                let set = clip.set.select(tracks.iter().copied()).map_err(of_tracks)?;
-                Ok((method, set, Some(tracks)))
-            }
-        })
-        .collect()
 }

@@ -17,7 +17,8 @@ use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 use crate::arrays::{ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{expected, input, of_diagnostic, of_track, warn};
-use crate::options::{frame_rate, one_of, option_of, unknown_name};
+use crate::names::{one_of, option_of, unknown_name};
+use crate::options::frame_rate;
 use crate::run::interruptible;
 
 /// The clips of a file, by their indices or names.
@@ -305,7 +306,7 @@ pub(crate) fn load(
         ));
     }
     let offsets = offsets.map(joint_offsets).transpose()?;
-    let request = ReadRequest {
+    let request = FileOptions {
         format,
         options,
         source_times,
@@ -329,14 +330,14 @@ pub(crate) fn load_all(
     source_fps: Option<&Bound<'_, PyAny>>,
     override_fps: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<File>> {
-    let request = ReadRequest {
+    let request = FileOptions {
         options: ReadOptions {
             source_rate: source_fps.map(frame_rate).transpose()?,
             override_rate: override_fps.map(frame_rate).transpose()?,
             ..ReadOptions::default()
         },
         is_changed: source_fps.is_some() || override_fps.is_some(),
-        ..ReadRequest::default()
+        ..FileOptions::default()
     };
     let mut files = Vec::with_capacity(paths.0.len());
     let mut warnings = Vec::new();
@@ -351,7 +352,7 @@ pub(crate) fn load_all(
 
 /// How a file is read.
 #[derive(Clone, Default)]
-struct ReadRequest {
+struct FileOptions {
     format: Option<&'static Format>,
     options: ReadOptions,
     source_times: Option<PathBuf>,
@@ -363,7 +364,7 @@ struct ReadRequest {
     is_changed: bool,
 }
 
-impl ReadRequest {
+impl FileOptions {
     /// Reads a file; returns what to warn of, too.
     fn read(mut self, py: Python<'_>, path: PathBuf) -> PyResult<(File, Vec<Diagnostic>)> {
         let (file, is_changed) = (path.clone(), self.is_changed);

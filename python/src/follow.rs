@@ -12,7 +12,8 @@ use tumble_formats::path::{Pace, PathPoints, paths_of};
 use crate::arrays::{ArrayValues, Order, doubles, has_arrays, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, ends, one_of, option_named, option_of};
+use crate::names::{one_of, option_named, option_of};
+use crate::options::{SampleChoice, ends};
 use crate::run::interruptible;
 use crate::samples::of_values;
 
@@ -180,7 +181,7 @@ pub(crate) fn follow<'py>(
     engine: &Engine,
     (key_times, path): (Option<&Bound<'py, PyAny>>, &Bound<'py, PyAny>),
     options: &FollowOptions<'_, 'py>,
-    moments: SampleRequest,
+    moments: SampleChoice,
     (layout, order): (Layout, Order),
 ) -> PyResult<Bound<'py, PyTuple>> {
     let py = path.py();
@@ -244,7 +245,7 @@ pub(crate) fn follow<'py>(
     })?;
     let origin = made.origin(0);
     let follow = options.follow(origin)?;
-    let is_one_time = matches!(moments, SampleRequest::Shared { is_one: true, .. });
+    let is_one_time = matches!(moments, SampleChoice::Shared { is_one: true, .. });
     let (frames, count) = moments.resolved(&made)?;
     let engine = engine.engine_for(tracks * count)?;
     let found = interruptible(py, move || {

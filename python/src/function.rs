@@ -8,8 +8,8 @@ use crate::arrays::Order;
 use crate::build::{ClipKeys, KeysLayout};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::guarded;
-use crate::evaluate::OutputRequest;
-use crate::options::{Request, request_arrays};
+use crate::evaluate::OutputForm;
+use crate::options::{EvaluationKeywords, request_arrays};
 use crate::output::quaternions_of;
 use crate::run::work;
 
@@ -44,12 +44,12 @@ pub(crate) fn evaluate<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     guarded(|| {
         let py = times.py();
-        let request = Request::new(options)?;
+        let request = EvaluationKeywords::new(options)?;
         let order = Order::named(order)?;
         let arrays = ClipKeys::new(times, keys, order, KeysLayout::OfClip)?;
         let is_one_track = arrays.is_one;
         let motion = work(py, arrays.key_count(), move || arrays.clip(None))?;
-        let result = OutputRequest {
+        let result = OutputForm {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             // Rotations of SciPy's have an order of their own.
             order: if as_rotation { Order::Xyzw } else { order },
@@ -57,7 +57,7 @@ pub(crate) fn evaluate<'py>(
             as_rotation,
             on_card: device_array,
             is_one_track,
-            ..OutputRequest::default()
+            ..OutputForm::default()
         };
         let engine = |rotations| default_engine(py)?.get().engine_for(rotations);
         let arrays = request_arrays(options)?;

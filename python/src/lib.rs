@@ -20,6 +20,7 @@ mod file;
 mod follow;
 mod function;
 mod motions;
+mod names;
 mod options;
 mod output;
 mod pickle;
@@ -32,6 +33,7 @@ mod samples;
 mod save;
 mod shards;
 mod stream;
+mod unpickle;
 mod values;
 mod verify;
 
@@ -79,7 +81,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::stream::{Chunk, Chunks};
     #[pymodule_export]
-    use crate::values::value_of_state;
+    use crate::unpickle::value_of_state;
     #[pymodule_export]
     use crate::verify::Verification;
 

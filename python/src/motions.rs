@@ -12,9 +12,9 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::crowd::{CrowdError, CrowdLibrary, MotionStates, MotionTables, MotionWords};
-use tumble::{Channel, Error, Interpolation, Method, Quantity, Skeleton};
+use tumble::{Channel, Error, Skeleton};
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::ChannelMethods;
+use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
 
 use crate::arrays::ListArgument;
@@ -243,14 +243,14 @@ pub(crate) fn push(
     library: &mut CrowdLibrary,
     skeleton: &SharedSkeleton,
     listed: ListedClip<'_>,
-    method: Option<Method>,
+    method: MethodChoice,
     check: impl Fn(&tumble::TrackSet) -> Result<(), &'static str>,
 ) -> PyResult<()> {
     let named = |error: &str| input(format!("{listed}: {error}"));
     let motion = &listed.clip.motion;
     let methods = ChannelMethods {
         method,
-        with: &Interpolation::from,
+        ..ChannelMethods::AUTHORED
     };
     let (Some(of_rotations), Some(of_vectors)) =
         (methods.method_of(motion), methods.vector_method_of(motion))
@@ -259,13 +259,9 @@ pub(crate) fn push(
             "its tracks have several methods; name one as `method`",
         ));
     };
-    let interpolation = Interpolation {
-        quantity: Quantity::Rotation,
-        ..Interpolation::from(of_rotations)
-    };
     let tracks = skeleton.tracks(listed)?;
     check(&tracks).map_err(named)?;
-    let pushed = library.push(&tracks, interpolation, of_vectors);
+    let pushed = library.push(&tracks, of_rotations, of_vectors);
     pushed.map(drop).map_err(|error| match error {
         CrowdError::Stopped(_) => of_crowd(error),
         error => named(&error.to_string()),

@@ -1,7 +1,6 @@
 //! The keywords that all evaluations share: which samples, and how to interpolate.
 
 use std::borrow::Cow;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -9,19 +8,20 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
-    Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
-    UnknownNameError,
+    Ends, FrameRate, InterpolationOption, InterpolationOptions, OptionValue, OptionValueError,
+    Quantity, SampleTimes, UnknownNameError,
 };
-use tumble_cli::host;
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::{Outside, OutsideError};
+use tumble_formats::sample::{ChannelMethods, MethodChoice};
 
-use crate::arrays;
+use crate::arrays::{self, ArrayValues, doubles, parts};
 use crate::errors::{input, of_engine};
+use crate::names::{option_of, text, unknown_name, unknown_value};
 
 /// Which samples.
 #[derive(Debug, Clone)]
-pub(crate) enum SampleRequest {
+pub(crate) enum SampleChoice {
     /// Frames at a rate.
     Rate(FrameRate, Option<f64>, Option<f64>),
     /// One list of times for all tracks; a single time stands for a result without an axis of
@@ -35,39 +35,22 @@ pub(crate) enum SampleRequest {
 
 /// The keywords of an evaluation.
 #[derive(Debug, Clone)]
-pub(crate) struct Request {
+pub(crate) struct EvaluationKeywords {
     /// `None` without a rate and times.
-    pub(crate) samples: Option<SampleRequest>,
-    /// `None`: the method that the file gives each channel.
-    pub(crate) method: Option<Method>,
-    interpolation: InterpolationOptions,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct InterpolationOptions {
-    signs: KeySigns,
-    ends: Option<Ends>,
-    speed: Speed,
+    pub(crate) samples: Option<SampleChoice>,
+    pub(crate) method: MethodChoice,
+    options: InterpolationOptions,
     outside: Outside,
-    tcb: Tcb,
 }
 
-/// The name of "the method that the file gives each channel; bessel-overhauser where it gives none".
-pub(crate) const AUTHORED: &str = "authored";
-
-impl Request {
+impl EvaluationKeywords {
     /// Reads the keywords.
     pub(crate) fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut request = Self {
             samples: None,
-            method: None,
-            interpolation: InterpolationOptions {
-                signs: KeySigns::Shortest,
-                ends: None,
-                speed: Speed::AsKeyed,
-                outside: Outside::default(),
-                tcb: Tcb::default(),
-            },
+            method: MethodChoice::AUTHORED,
+            options: InterpolationOptions::default(),
+            outside: Outside::default(),
         };
         let (mut rate, mut times, mut start, mut end) = (None, None, None, None);
         for (name, value) in keywords.into_iter().flatten() {
@@ -76,7 +59,6 @@ impl Request {
                 check_name(&name)?;
                 continue;
             }
-            let interpolation = &mut request.interpolation;
             match &*name {
                 "fps" => rate = Some(frame_rate(&value)?),
                 "at" | "times" if times.is_some() => {
@@ -87,34 +69,23 @@ impl Request {
                 "at" | "times" => times = Some(value),
                 "start" => start = Some(arrays::number(&value, "start", "seconds")?),
                 "end" => end = Some(arrays::number(&value, "end", "seconds")?),
-                "method" => request.method = method(&value)?,
-                "path" => {
-                    interpolation.signs = option_of(&value, "path")?;
-                }
-                "ends" => interpolation.ends = Some(ends(&value)?),
-                "speed" => {
-                    interpolation.speed = option_of(&value, "speed")?;
-                }
-                "before" => interpolation.outside.before = option_of(&value, "before")?,
-                "after" => interpolation.outside.after = option_of(&value, "after")?,
-                "tension" => {
-                    interpolation.tcb.tension = arrays::number(&value, "tension", "a number")?;
-                }
-                "continuity" => {
-                    interpolation.tcb.continuity =
-                        arrays::number(&value, "continuity", "a number")?;
-                }
-                "bias" => interpolation.tcb.bias = arrays::number(&value, "bias", "a number")?,
-                _ => check_name(&name)?,
+                "method" => request.method = method_named(&text(&value, "method")?)?,
+                "ends" => request.options.ends = Some(ends(&value)?),
+                // Times outside can be left out, too, which the engine does not do.
+                "before" => request.outside.before = option_of(&value, "before")?,
+                "after" => request.outside.after = option_of(&value, "after")?,
+                _ => match InterpolationOption::named(&name) {
+                    Some(option) => set_option(&mut request.options, option, &value)?,
+                    None => check_name(&name)?,
+                },
             }
         }
+        request.options.before = request.outside.before.wrap_mode();
+        request.options.after = request.outside.after.wrap_mode();
         request.samples = samples(rate, times, start, end)?;
-        let leaves_out = request.interpolation.outside.leaves_out();
-        let is_of_each = |samples: &SampleRequest| {
-            matches!(
-                samples,
-                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
-            )
+        let leaves_out = request.outside.leaves_out();
+        let is_of_each = |samples: &SampleChoice| {
+            matches!(samples, SampleChoice::Each { .. } | SampleChoice::Ragged(_))
         };
         if leaves_out != [false; 2] && request.samples.as_ref().is_some_and(is_of_each) {
             let keyword = if leaves_out[0] { "before" } else { "after" };
@@ -127,20 +98,20 @@ impl Request {
     }
 
     /// The samples, of which there must be some.
-    pub(crate) fn samples(&self) -> PyResult<&SampleRequest> {
+    pub(crate) fn samples(&self) -> PyResult<&SampleChoice> {
         self.samples.as_ref().ok_or_else(none_asked_for)
     }
 
     /// What is done with times outside the keys.
     pub(crate) fn outside(&self) -> Outside {
-        self.interpolation.outside
+        self.outside
     }
 
-    /// As [`SampleRequest::frames`], without the times that are left out.
+    /// As [`SampleChoice::frames`], without the times that are left out.
     pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         let samples = self.samples()?;
         let rate = match samples {
-            &SampleRequest::Rate(rate, ..) => Some(rate),
+            &SampleChoice::Rate(rate, ..) => Some(rate),
             _ => None,
         };
         let kept = (self.outside()).kept(samples.frames(clip, tracks)?, rate, clip);
@@ -155,28 +126,39 @@ impl Request {
         count_of(self.frames(clip, None)?, clip)
     }
 
-    /// The interpolation by a method, for a quantity.
-    pub(crate) fn with(&self, quantity: Quantity) -> impl Fn(Method) -> Interpolation + use<> {
-        let interpolation = self.interpolation;
-        move |method| Interpolation {
-            method,
-            signs: method.signs.unwrap_or(interpolation.signs),
-            ends: interpolation.ends.unwrap_or(method.ends),
-            tcb: interpolation.tcb,
-            quantity,
-            speed: interpolation.speed,
-            before: interpolation.outside.before.wrap_mode(),
-            after: interpolation.outside.after.wrap_mode(),
+    /// The methods of a clip's channels, for a quantity.
+    pub(crate) fn methods(&self, quantity: Quantity) -> ChannelMethods {
+        ChannelMethods {
+            method: self.method,
+            options: InterpolationOptions {
+                quantity,
+                ..self.options
+            },
         }
-    }
-
-    /// The method's name.
-    pub(crate) fn method_name(&self) -> &'static str {
-        self.method.map_or(AUTHORED, |method| method.name)
     }
 }
 
-impl SampleRequest {
+/// Sets an option whose values are names or numbers.
+fn set_option(
+    options: &mut InterpolationOptions,
+    option: InterpolationOption,
+    value: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    let keyword = option.name;
+    let set = match option.is_number {
+        true => {
+            let number = arrays::number(value, keyword, "a number")?;
+            option.set(options, OptionValue::Number(number))
+        }
+        false => option.set(options, OptionValue::Text(&text(value, keyword)?)),
+    };
+    set.map_err(|error| match error {
+        OptionValueError::Name(error) => unknown_value(keyword, &error.name, &error.known),
+        error => input(error.to_string()),
+    })
+}
+
+impl SampleChoice {
     /// The samples of some tracks of a clip as the engine takes them.
     pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         let set = &clip.set;
@@ -234,7 +216,7 @@ pub(crate) fn samples_of(
     at: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<SampleRequest> {
+) -> PyResult<SampleChoice> {
     let finite = |name: &str, number: Option<f64>| match number {
         Some(number) if !number.is_finite() => {
             Err(input(format!("{name}: {number} is not finite")))
@@ -255,18 +237,56 @@ fn samples(
     times: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<Option<SampleRequest>> {
+) -> PyResult<Option<SampleChoice>> {
     match (rate, times) {
         (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
         (None, Some(_)) if start.is_some() || end.is_some() => {
             Err(input("`start` and `end` need `fps`; `at` lists all times"))
         }
-        (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
-        (None, Some(times)) => arrays::sample_times(&times).map(Some),
+        (Some(rate), None) => Ok(Some(SampleChoice::Rate(rate, start, end))),
+        (None, Some(times)) => sample_times(&times).map(Some),
         (None, None) if start.is_some() || end.is_some() => {
             Err(input("`start` and `end` need `fps`; give it too"))
         }
         (None, None) => Ok(None),
+    }
+}
+
+/// The times of `at`.
+pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleChoice> {
+    if let Some(parts) = parts(value)? {
+        let mut lists = Vec::with_capacity(parts.len());
+        for part in &parts {
+            let ArrayValues { shape, values } = doubles(part, "at")?;
+            if shape.len() != 1 {
+                return Err(input(format!(
+                    "at: a part of the list has shape {shape:?}; give a list of times for each track"
+                )));
+            }
+            lists.push(values);
+        }
+        let count = lists.first().map_or(0, Vec::len);
+        if lists.iter().any(|list| list.len() != count) {
+            return Ok(SampleChoice::Ragged(lists));
+        }
+        let times: Arc<[f64]> = lists.concat().into();
+        return Ok(SampleChoice::Each { times, count });
+    }
+    let ArrayValues { shape, values } = doubles(value, "at")?;
+    let times: Arc<[f64]> = values.into();
+    match *shape {
+        [] => Ok(SampleChoice::Shared {
+            times,
+            is_one: true,
+        }),
+        [_] => Ok(SampleChoice::Shared {
+            times,
+            is_one: false,
+        }),
+        [_, count] => Ok(SampleChoice::Each { times, count }),
+        _ => Err(input(format!(
+            "at: its shape is {shape:?}; give one time, (frames,), or (tracks, frames)"
+        ))),
     }
 }
 
@@ -278,37 +298,12 @@ pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
         .map_err(|error: tumble::SampleTimesError| input(format!("fps: {error}")))
 }
 
-fn method(value: &Bound<'_, PyAny>) -> PyResult<Option<Method>> {
-    method_named(&text(value, "method")?)
-}
-
-/// The method of that name; `None` for "authored".
-pub(crate) fn method_named(name: &str) -> PyResult<Option<Method>> {
-    if name == AUTHORED {
-        return Ok(None);
-    }
-    let found = Method::named(name);
-    found.map(Some).ok_or_else(|| {
-        let names = METHODS.iter().map(|method| method.name);
-        let names: Vec<&str> = std::iter::once(AUTHORED).chain(names).collect();
+/// The method of that name, or "authored".
+pub(crate) fn method_named(name: &str) -> PyResult<MethodChoice> {
+    name.parse().map_err(|error: UnknownNameError| {
         let refusal = format!("there is no method `{name}`");
-        input(unknown_name(&refusal, name, &names))
+        input(unknown_name(&refusal, name, &error.known))
     })
-}
-
-/// The message about a name that is not in the list of the known ones: `refusal`, the list, and the name that was
-/// probably meant.
-pub(crate) fn unknown_name(refusal: &str, name: &str, known: &[&str]) -> String {
-    let similar = host::nearest_name(name, known.iter().copied());
-    let hint = similar.map(|similar| format!("; did you mean `{similar}`?"));
-    let list = known.join(", ");
-    format!("{refusal}; there are {list}{}", hint.unwrap_or_default())
-}
-
-/// As [`unknown_name`], for the value of a keyword.
-pub(crate) fn unknown_value(keyword: &str, name: &str, known: &[&str]) -> PyErr {
-    let refusal = format!("{keyword}: there is no `{name}`");
-    input(unknown_name(&refusal, name, known))
 }
 
 /// A name, or a pair of angular velocities.
@@ -329,68 +324,17 @@ pub(crate) fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
     option_of(value, "ends")
 }
 
-/// The value of an option of the engine that is called `name`; messages call the keyword `keyword`.
-pub(crate) fn option_named<T: FromStr<Err = UnknownNameError>>(
-    name: &str,
-    keyword: &str,
-) -> PyResult<T> {
-    name.parse()
-        .map_err(|error: UnknownNameError| unknown_value(keyword, name, &error.known))
-}
-
-/// As [`option_named`], of a value of Python.
-pub(crate) fn option_of<T: FromStr<Err = UnknownNameError>>(
-    value: &Bound<'_, PyAny>,
-    keyword: &str,
-) -> PyResult<T> {
-    option_named(&text(value, keyword)?, keyword)
-}
-
-/// The value of that name.
-pub(crate) fn one_of<T: Copy>(
-    value: &Bound<'_, PyAny>,
-    keyword: &str,
-    known: &[(&str, T)],
-) -> PyResult<T> {
-    let name = text(value, keyword)?;
-    let found = known.iter().find(|(known_name, _)| **known_name == *name);
-    found.map(|&(_, value)| value).ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(|&(name, _)| name).collect();
-        unknown_value(keyword, &name, &names)
-    })
-}
-
-fn text<'a>(value: &'a Bound<'_, PyAny>, keyword: &str) -> PyResult<Cow<'a, str>> {
-    value
-        .cast::<PyString>()
-        .map_err(|_| PyTypeError::new_err(format!("{keyword}: give a name, as text")))?
-        .to_cow()
-}
-
-/// The keywords, for the message about one that is none of them.
-const NAMES: [&str; 14] = [
-    "fps",
-    "at",
-    "times",
-    "start",
-    "end",
-    "method",
-    "path",
-    "ends",
-    "speed",
-    "before",
-    "after",
-    "tension",
-    "continuity",
-    "bias",
-];
+/// The keywords that name samples and the method.
+const NAMES: [&str; 6] = ["fps", "at", "times", "start", "end", "method"];
 
 fn check_name(name: &str) -> PyResult<()> {
-    if NAMES.contains(&name) {
+    let options = InterpolationOption::ALL.map(|option| option.name);
+    let known = [&NAMES[..], &options].concat();
+    if known.contains(&name) {
         return Ok(());
     }
     let refusal = format!("there is no keyword `{name}`");
-    Err(PyTypeError::new_err(unknown_name(&refusal, name, &NAMES)))
+    Err(PyTypeError::new_err(unknown_name(&refusal, name, &known)))
 }
 
 /// The arrays among the keywords.

@@ -11,7 +11,7 @@ use tumble::{ComponentType, Encoding, EncodingOptions};
 
 use crate::arrays::{is_aligned, numpy};
 use crate::errors::input;
-use crate::options::unknown_value;
+use crate::names::unknown_value;
 
 /// The type of NumPy's that a component is stored as.
 pub(crate) fn type_name(component: ComponentType) -> &'static str {

@@ -8,10 +8,10 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
-use tumble_formats::bvh::{BvhChannel, BvhJoint};
 use tumble_formats::motion::{
     Body, ChannelInterpolation, Channels, Joint, Motion, Shape, Transform,
 };
+use tumble_formats::motion::{WrittenChannel, WrittenJoint};
 
 use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
@@ -124,10 +124,10 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     let origins: Vec<f64> = motion.origins.iter().flat_map(DVec3::to_array).collect();
     state.set_item("origins", rows(py, origins, 3)?)?;
     let bvh = PyList::empty(py);
-    for joint in &motion.bvh {
-        let number = |channel: &BvhChannel| match *channel {
-            BvhChannel::Position(axis) => axis,
-            BvhChannel::Rotation(axis) => 3 + axis,
+    for joint in &motion.written_joints {
+        let number = |channel: &WrittenChannel| match *channel {
+            WrittenChannel::Position(axis) => axis,
+            WrittenChannel::Rotation(axis) => 3 + axis,
         };
         let channels: Vec<usize> = joint.channels.iter().map(number).collect();
         let sites: Vec<f32> = joint.end_sites.iter().flat_map(Vec3::to_array).collect();
@@ -290,11 +290,11 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     let bvh: Vec<(Vec<usize>, Bound<'_, PyAny>)> = entry(state, "bvh")?.extract()?;
     let bvh = bvh.into_iter().map(|(channels, sites)| {
         let channel = |number: usize| match number {
-            0..3 => BvhChannel::Position(number),
-            _ => BvhChannel::Rotation((number - 3).min(2)),
+            0..3 => WrittenChannel::Position(number),
+            _ => WrittenChannel::Rotation((number - 3).min(2)),
         };
         let sites: Vec<[f32; 3]> = chunks(&sites)?;
-        Ok(BvhJoint {
+        Ok(WrittenJoint {
             channels: channels.into_iter().map(channel).collect(),
             end_sites: sites.into_iter().map(Vec3::from_array).collect(),
         })
@@ -319,7 +319,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         time_offset: entry(state, "time_offset")?.extract()?,
         origins: origins.into_iter().map(DVec3::from_array).collect(),
         no_world: entry(state, "no_world")?.extract()?,
-        bvh: bvh.collect::<PyResult<_>>()?,
+        written_joints: bvh.collect::<PyResult<_>>()?,
         body: pelvis.map(|pelvis| Body {
             pelvis: Vec3::from_array(pelvis),
             shape,
@@ -359,7 +359,7 @@ pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
         && a.time_offset == b.time_offset
         && a.origins == b.origins
         && a.no_world == b.no_world
-        && a.bvh == b.bvh
+        && a.written_joints == b.written_joints
         && a.body == b.body
         && (0..tracks).all(is_same_track)
 }

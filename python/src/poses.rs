@@ -9,13 +9,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::{Layout, Quantity};
 use tumble_formats::motion::Motion;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::Samples;
 use tumble_formats::world::world;
 
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine};
-use crate::options::{Request, SampleRequest};
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::run::interruptible;
 
 /// Translations, rotations and scales relative to the parents.
@@ -92,12 +92,12 @@ fn samples(
     clip: &Bound<'_, Clip>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Samples, usize)> {
-    let request = Request::new(options)?;
+    let request = EvaluationKeywords::new(options)?;
     let motion = &clip.get().motion;
     let requested = request.samples()?;
     if !matches!(
         requested,
-        SampleRequest::Rate(..) | SampleRequest::Shared { .. }
+        SampleChoice::Rate(..) | SampleChoice::Shared { .. }
     ) {
         return Err(input("at: poses need the same times for all tracks"));
     }
@@ -106,11 +106,8 @@ fn samples(
     let engine = engine.engine_for(tracks * count)?;
     let motion = Arc::clone(motion);
     let samples = interruptible(clip.py(), move || {
-        let methods = ChannelMethods {
-            method: request.method,
-            with: &request.with(Quantity::Rotation),
-        };
-        methods
+        request
+            .methods(Quantity::Rotation)
             .sample(&engine, &motion, &frames)
             .map_err(|error| of_engine(&error))
     })?;

@@ -11,7 +11,8 @@ use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, reduce as reduced
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{input, of_engine};
-use crate::options::{frame_rate, option_of};
+use crate::names::option_of;
+use crate::options::frame_rate;
 use crate::run::interruptible;
 use crate::values::{Pickled, pickled, value};
 

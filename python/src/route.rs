@@ -16,7 +16,7 @@ use tumble_routes::walkers::{self, Mover, Walker};
 
 use crate::arrays::{ArrayValues, ListArgument, doubles, parts};
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::unknown_name;
+use crate::names::unknown_name;
 use crate::run::interruptible;
 use crate::values::{Pickled, Value, broken, chunks, list as list_of, pickled, rows};
 

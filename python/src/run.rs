@@ -7,7 +7,9 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use tumble::vulkan::ExportedResult;
-use tumble::{Encoding, Engine, Interpolation, Layout, SampleTimes, Speed, Stop, TrackSet};
+use tumble::{
+    Encoding, Engine, Interpolation, Layout, PerTrack, SampleTimes, Speed, Stop, TrackSet,
+};
 
 use crate::errors::{guarded, of_engine};
 
@@ -29,7 +31,7 @@ const GRACE: Duration = Duration::from_millis(40);
 pub(crate) struct Job<'a> {
     pub(crate) engine: &'a Engine,
     pub(crate) set: &'a TrackSet,
-    pub(crate) interpolation: Interpolation,
+    pub(crate) interpolations: &'a PerTrack<Interpolation>,
     pub(crate) frames: &'a SampleTimes,
     /// Samples of each track.
     pub(crate) samples: usize,
@@ -128,7 +130,7 @@ impl Job<'_> {
     fn evaluate(&self, output: &mut [u8]) -> PyResult<()> {
         let evaluated = self
             .engine
-            .request(self.set, self.interpolation, self.frames)
+            .request(self.set, self.interpolations.clone(), self.frames)
             .layout(self.layout)
             .encoding(self.encoding)
             .evaluate_into(output);
@@ -144,7 +146,7 @@ impl Job<'_> {
     }
 
     fn exported(&self) -> PyResult<ExportedResult> {
-        let clip = self.engine.upload(self.set, self.interpolation);
+        let clip = self.engine.upload(self.set, self.interpolations.clone());
         let exported = clip.and_then(|clip| {
             clip.request(self.frames)
                 .layout(self.layout)
@@ -157,7 +159,7 @@ impl Job<'_> {
     /// Some tracks.
     pub(crate) fn tracks(&self, tracks: std::ops::Range<usize>, output: &mut [u8]) -> PyResult<()> {
         self.engine
-            .request(self.set, self.interpolation, self.frames)
+            .request(self.set, self.interpolations.clone(), self.frames)
             .tracks(tracks)
             .encoding(self.encoding)
             .evaluate_into(output)
@@ -166,12 +168,14 @@ impl Job<'_> {
 
     /// About what it costs one thread at the most.
     fn nanoseconds(&self) -> f64 {
-        let cost = self.interpolation.method.cost;
-        let key = match self.interpolation.speed {
+        let of_key = |interpolation: &Interpolation| match interpolation.speed {
             Speed::Constant => CONSTANT_SPEED,
-            Speed::AsKeyed => cost.key,
+            Speed::AsKeyed => interpolation.method.cost.key,
         };
+        let all = self.interpolations.values();
+        let key = all.iter().map(of_key).fold(0.0, f64::max);
+        let rotation = all.iter().map(|one| one.method.cost.rotation);
         let rotations = self.set.track_count() as f64 * self.samples as f64;
-        key * self.set.key_count() as f64 + cost.rotation * rotations
+        key * self.set.key_count() as f64 + rotation.fold(0.0, f64::max) * rotations
     }
 }

@@ -18,7 +18,8 @@ use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{input, input_at, of_engine, of_track};
-use crate::options::{frame_rate, option_named};
+use crate::names::option_named;
+use crate::options::frame_rate;
 use crate::output::{array, filled};
 use crate::run::{interruptible, work};
 

@@ -7,7 +7,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop};
+use tumble::{
+    Encoding, Engine, Error, FrameRate, Interpolation, Layout, PerTrack, Quantity, SampleTimes,
+    Stop,
+};
 use tumble_formats::diagnostic::Code;
 use tumble_formats::end_frame::{
     EndFrame, EndFrameError, EndRows, FramesToEnd, RateFrames, SampledKind, SampledResult,
@@ -22,16 +25,16 @@ use tumble_formats::kitti::write_frame_times;
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::output::Output;
 use tumble_formats::quaternion::ComponentOrder;
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::Samples;
 use tumble_formats::{Diagnostic, Feature};
 
 use crate::arrays::{ListArgument, Order};
 use crate::clip::{Clip, Source};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{expected, input, of_engine, of_output, of_write, warn};
-use crate::evaluate::uniform;
 use crate::file::{File, format_named};
-use crate::options::{Request, SampleRequest, option_named};
+use crate::names::option_named;
+use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::run::interruptible;
 
 /// Rotations evaluated at once.
@@ -86,7 +89,7 @@ pub(crate) fn save(
     engine: Option<&Bound<'_, crate::engine::Engine>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<()> {
-    let request = Request::new(options)?;
+    let request = EvaluationKeywords::new(options)?;
     let clips = clips_of(clips)?;
     let ending = path.extension().and_then(|ending| ending.to_str());
     let Some(name) = format.or(ending) else {
@@ -203,16 +206,20 @@ struct Save {
     layout: Layout,
     end_frame: Option<EndFrame>,
     engine: Py<crate::engine::Engine>,
-    request: Request,
+    request: EvaluationKeywords,
     clips: Vec<Clip>,
     path: PathBuf,
 }
 
 /// The samples of a clip that are asked for.
-fn requested(clip: &Motion, request: &Request, end_frame: EndFrame) -> PyResult<FramesToEnd> {
+fn requested(
+    clip: &Motion,
+    request: &EvaluationKeywords,
+    end_frame: EndFrame,
+) -> PyResult<FramesToEnd> {
     let frames = request.frames(clip, None)?;
     let found = match *request.samples()? {
-        SampleRequest::Rate(rate, _, end) => {
+        SampleChoice::Rate(rate, _, end) => {
             let end = end.map(|end| clip.time_in_set(end));
             let end = request.outside().end(end, clip);
             FramesToEnd::new(clip, RateFrames { frames, rate, end }, end_frame)
@@ -262,12 +269,12 @@ impl Save {
                 None => self.keys(out, times),
             };
         };
-        if self.end_frame.is_some() && !matches!(samples, SampleRequest::Rate(..)) {
+        if self.end_frame.is_some() && !matches!(samples, SampleChoice::Rate(..)) {
             return Err(input("`end_frame` needs `fps`; `at` lists all times"));
         }
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
-            let SampleRequest::Rate(rate, None, None) = *samples else {
+            let SampleChoice::Rate(rate, None, None) = *samples else {
                 return Err(input(
                     "the animations of a file that is kept keep their lengths; leave out `at`, \
                      `start` and `end`, or write another format",
@@ -501,10 +508,7 @@ impl Save {
                 .engine
                 .get()
                 .engine_for(clip.set.track_count() * frames.timeline.len())?;
-            let methods = ChannelMethods {
-                method: self.request.method,
-                with: &self.request.with(Quantity::Rotation),
-            };
+            let methods = self.request.methods(Quantity::Rotation);
             let samples = sample_to_end(&methods, &engine, clip, &frames.frames, frames.end);
             all.push(samples.map_err(|error| of_engine(&error))?);
         }
@@ -516,7 +520,7 @@ impl Save {
     }
 
     fn notes(&self) -> Vec<(&'static str, String)> {
-        let mut notes = vec![("method", self.request.method_name().to_owned())];
+        let mut notes = vec![("method", self.request.method.name().to_owned())];
         if let Some(source) = self.clips.first().and_then(|clip| clip.source.as_ref()) {
             notes.push(("input", source.path.display().to_string()));
         }
@@ -540,7 +544,7 @@ impl Save {
             }
             None => all.timeline.clone(),
         };
-        let mut notes = vec![("method", self.request.method_name().to_owned())];
+        let mut notes = vec![("method", self.request.method.name().to_owned())];
         notes.extend(all.rate.map(|rate| ("rate", rate.to_string())));
         let layout = format.layout.unwrap_or(self.layout);
         let shape = ResultShape {
@@ -559,11 +563,7 @@ impl Save {
             .engine
             .get()
             .engine_for(clip.set.track_count() * count)?;
-        let with = self.request.with(Quantity::Rotation);
-        let methods = ChannelMethods {
-            method: self.request.method,
-            with: &with,
-        };
+        let methods = self.request.methods(Quantity::Rotation);
         let rows = |at: &SampleTimes| {
             let found = methods.rotations(&engine, clip, at, layout);
             found.map_err(|error| of_engine(&error))
@@ -571,11 +571,8 @@ impl Save {
         let ends = all.end.map(|end| rows(&SampleTimes::at(vec![end.at])));
         let mut ends = EndRows::new(ends.transpose()?.unwrap_or_default(), layout, count);
         let mut write = |rows: &[glam::Quat]| writer.write(&ends.next(rows)).map_err(of_io);
-        if let Some(method) = uniform(clip, &self.request) {
-            stream(&engine, clip, with(method), frames, layout, &mut write)?;
-        } else {
-            write(&rows(frames)?)?;
-        }
+        let interpolations = methods.interpolations(clip);
+        stream(&engine, clip, interpolations, frames, layout, &mut write)?;
         writer.finish().map_err(of_io)?;
         Ok(Vec::new())
     }
@@ -585,7 +582,7 @@ impl Save {
 fn stream(
     engine: &Engine,
     clip: &Motion,
-    interpolation: tumble::Interpolation,
+    interpolations: PerTrack<Interpolation>,
     frames: &SampleTimes,
     layout: Layout,
     mut sink: impl FnMut(&[glam::Quat]) -> PyResult<()>,
@@ -607,7 +604,7 @@ fn stream(
     let sink =
         |chunk: tumble::Chunk<'_>| sink(chunk.rotations().unwrap_or_default()).map_err(Ended::Sink);
     let streamed = engine
-        .request(&clip.set, interpolation, frames)
+        .request(&clip.set, interpolations, frames)
         .layout(layout)
         .stream(CHUNK.max(row), sink);
     streamed.map_err(|ended| match ended {

@@ -7,13 +7,12 @@ use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
-use tumble::{Encoding, Engine, Interpolation, Layout, Quantity, SampleTimes};
+use tumble::{Encoding, Engine, Interpolation, Layout, PerTrack, Quantity, SampleTimes};
 use tumble_formats::motion::Motion;
 
 use crate::arrays::{Order, numpy};
 use crate::errors::{input, of_engine};
-use crate::evaluate::{MethodTracks, sets, uniform};
-use crate::options::Request;
+use crate::options::EvaluationKeywords;
 use crate::output::{array, filled};
 use crate::run::{Job, stoppable};
 use crate::values::{Pickled, Value, pickled};
@@ -26,6 +25,7 @@ pub(crate) struct Chunks {
     samples: usize,
     order: Order,
     layout: Layout,
+    frames: SampleTimes,
     source: ChunkSource,
     /// Rows and columns that a chunk has at most; rows are tracks or frames, as the layout has it.
     each: (usize, usize),
@@ -35,18 +35,10 @@ pub(crate) struct Chunks {
 
 /// How the rotations of a chunk are made.
 enum ChunkSource {
-    /// Tracks that one method interpolates, prepared for each chunk.
-    Tracks(Box<Interpolation>, SampleTimes),
-    /// Tracks that have been prepared: all of them by one method, or those of each method.
-    Prepared(Vec<PreparedTracks>),
-}
-
-/// Tracks that one method interpolates.
-struct PreparedTracks {
-    clip: tumble::Clip,
-    frames: SampleTimes,
-    /// Their indices among all tracks, increasing; `None` where they are all.
-    tracks: Option<Vec<usize>>,
+    /// Tracks that are prepared for each chunk.
+    Tracks(PerTrack<Interpolation>),
+    /// Tracks that have been prepared.
+    Prepared(tumble::Clip),
 }
 
 /// A part of a result, contiguous in the whole.
@@ -78,7 +70,7 @@ impl Chunks {
     pub(crate) fn new(
         engine: Engine,
         motion: &Arc<Motion>,
-        request: &Request,
+        request: &EvaluationKeywords,
         chunk: usize,
         (order, layout): (Order, Layout),
     ) -> PyResult<Self> {
@@ -94,20 +86,12 @@ impl Chunks {
         };
         let each = ((chunk / columns.max(1)).max(1), columns.min(chunk));
         let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
-        let with = request.with(Quantity::Rotation);
-        let source = match uniform(motion, request) {
-            Some(method) if !is_prepared => ChunkSource::Tracks(Box::new(with(method)), frames),
-            _ => {
-                let group = |(method, set, tracks): MethodTracks| -> PyResult<PreparedTracks> {
-                    let clip = engine.upload(&set, with(method));
-                    Ok(PreparedTracks {
-                        clip: clip.map_err(|error| of_engine(&error))?,
-                        frames: request.frames(motion, tracks.as_deref())?,
-                        tracks,
-                    })
-                };
-                let groups = sets(motion, request)?.into_iter().map(group);
-                ChunkSource::Prepared(groups.collect::<PyResult<_>>()?)
+        let interpolations = request.methods(Quantity::Rotation).interpolations(motion);
+        let source = match is_prepared {
+            false => ChunkSource::Tracks(interpolations),
+            true => {
+                let clip = engine.upload(&motion.set, interpolations);
+                ChunkSource::Prepared(clip.map_err(|error| of_engine(&error))?)
             }
         };
         Ok(Self {
@@ -116,6 +100,7 @@ impl Chunks {
             samples,
             order,
             layout,
+            frames,
             source,
             each,
             next: Mutex::new((0, 0)),
@@ -169,20 +154,20 @@ impl Chunks {
             stoppable(|| {
                 let bytes = bytemuck::cast_slice_mut(&mut *numbers);
                 match &self.source {
-                    ChunkSource::Tracks(interpolation, frames) => Job {
+                    ChunkSource::Tracks(interpolations) => Job {
                         engine: &self.engine,
                         set: &self.motion.set,
-                        interpolation: **interpolation,
-                        frames,
+                        interpolations,
+                        frames: &self.frames,
                         samples: self.samples,
                         layout: self.layout,
                         encoding: Encoding::F32,
                     }
                     .tracks(part.0, bytes)?,
-                    ChunkSource::Prepared(groups) => {
-                        for group in groups {
-                            group.write(self.layout, part.clone(), bytes)?;
-                        }
+                    ChunkSource::Prepared(clip) => {
+                        let request = clip.request(&self.frames).layout(self.layout);
+                        let request = request.tracks(part.0).samples(part.1);
+                        (request.evaluate_into(bytes)).map_err(|error| of_engine(&error))?;
                     }
                 }
                 if self.order == Order::Wxyz {
@@ -204,43 +189,6 @@ impl Chunks {
     fn __repr__(&self) -> String {
         let (tracks, samples) = (self.motion.set.track_count(), self.samples);
         format!("Chunks({tracks} tracks × {samples} frames)")
-    }
-}
-
-impl PreparedTracks {
-    /// Writes those of its tracks that are in a part into the bytes of the part.
-    fn write(
-        &self,
-        layout: Layout,
-        (tracks, samples): (Range<usize>, Range<usize>),
-        bytes: &mut [u8],
-    ) -> PyResult<()> {
-        let part = |tracks, bytes: &mut [u8]| {
-            let request = self.clip.request(&self.frames).layout(layout);
-            (request.tracks(tracks).samples(samples.clone()))
-                .evaluate_into(bytes)
-                .map_err(|error| of_engine(&error))
-        };
-        let Some(all) = &self.tracks else {
-            return part(tracks, bytes);
-        };
-        let [first, end] =
-            [tracks.start, tracks.end].map(|track| all.partition_point(|&it| it < track));
-        let tracks_of_group = &all[first..end];
-        let size = Encoding::F32.bytes();
-        let mut found = vec![0; tracks_of_group.len() * samples.len() * size];
-        part(first..end, &mut found)?;
-        for (row, &track) in tracks_of_group.iter().enumerate() {
-            for sample in 0..samples.len() {
-                let from = layout.index(row, sample, tracks_of_group.len(), samples.len());
-                let to = layout.index(track - tracks.start, sample, tracks.len(), samples.len());
-                if let (Some(from), Some(to)) = (from, to) {
-                    let (from, to) = (from * size, to * size);
-                    bytes[to..to + size].copy_from_slice(&found[from..from + size]);
-                }
-            }
-        }
-        Ok(())
     }
 }
 

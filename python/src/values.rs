@@ -6,15 +6,7 @@ use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
 use pyo3::types::{PyString, PyTuple};
 
-use crate::compare::{
-    ArrayDifference, ChannelDifference, ClipDifference, JointDifference, PathErrors,
-    PathStatistics, Spread,
-};
-use crate::errors::{guarded, input};
-use crate::reduce::Reduction;
-use crate::route::{Route, Surface, Walk};
-use crate::stream::Chunk;
-use crate::verify::Verification;
+use crate::errors::input;
 
 /// A result that can be pickled.
 pub(crate) trait Value:
@@ -67,40 +59,6 @@ pub(crate) fn pickled<'py, T: Value>(value: &Bound<'py, T>) -> PyResult<Pickled<
     let again = py.import("tumble._tumble")?.getattr("value_of_state")?;
     let name = value.as_any().get_type().name()?;
     Ok((again, (name, value.get().state(py)?)))
-}
-
-type Maker = for<'py> fn(&Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>>;
-
-fn made<'py, T: Value>(state: &Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
-    let value = guarded(|| T::of_state(state))?;
-    Ok(Bound::new(state.py(), value)?.into_any())
-}
-
-/// The classes by their names.
-const MAKERS: [(&str, Maker); 13] = [
-    ("ArrayDifference", made::<ArrayDifference>),
-    ("ChannelDifference", made::<ChannelDifference>),
-    ("Chunk", made::<Chunk>),
-    ("ClipDifference", made::<ClipDifference>),
-    ("JointDifference", made::<JointDifference>),
-    ("PathErrors", made::<PathErrors>),
-    ("PathStatistics", made::<PathStatistics>),
-    ("Reduction", made::<Reduction>),
-    ("Route", made::<Route>),
-    ("Spread", made::<Spread>),
-    ("Surface", made::<Surface>),
-    ("Verification", made::<Verification>),
-    ("Walk", made::<Walk>),
-];
-
-/// The value of a pickle.
-#[pyfunction]
-pub(crate) fn value_of_state<'py>(
-    name: &str,
-    state: &Bound<'py, PyTuple>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let maker = MAKERS.iter().find(|(known, _)| *known == name);
-    maker.ok_or_else(broken)?.1(state)
 }
 
 /// Rows of so many numbers as an array.

@@ -2,12 +2,11 @@
 
 use pyo3::prelude::*;
 use tumble::verify::{Verdict, verify};
-use tumble::{Engine, Quantity};
+use tumble::{Engine, Quantity, TrackGroup};
 use tumble_formats::motion::Motion;
 
 use crate::errors::of_engine;
-use crate::evaluate::sets;
-use crate::options::Request;
+use crate::options::EvaluationKeywords;
 use crate::values::{Pickled, pickled, value};
 
 /// What `Engine.verify` found.
@@ -53,9 +52,13 @@ value!(Verification {
 
 impl Verification {
     /// Verifies the tracks of each method, and puts together what was found.
-    pub(crate) fn of(engine: &Engine, clip: &Motion, request: &Request) -> PyResult<Self> {
+    pub(crate) fn of(
+        engine: &Engine,
+        clip: &Motion,
+        request: &EvaluationKeywords,
+    ) -> PyResult<Self> {
         let mut all = Self {
-            method: request.method_name().to_owned(),
+            method: request.method.name().to_owned(),
             device: None,
             rotations: 0,
             differing: 0,
@@ -67,12 +70,15 @@ impl Verification {
             verdict: Verdict::Nothing.name().to_owned(),
         };
         let mut verdict: Option<Verdict> = None;
-        let with = request.with(Quantity::Rotation);
-        let sets = sets(clip, request)?;
-        let is_one = sets.len() == 1;
-        for (method, set, tracks) in sets {
-            let frames = request.frames(clip, tracks.as_deref())?;
-            let found = verify(engine, &set, with(method), &frames);
+        let groups = request.methods(Quantity::Rotation).interpolations(clip);
+        let groups = groups.groups(clip.set.track_count());
+        let groups = groups.map_err(|error| of_engine(&error.into()))?;
+        let is_one = groups.len() == 1;
+        for TrackGroup { value, tracks } in groups {
+            let set = clip.set.select(tracks.iter().copied());
+            let set = set.map_err(|error| of_engine(&error.into()))?;
+            let frames = request.frames(clip, Some(&tracks))?;
+            let found = verify(engine, &set, value, &frames);
             let found = found.map_err(|error| of_engine(&error))?;
             if is_one {
                 all.method = found.method.to_owned();

@@ -16,7 +16,7 @@
 //!
 //! # Steps
 //!
-//! `evaluate` chooses one of four functions:
+//! The engine is a [`Machine`](crate::machine::Machine) (`engine/machine.rs`), which chooses one of four functions:
 //!
 //! | in [`engine`] | for | what is prepared |
 //! |---|---|---|

@@ -11,8 +11,9 @@ use crate::curve::options::Quantity;
 use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
+use crate::prepare::vectors::VectorRequest;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
@@ -213,10 +214,15 @@ impl ClipTables {
             Form::Arc => FORM_ARC,
             Form::Polynomial => FORM_POLYNOMIAL,
         };
-        let of_vectors =
-            |channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None, None);
-        let translations = of_vectors(Channel::Translation)?;
-        let scales = of_vectors(Channel::Scale)?;
+        let of_vectors = VectorRequest {
+            quantity: ScalarQuantity::Value,
+            method: vectors,
+            interpolation: &interpolation,
+            group_bytes: None,
+            only_for: None,
+        };
+        let translations = ClipData::of_vectors(set, Channel::Translation, &of_vectors)?;
+        let scales = ClipData::of_vectors(set, Channel::Scale, &of_vectors)?;
         let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
         for (joint, offset) in offsets.iter().enumerate() {
             curves.push(curve(&rotations, joint, form, clock)?);

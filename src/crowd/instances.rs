@@ -2,8 +2,9 @@
 
 use crate::crowd::fade::Fades;
 use crate::crowd::layer::CrowdLayer;
+use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
 use crate::memory::{OutOfMemoryError, reserved, zeroed};
-use crate::output::crowd::{CrowdFrame, EntryChanges, VisibleInstances, listed_changes};
+use crate::output::crowd::listed_changes;
 use crate::shader::{CrowdChange, CrowdClip, CrowdEntry};
 use crate::twin::crowd_entries::change;
 use crate::twin::crowd_times::{ELAPSED_BITS, elapsed};

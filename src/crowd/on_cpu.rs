@@ -3,11 +3,11 @@
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
-use crate::cpu::engine::CpuEngine;
 use crate::crowd::clip_tables::{ClipTables, arcs};
 use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
-use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::machine::Machine;
+use crate::output::crowd::{CrowdOutput, CrowdValues, FrameStep};
 use crate::shader::{
     CHANNELS, CrowdEntry, CrowdPosition, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
 };
@@ -17,7 +17,6 @@ use crate::threads::OutOfThreadsError;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::base_positions;
-use crate::work::crowd::FrameStep;
 
 const TASK: usize = 32;
 
@@ -34,10 +33,10 @@ pub(crate) struct CrowdScene<'a> {
 /// Evaluates all instances into vectors of four numbers.
 pub(crate) fn evaluate(
     scene: CrowdScene<'_>,
-    engine: &CpuEngine,
+    machine: &dyn Machine,
     output: &mut [[f32; 4]],
 ) -> Result<(), OutOfThreadsError> {
-    let (context, width) = (scene.context, engine.width);
+    let (context, width) = (scene.context, machine.width());
     let task = |(positions, rotations): &mut (Vec<_>, Vec<_>),
                 (output, entries): (&mut [[f32; 4]], &[CrowdEntry])| {
         positions.resize(
@@ -63,7 +62,7 @@ pub(crate) fn evaluate(
         task(&mut Default::default(), (output, entries));
         return Ok(());
     }
-    engine.on_threads(|| {
+    machine.threads().run(|| {
         let tasks = output.par_chunks_mut(of_output);
         let tasks = tasks.zip(entries.par_chunks(of_entries));
         tasks.for_each_init(Default::default, task);

@@ -9,16 +9,15 @@ use rayon::prelude::*;
 use crate::crowd::clip_tables::{ClipTables, arcs, constants_of, runs_of};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
-use crate::evaluate::Backend;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC,
     FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, POWERS, TICKS, TRANSLATION,
 };
-use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::Lanes;
-use crate::threads::{on_threads, stop};
+use crate::threads::stop;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
@@ -284,10 +283,7 @@ impl MotionTables {
         {
             return Err(CrowdError::OutputLength { length, needed });
         }
-        let width = match &*engine.backend {
-            Backend::Cpu(engine) => engine.width,
-            Backend::Vulkan(_) => VectorWidth::widest(),
-        };
+        let width = engine.machine.width();
         let stop = stop::current();
         let each = TASK * self.joints;
         let task = |memory: &mut StateScratch, (at, states): (&[(u32, u32)], MotionStates<'_>)| {
@@ -316,10 +312,7 @@ impl MotionTables {
             .map(|at| (at, left.split_off(each)))
             .collect();
         let work = || (tasks.into_par_iter()).try_for_each_init(StateScratch::default, task);
-        match &*engine.backend {
-            Backend::Cpu(engine) => engine.on_threads(work)?,
-            Backend::Vulkan(_) => on_threads(work)?,
-        }
+        engine.machine.threads().run(work)?
     }
 }
 

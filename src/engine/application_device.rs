@@ -2,12 +2,14 @@
 //! application's promises about its handles.
 #![allow(unsafe_code)]
 
+use std::sync::Arc;
+
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanHandles;
-use crate::gpu::options::EngineOptions;
 use crate::gpu::recovery::Opened;
+use crate::machine::options::EngineOptions;
 
 impl Engine {
     /// Makes an engine on an application's Vulkan device.
@@ -26,6 +28,13 @@ impl Engine {
     ) -> Result<Self, Error> {
         // SAFETY: promised by the caller.
         let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
-        Ok(Self::with_opened(Opened::trusted(engine, options)?))
+        Ok(Self {
+            machine: Arc::new(Opened::trusted(engine, options)?),
+        })
+    }
+
+    /// The Vulkan device; `None` on the CPU.
+    pub(crate) fn opened(&self) -> Option<&Opened> {
+        Opened::of(&*self.machine)
     }
 }

@@ -4,6 +4,7 @@
 mod application_device;
 mod auto;
 pub(crate) mod clip;
+pub(crate) mod groups;
 mod stream;
 
 use std::sync::Arc;
@@ -15,26 +16,26 @@ use crate::cpu::engine::CpuEngine;
 use crate::device::{Device, VulkanDevice};
 use crate::engine::clip::Clip;
 use crate::engine::clip::request::Request;
+use crate::engine::groups::GroupedSet;
 use crate::error::Error;
-use crate::evaluate::Backend;
-use crate::evaluate::plan::Plan;
+use crate::evaluate;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
 use crate::gpu::engine::choices::EngineChoices;
-use crate::gpu::options::{EngineOptions, Timings};
 #[cfg(feature = "prove")]
 use crate::gpu::physical::details::DeviceDetails;
-use crate::gpu::recovery::Opened;
-use crate::gpu::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
-use crate::gpu::self_test;
+use crate::machine::Machine;
+use crate::machine::options::{EngineOptions, Timings};
+use crate::machine::plan::Plan;
+use crate::machine::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
 use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::prepare::preparation::SetRequest;
 use crate::simd::dispatch::VectorWidth;
-use crate::threads::lock;
 use crate::time::frames::SampleTimes;
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
 
 /// The maximum number of worker threads.
@@ -62,7 +63,7 @@ const MAX_THREADS: usize = 1024;
 /// after another.
 #[derive(Clone)]
 pub struct Engine {
-    pub(crate) backend: Arc<Backend>,
+    pub(crate) machine: Arc<dyn Machine>,
 }
 
 impl Engine {
@@ -104,18 +105,12 @@ impl Engine {
                 let (stores, memory) = (options.streaming_stores, options.memory);
                 let engine = CpuEngine::new(width, stores, options.thread_count, memory)?;
                 Ok(Self {
-                    backend: Arc::new(Backend::Cpu(engine)),
+                    machine: Arc::new(engine),
                 })
             }
-            Device::Vulkan(VulkanDevice { physical }) => {
-                Ok(Self::with_opened(Opened::new(&physical, options)?))
-            }
-        }
-    }
-
-    pub(crate) fn with_opened(opened: Opened) -> Self {
-        Self {
-            backend: Arc::new(Backend::Vulkan(Box::new(opened))),
+            Device::Vulkan(VulkanDevice { listed }) => Ok(Self {
+                machine: listed.open(options)?,
+            }),
         }
     }
 
@@ -128,31 +123,28 @@ impl Engine {
     /// Name, kind and limits of the Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
-        self.backend.opened().map(|opened| &opened.info)
+        self.machine.info()
     }
 
     /// All details that Vulkan reports of the device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn device_details(&self) -> Option<DeviceDetails> {
-        let opened = self.backend.opened()?;
-        Some(opened.engine().device.physical.details())
+        Some(self.opened()?.engine().device.physical.details())
     }
 
     /// The engine's choices for its device; `None` on the CPU.
     #[cfg(feature = "prove")]
     #[must_use]
     pub fn choices(&self) -> Option<EngineChoices> {
-        Some(self.backend.opened()?.engine().choices())
+        Some(self.opened()?.engine().choices())
     }
 
     /// The results of the self-test that ran when the device was opened, one report for each expression; empty on the
     /// CPU, with which devices are compared.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
-        self.backend
-            .opened()
-            .map_or(&[], |opened| &opened.self_tests)
+        self.machine.self_tests()
     }
 
     /// Compiles every kernel, one after the other, and calls `each` with its name and the time that the driver took.
@@ -167,10 +159,10 @@ impl Engine {
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
     ) -> Result<(), Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(());
-        };
-        Ok(opened.engine().compile_kernels(each)?)
+        match self.opened() {
+            Some(opened) => Ok(opened.engine().compile_kernels(each)?),
+            None => Ok(()),
+        }
     }
 
     /// Compares every kernel on the device with its twin on the CPU, bit by bit, for small, ordinary and extreme
@@ -195,10 +187,7 @@ impl Engine {
         &self,
         each: &mut dyn FnMut(KernelCheck) -> bool,
     ) -> Result<(), Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(());
-        };
-        Ok(opened.engine().check_kernels(false, each)?)
+        Ok(self.machine.check_kernels(false, each)?)
     }
 
     /// As [`Engine::check_kernels`], without running the kernels that are known to be exact on this device; they are
@@ -214,20 +203,16 @@ impl Engine {
     /// [`remembered`](KernelCheck::remembered); for the others no values were compared. Empty on the CPU.
     #[must_use]
     pub fn known_kernels(&self) -> Vec<KernelCheck> {
-        let known = |opened: &Opened| opened.engine().known_kernels();
-        self.backend.opened().map_or_else(Vec::new, known)
+        self.machine.known_kernels()
     }
 
     fn kernel_checks(&self, only_unknown: bool) -> Result<Vec<KernelCheck>, Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(Vec::new());
-        };
         let mut checks = Vec::new();
         let mut each = |check| {
             checks.push(check);
             true
         };
-        opened.engine().check_kernels(only_unknown, &mut each)?;
+        self.machine.check_kernels(only_unknown, &mut each)?;
         Ok(checks)
     }
 
@@ -237,48 +222,46 @@ impl Engine {
     /// # Errors
     /// When the device fails.
     pub fn negative_control(&self) -> Result<Option<NegativeControl>, Error> {
-        let Some(opened) = self.backend.opened() else {
-            return Ok(None);
-        };
-        Ok(Some(self_test::negative_control(&opened.engine())?))
+        Ok(self.machine.negative_control()?)
     }
 
     /// The messages of the validation layer so far; see [`Device::list_with`].
     #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
-        let messages = |opened: &Opened| {
-            let device = &opened.engine().device;
-            device.physical.instance.validation_messages()
-        };
-        self.backend.opened().map_or_else(Vec::new, messages)
+        self.machine.validation_messages()
     }
 
     /// Returns the times of this engine's evaluations since the last call, or since the engine was opened; zero on
     /// the CPU.
     #[must_use]
     pub fn take_timings(&self) -> Timings {
-        let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
-        self.backend.opened().map_or_else(Timings::default, timings)
+        self.machine.take_timings()
     }
 
-    /// Prepares a set for a method and stores it on the device as a clip.
+    /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
     ///
-    /// If the prepared set would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
+    /// If the prepared tracks of an interpolation would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
     /// evaluation prepares them piece by piece: slower, with the same bits.
     ///
     /// # Errors
-    /// When a track cannot be interpolated as requested, there is not enough memory, or the device fails.
-    /// [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
+    /// When a track cannot be interpolated as requested, there are interpolations for another number of tracks or with
+    /// several quantities, there is not enough memory, or the device fails. [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
     pub fn upload(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
     ) -> Result<Clip, Error> {
-        let uploaded = Uploaded::whole(&self.backend, set, interpolation.into())?;
+        let (interpolations, tracks) = (interpolations.into(), set.track_count());
+        let Some(interpolation) = interpolations.uniform(tracks) else {
+            let grouped = GroupedSet::new(self, set, interpolations);
+            return Ok(Clip::of_groups(self.clone(), grouped.prepared()?));
+        };
+        let uploaded = Uploaded::whole(&self.machine, set, interpolation)?;
         Ok(Clip::new(self.clone(), uploaded))
     }
 
-    /// Starts a request for the samples of a set at the times of `frames`. The set need not be uploaded.
+    /// Starts a request for the samples of a set at the times of `frames`, by an interpolation, or by [one of each
+    /// track](PerTrack). The set need not be uploaded.
     ///
     /// By default the result has all tracks, track by track, with four f32 a value. Only the segments that the
     /// samples need are prepared. On a Vulkan device a set larger than its memory (or than [`EngineOptions::memory`])
@@ -300,13 +283,13 @@ impl Engine {
     pub fn request<'a>(
         &'a self,
         set: &'a TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &'a SampleTimes,
     ) -> Request<'a> {
-        Request::of_set(self, set, interpolation.into(), frames)
+        Request::of_set(self, set, interpolations.into(), frames)
     }
 
-    /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolation,
+    /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolations,
     /// frames).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
@@ -314,10 +297,10 @@ impl Engine {
     pub fn evaluate(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
     ) -> Result<Rotations, Error> {
-        self.request(set, interpolation, frames).evaluate()
+        self.request(set, interpolations, frames).evaluate()
     }
 
     /// Evaluates the angular velocity or acceleration ([`Interpolation::quantity`]) of every track at every sample.
@@ -347,7 +330,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let plan = self.plan(request, layout, Encoding::F32, None);
-        let storage = self.backend.evaluate(request, &plan)?;
+        let storage = evaluate::evaluate(&self.machine, request, &plan)?;
         let (tracks, samples) = (request.tracks.len(), request.samples.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -360,12 +343,12 @@ impl Engine {
         encoding: Encoding,
         chunk: Option<usize>,
     ) -> Plan {
-        Plan::of(request, layout, encoding, chunk, &self.backend.limits())
+        Plan::of(request, layout, encoding, chunk, &self.machine.limits())
     }
 
     /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
     /// velocities and accelerations, or `[f32; 4]` for both. Short for [`request`](Engine::request)`(set,
-    /// interpolation,
+    /// interpolations,
     /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which
     /// accepts memory of any type.
     ///
@@ -379,12 +362,12 @@ impl Engine {
     pub fn evaluate_into<R: OutputValue>(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        self.request(set, interpolation, frames)
+        self.request(set, interpolations, frames)
             .layout(layout)
             .evaluate_values_into(output)
     }
@@ -411,14 +394,11 @@ impl Engine {
     ) -> Result<(), Error> {
         let interpolation = interpolation.into();
         check_encoding(encoding, interpolation.quantity)?;
-        match self.backend.opened() {
-            Some(opened) => Ok(opened.warm(interpolation.form(), encoding)?),
-            None => Ok(()),
-        }
+        Ok(self.machine.warm(interpolation.form(), encoding)?)
     }
 
     /// Describes in words how a whole set would be evaluated in f32: whether it is prepared, and in which pieces. All
-    /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolation,
+    /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolations,
     /// frames).`[`layout`](Request::layout)`(layout).`[`explain`](Request::explain)`()`, which also knows encodings and
     /// parts of a set.
     ///
@@ -427,11 +407,11 @@ impl Engine {
     pub fn explain_route(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<String, Error> {
-        self.request(set, interpolation, frames)
+        self.request(set, interpolations, frames)
             .layout(layout)
             .explain()
     }

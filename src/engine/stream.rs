@@ -6,8 +6,9 @@ use glam::Quat;
 use crate::checks::{check_encoding, check_window};
 use crate::engine::Engine;
 use crate::error::Error;
+use crate::evaluate::fill;
 use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::plan::Chunks;
+use crate::machine::plan::Chunks;
 use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
@@ -31,23 +32,22 @@ impl Engine {
         request.check().map_err(Error::from)?;
         match plan.chunks {
             Chunks::PreparedOnce => {
-                let prepared = PreparedWindow::whole(&self.backend, request);
+                let prepared = PreparedWindow::whole(&self.machine, request);
                 let prepared = prepared.map_err(Error::from)?;
-                let fill = |window: &Window, output: &mut [Quat]| {
+                let fill_chunk = |window: &Window, output: &mut [Quat]| {
                     let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
                     Ok(prepared.evaluate_into(window, output)?)
                 };
-                run(windows, quantity, fill, sink)
+                run(windows, quantity, fill_chunk, sink)
             }
-            Chunks::Single | Chunks::Each => {
-                let fill = |window: &Window, output: &mut [Quat]| {
+            Chunks::Single | Chunks::Each | Chunks::SomeTracks => {
+                let fill_chunk = |window: &Window, output: &mut [Quat]| {
                     let part = request.part(window.tracks.clone(), window.samples.clone());
                     let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
-                    Ok(self
-                        .backend
-                        .fill(&part, &plan.of_chunk(request, window), output)?)
+                    let plan = plan.of_chunk(request, window);
+                    Ok(fill(&self.machine, &part, &plan, output)?)
                 };
-                run(windows, quantity, fill, sink)
+                run(windows, quantity, fill_chunk, sink)
             }
         }
     }
@@ -68,6 +68,6 @@ impl Engine {
             return Ok(());
         }
         let plan = self.plan(request, layout, encoding, None);
-        Ok(self.backend.fill(request, &plan, output)?)
+        Ok(fill(&self.machine, request, &plan, output)?)
     }
 }

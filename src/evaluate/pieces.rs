@@ -5,37 +5,28 @@ use std::sync::Arc;
 
 use glam::Quat;
 
-use crate::evaluate::Backend;
-use crate::evaluate::plan::{Plan, halves};
 #[cfg(test)]
 use crate::evaluate::steps;
-use crate::evaluate::uploaded::Uploaded;
-use crate::gpu::error::EvaluateError;
-use crate::gpu::job::ClipBuffers;
+use crate::evaluate::uploaded::prepare;
+use crate::machine::error::EvaluateError;
+use crate::machine::plan::{Plan, halves};
+use crate::machine::{Machine, MachineClip};
 use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::PrepareRequest;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::SetRequest;
-use crate::prepare::prepared::Prepared;
 use crate::threads::stop;
 use crate::time::frames::Timeline;
 
 /// The number of values of a piece that are evaluated at once, if they are not contiguous in the result.
 const SCATTERED: usize = 1 << 18;
 
-/// The memory of a piece, which the next one uses: fresh memory costs more than the work in it.
-#[derive(Default)]
-struct Spare {
-    segments: Vec<Prepared>,
-    buffers: Option<ClipBuffers>,
-}
-
 /// Evaluates the pieces of a plan into `output`, which is exactly as long as the request's result. If a device has no
 /// memory for a piece, it is halved.
 pub(crate) fn evaluate(
-    backend: &Arc<Backend>,
+    machine: &Arc<dyn Machine>,
     request: &SetRequest<'_>,
     plan: &Plan,
     output: EncodedOutput<'_>,
@@ -43,13 +34,14 @@ pub(crate) fn evaluate(
     let whole = Window::of(request.tracks.clone(), request.samples.clone(), plan.layout);
     let mut pieces = VecDeque::from(plan.pieces.clone());
     let are_several = pieces.len() > 1;
-    let mut spare = Spare::default();
+    // The memory of a piece is used by the next one: fresh memory costs more than the work in it.
+    let mut spare = None;
     let mut scratch = Vec::new();
     while let Some(piece) = pieces.pop_front() {
         stop::check().map_err(SetError::from)?;
         let part = request.part(piece.tracks.clone(), piece.samples.clone());
-        match PreparedWindow::new(backend, &part, are_several, std::mem::take(&mut spare)) {
-            Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => {
+        match PreparedWindow::new(machine, &part, are_several, spare.take()) {
+            Err(EvaluateError::NoRoom(error)) => {
                 let halves = halves(request, &piece).ok_or(error)?;
                 halves
                     .into_iter()
@@ -66,7 +58,7 @@ pub(crate) fn evaluate(
                     &mut scratch,
                     EncodedOutput { encoding, bytes },
                 )?;
-                spare = prepared.into_spare();
+                spare = Some(prepared.clip);
             }
         }
     }
@@ -75,7 +67,7 @@ pub(crate) fn evaluate(
 
 /// Some samples of some tracks of a set, prepared.
 pub(crate) struct PreparedWindow {
-    clip: Uploaded,
+    clip: Box<dyn MachineClip>,
     /// The timeline of the prepared tracks.
     timeline: Timeline,
     /// The index of the first prepared track.
@@ -87,31 +79,30 @@ pub(crate) struct PreparedWindow {
 impl PreparedWindow {
     /// Prepares the segments of a request, all at once.
     pub(crate) fn whole(
-        backend: &Arc<Backend>,
+        machine: &Arc<dyn Machine>,
         request: &SetRequest<'_>,
     ) -> Result<Self, EvaluateError> {
-        Self::new(backend, request, false, Spare::default())
+        Self::new(machine, request, false, None)
     }
 
     fn new(
-        backend: &Arc<Backend>,
+        machine: &Arc<dyn Machine>,
         request: &SetRequest<'_>,
         large_groups: bool,
-        spare: Spare,
+        spare: Option<Box<dyn MachineClip>>,
     ) -> Result<Self, EvaluateError> {
         #[cfg(test)]
-        steps::take_note(backend, steps::Step::Piece);
+        steps::take_note(&**machine, steps::Step::Piece);
         let (timeline, first_sample) = (request.timeline).part(&request.tracks, &request.samples);
         let to_prepare = PrepareRequest {
             batch: request.batch(),
             large_groups,
             only_for: Some(&timeline),
-            spare: spare.segments,
             ..PrepareRequest::all(request.set)
         };
         let (set, interpolation) = (request.set, *request.interpolation);
-        let clip = Uploaded::new(backend, set, interpolation, to_prepare, spare.buffers)?;
-        let timeline = clip.data.folded(&timeline)?.into_owned();
+        let clip = prepare(machine, set, interpolation, to_prepare, spare)?;
+        let timeline = clip.data().folded(&timeline)?.into_owned();
         Ok(Self {
             clip,
             timeline,
@@ -120,27 +111,27 @@ impl PreparedWindow {
         })
     }
 
-    fn into_spare(self) -> Spare {
-        let (segments, buffers) = self.clip.into_spare();
-        Spare { segments, buffers }
-    }
-
     /// Evaluates a part of the window, of tracks and samples of the set, into `output`, which is exactly as long.
     pub(crate) fn evaluate_into(
         &self,
         part: &Window,
         output: EncodedOutput<'_>,
     ) -> Result<(), EvaluateError> {
-        self.with(part, |clip, timeline, window| {
-            clip.evaluate_into(timeline, window, output)
+        self.with(part, |timeline, window| {
+            self.clip().evaluate_into(timeline, window, output)
         })
     }
 
-    /// Calls `work` with the prepared tracks, the samples, and a part of the window relative to them.
+    /// The prepared tracks.
+    pub(crate) fn clip(&self) -> &dyn MachineClip {
+        &*self.clip
+    }
+
+    /// Calls `work` with the samples, and a part of the window relative to the prepared tracks.
     pub(crate) fn with<T>(
         &self,
         part: &Window,
-        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
+        work: impl FnOnce(&Timeline, &Window) -> Result<T, EvaluateError>,
     ) -> Result<T, EvaluateError> {
         let (tracks, samples) = (&part.tracks, &part.samples);
         let (first_track, skipped) = (self.first_track, self.skipped_samples);
@@ -149,7 +140,7 @@ impl PreparedWindow {
             samples.start - skipped..samples.end - skipped,
             part.layout,
         );
-        let done = work(&self.clip, &self.timeline, &window);
+        let done = work(&self.timeline, &window);
         done.map_err(|error| error.of_tracks_from(first_track))
     }
 

@@ -2,31 +2,35 @@
 
 use std::sync::Mutex;
 
-use crate::evaluate::Backend;
-use crate::evaluate::plan::Route;
+use crate::machine::Machine;
+use crate::machine::plan::Rows;
 use crate::threads::lock;
 
 /// A step of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Step {
     /// Rows of samples on a route.
-    Rows(Route),
+    Rows(Rows),
     /// Rows that are copied into frames.
     Transposed,
     /// Segments that are prepared together.
     Piece,
 }
 
-/// Tests run at the same time: the notes of each engine are its own, by the address of its device.
+/// Tests run at the same time: the notes of each engine are its own, by the address of its machine.
 static NOTES: Mutex<Vec<(usize, Step)>> = Mutex::new(Vec::new());
 
-pub(crate) fn take_note(backend: &Backend, step: Step) {
-    lock(&NOTES).push((std::ptr::from_ref(backend).addr(), step));
+fn address_of(machine: &dyn Machine) -> usize {
+    std::ptr::from_ref(machine).cast::<()>().addr()
+}
+
+pub(crate) fn take_note(machine: &dyn Machine, step: Step) {
+    lock(&NOTES).push((address_of(machine), step));
 }
 
 /// Returns the steps of an engine since the last call.
-pub(crate) fn of(backend: &Backend) -> Vec<Step> {
-    let address = std::ptr::from_ref(backend).addr();
+pub(crate) fn of(machine: &dyn Machine) -> Vec<Step> {
+    let address = address_of(machine);
     let mut notes = lock(&NOTES);
     let steps = notes.iter().filter(|(of, _)| *of == address);
     let steps = steps.map(|(_, step)| *step).collect();

@@ -3,7 +3,6 @@
 
 pub(crate) mod arcs;
 pub(crate) mod cubics;
-pub(crate) mod dispatches;
 pub(crate) mod evaluate;
 
 use crate::curve::options::KeySigns;

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 
 use ash::{khr, vk};
 
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
 use crate::gpu::instance::Instance;
 use crate::gpu::physical::PhysicalDevice;
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 
 /// The Vulkan version that the application requests.
 const VERSION: u32 = vk::API_VERSION_1_1;

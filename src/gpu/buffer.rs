@@ -7,9 +7,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::external::{FILE, HOST_ALLOCATION, usage};
 use crate::gpu::shared_memory::{MemoryKind, Share};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::shader::PolynomialSegment;
 
 /// The memory of a buffer, by its users.

@@ -4,12 +4,12 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
+use crate::gpu::clip::{ClipBuffers, Job};
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kept_lists::KeptLists;
 use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::machine::error::{EvaluateError, VulkanError};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::threads::lock;

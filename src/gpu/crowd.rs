@@ -1,21 +1,23 @@
 //! A crowd on a Vulkan device: its tables, which stay on the device, and the buffers for its results. Each evaluation
 //! records a frame ([`Frames`]) into the same memory, without waiting and without allocating.
 
+use std::any::Any;
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
+use bytemuck::cast_slice;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::in_flight::KernelResults;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::{Binding, Commands, Recorded};
-use crate::output::crowd::{
-    CrowdFrame, CrowdOutput, EntryChanges, VisibleInstances, listed_changes,
-};
-use crate::shader::{CrowdChange, CrowdEntry};
+use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
+use crate::machine::crowd::{CrowdSource, MachineCrowd};
+use crate::machine::error::VulkanError;
+use crate::output::crowd::{CrowdOutput, listed_changes};
+use crate::shader::{CrowdChange, CrowdEntry, CrowdLink};
 use crate::threads::lock;
 use crate::work::crowd::{self, CrowdDevice, CrowdResources, CrowdShape, FrameKernels, Frames};
 
@@ -28,7 +30,7 @@ const SOFTWARE_WINDOW: u64 = 8 << 20;
 /// Bytes of a matrix.
 const MATRIX: u64 = 48;
 
-/// The shape of a crowd, and the tables of its library for the kernels ([`VulkanEngine::crowd_table`]).
+/// The shape of a crowd, and the tables of its library for the kernels.
 pub(crate) struct CrowdTables {
     pub(crate) instances: u32,
     pub(crate) shape: CrowdShape,
@@ -54,8 +56,39 @@ pub(crate) struct DeviceCrowd {
     visible: Buffer,
 }
 
+impl CrowdTables {
+    /// Copies the tables to the device.
+    fn new(engine: &VulkanEngine, source: &CrowdSource<'_>) -> Result<Self, VulkanError> {
+        // Behind the links, where each level begins and ends.
+        let mut links = source.links.to_vec();
+        links.extend(source.levels.windows(2).map(|level| CrowdLink {
+            joint: level[0],
+            parent: level[1],
+        }));
+        let table = |name, bytes: &[u8]| {
+            engine.check_size("a crowd's library", bytes)?;
+            engine.resident(name, bytes, &mut Vec::new())
+        };
+        Ok(Self {
+            instances: source.instances,
+            shape: CrowdShape {
+                levels: source.levels.to_vec(),
+                only_arcs: source.only_arcs,
+                arguments: source.arguments,
+            },
+            clips: table("tumble crowd clips", cast_slice(source.clips))?,
+            bases: table("tumble crowd time bases", cast_slice(source.bases))?,
+            spans: table("tumble crowd spans", cast_slice(source.spans))?,
+            channels: table("tumble crowd channels", cast_slice(source.channels))?,
+            cells: table("tumble crowd cells", cast_slice(source.cells))?,
+            links: table("tumble crowd links", cast_slice(&links))?,
+            bind: table("tumble crowd inverse bind", cast_slice(source.bind))?,
+        })
+    }
+}
+
 impl DeviceCrowd {
-    pub(crate) fn new(engine: Arc<VulkanEngine>, tables: CrowdTables) -> Result<Self, VulkanError> {
+    fn new(engine: Arc<VulkanEngine>, tables: CrowdTables) -> Result<Self, VulkanError> {
         let device = &engine.device;
         let arguments = &tables.shape.arguments;
         let instances = u64::from(tables.instances);
@@ -229,20 +262,68 @@ impl CrowdTarget {
     }
 }
 
+/// A crowd on a device, and the evaluation that is in flight.
+pub(crate) struct VulkanCrowd {
+    pub(crate) device: Arc<DeviceCrowd>,
+    /// The objects for evaluations whose result is read back, for the last requested output.
+    reader: Option<CrowdReader>,
+}
+
+impl VulkanCrowd {
+    pub(super) fn new(
+        engine: Arc<VulkanEngine>,
+        source: &CrowdSource<'_>,
+    ) -> Result<Self, VulkanError> {
+        let tables = CrowdTables::new(&engine, source)?;
+        Ok(Self {
+            device: Arc::new(DeviceCrowd::new(engine, tables)?),
+            reader: None,
+        })
+    }
+
+    /// The crowd, if it is on a Vulkan device.
+    pub(crate) fn of(crowd: &dyn MachineCrowd) -> Option<&Self> {
+        let crowd: &dyn Any = crowd;
+        crowd.downcast_ref()
+    }
+}
+
+impl MachineCrowd for VulkanCrowd {
+    fn submit(&mut self, output: CrowdOutput, frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
+        let kept = self.reader.take();
+        let kept = kept.filter(|reader| reader.fits(output, frame.instances));
+        let all = self.device.tables.instances;
+        let room = frame.instances.next_power_of_two().min(all);
+        let mut reader = kept.map_or_else(|| CrowdReader::new(&self.device, output, room), Ok)?;
+        reader.submit(frame)?;
+        self.reader = Some(reader);
+        Ok(())
+    }
+
+    fn is_done(&self) -> Result<bool, VulkanError> {
+        (self.reader.as_ref()).map_or(Ok(true), |reader| reader.results.is_done())
+    }
+
+    fn wait_into(&mut self, output: &mut [u8]) -> Result<bool, VulkanError> {
+        let Some(mut reader) = self.reader.take() else {
+            return Ok(false);
+        };
+        reader.wait_into(output)?;
+        self.reader = Some(reader);
+        Ok(true)
+    }
+}
+
 /// A target whose result the host reads: it is in host-visible memory, and a submission does not wait.
-pub(crate) struct CrowdReader {
+struct CrowdReader {
     // It goes first: it waits for what uses the rest.
-    pub(crate) results: KernelResults,
-    pub(crate) target: CrowdTarget,
+    results: KernelResults,
+    target: CrowdTarget,
 }
 
 impl CrowdReader {
     /// Makes a reader with room for `room` instances.
-    pub(crate) fn new(
-        crowd: &Arc<DeviceCrowd>,
-        output: CrowdOutput,
-        room: u32,
-    ) -> Result<Self, VulkanError> {
+    fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput, room: u32) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
         let bytes = u64::from(room) * crowd.bytes(output);
         let mut results = KernelResults::new(&engine.device)?;
@@ -255,12 +336,12 @@ impl CrowdReader {
     }
 
     /// Whether the reader is for this output and has room for so many instances.
-    pub(crate) fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
+    fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
         self.target.output == output && self.target.room >= instances
     }
 
     /// Submits the evaluation of a frame; the previous one must have been waited for.
-    pub(crate) fn submit(&mut self, frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
+    fn submit(&mut self, frame: &CrowdFrame<'_>) -> Result<(), VulkanError> {
         let kernels = &mut self.results.kernels;
         kernels.begin()?;
         self.target.record(kernels.commands(), frame);
@@ -271,7 +352,7 @@ impl CrowdReader {
     }
 
     /// Waits, and copies the result to `output`, which has the same length.
-    pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
+    fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
         self.results.wait()?;
         output.copy_from_slice(self.results.bytes(0..output.len())?);
         Ok(())

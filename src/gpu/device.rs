@@ -7,18 +7,19 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::cache::Cache;
 use crate::gpu::device_queue::DeviceQueue;
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::handles::VulkanQueue;
 use crate::gpu::kernel_check::passes::Passes;
-use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
 use crate::gpu::physical::queues::{Copies, QueueIndex};
 use crate::gpu::physical::upload_memory::{Placing, direct};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::shared_memory::SharedMemory;
+use crate::machine::cache::Cache;
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
+use crate::machine::options::{EngineOptions, ReadBack};
 
 /// The purpose of a submission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

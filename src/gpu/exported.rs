@@ -7,11 +7,12 @@ use ash::vk;
 
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::{Named, VulkanError};
 #[cfg(unix)]
 use crate::gpu::physical::external::{FILE, SEMAPHORE_FILE};
 use crate::gpu::submission::Point;
 use crate::gpu::submission::Semaphore;
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::threads::lock;
 
 /// The time limit for waiting for a result; the same as for a fence.
@@ -139,7 +140,7 @@ impl ExportedResult {
     }
 
     /// The device's UUID, by which other interfaces identify it, as in
-    /// [`DeviceInfo::uuid`](crate::gpu::reports::DeviceInfo::uuid).
+    /// [`DeviceInfo::uuid`](crate::machine::reports::DeviceInfo::uuid).
     #[must_use]
     pub fn device_uuid(&self) -> &str {
         &self.device().physical.info.uuid

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk::{self, Handle as _};
 
-use crate::gpu::error::{Named as _, VulkanError};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named as _;
 use crate::threads::lock;
 
 /// An application's instance, device and queue, for an engine
@@ -34,7 +35,7 @@ pub struct VulkanHandles {
     /// The family of `queue`.
     pub queue_family: u32,
     /// A second queue, on which staged results are copied to the host while `queue` computes
-    /// ([`ReadBack`](crate::gpu::options::ReadBack)). It requires the feature `timelineSemaphore` of the device.
+    /// ([`ReadBack`](crate::machine::options::ReadBack)). It requires the feature `timelineSemaphore` of the device.
     /// `None`: only `queue` is used.
     pub copy_queue: Option<VulkanQueue>,
     /// A lock for `queue`, so that the application and the engine may submit at any time, from any thread.
@@ -53,7 +54,7 @@ pub struct VulkanHandles {
     pub queue_lock: Option<QueueLock>,
     /// The application's pipeline cache, in which the engine makes its pipelines. It must outlive the engine, must not
     /// be synchronized externally, and is neither read from nor written to a file by the engine. `None`: the engine
-    /// makes a cache, and keeps it in a file ([`EngineOptions::cache_files`](crate::gpu::options::EngineOptions)).
+    /// makes a cache, and keeps it in a file ([`EngineOptions::cache_files`](crate::machine::options::EngineOptions)).
     pub pipeline_cache: Option<vk::PipelineCache>,
 }
 

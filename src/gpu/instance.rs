@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::error::{Named, VulkanError};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::threads::lock;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";

@@ -4,11 +4,11 @@
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::error::EvaluateError;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::recorded::Recorded;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
+use crate::machine::error::EvaluateError;
 use crate::output::window::Window;
 use crate::shader::List;
 use crate::threads::{lock, on_threads};

@@ -13,13 +13,13 @@
 //! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands,
 //!   a fence and a recording that are reused;
 //! * [`VulkanEngine`](engine::VulkanEngine): a device with its pipelines, and buffers kept for the next call;
-//! * [`Opened`](recovery::Opened): the device for the rest of the crate. It has the current `VulkanEngine`, opens a
-//!   lost device again, and repeats work that ran out of memory in smaller windows.
+//! * [`Opened`](recovery::Opened): the device for the rest of the crate, a [`Machine`](crate::machine::Machine). It has
+//!   the current `VulkanEngine`, opens a lost device again, and repeats work that ran out of memory in smaller windows.
 //!
 //! # Steps
 //!
-//! 1. `evaluate::uploaded` makes a [`Job`](job::Job): prepared segments on the device
-//!    ([`ClipBuffers`](job::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
+//! 1. A [`VulkanClip`](clip::VulkanClip) makes a [`Job`](clip::Job): prepared segments on the device
+//!    ([`ClipBuffers`](clip::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
 //! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples, or a grid;
@@ -49,36 +49,32 @@
 //! # Trust
 //!
 //! [`self_test`] runs when a device is opened, [`kernel_check`] when a pipeline is first made; passed checks are
-//! stored ([`cache`]). Without the feature `vulkan`, `absent.rs` replaces this module: it has the names that the rest
-//! of the crate uses, without functions.
+//! stored ([`cache`](crate::machine::cache)).
 #![allow(unsafe_code)]
 
 #[cfg(feature = "prove")]
 pub(crate) mod application;
 pub(crate) mod buffer;
-pub(crate) mod cache;
+pub(crate) mod clip;
 pub(crate) mod clip_target;
 pub(crate) mod crowd;
 pub(crate) mod device;
 pub(crate) mod device_queue;
 pub(crate) mod engine;
-pub(crate) mod error;
 pub(crate) mod exported;
 pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
-pub(crate) mod job;
 pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
-pub(crate) mod options;
+mod machine;
 pub(crate) mod pass_target;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
 pub(crate) mod pipeline_cache;
 pub(crate) mod recorded;
 pub(crate) mod recovery;
-pub(crate) mod reports;
 pub(crate) mod run_once;
 pub(crate) mod self_test;
 pub(crate) mod shared_memory;

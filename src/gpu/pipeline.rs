@@ -6,7 +6,8 @@ use std::sync::atomic::AtomicBool;
 use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::{Named, VulkanError};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::shader::{
     Access, CrowdWholeDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv,
 };

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ash::vk;
 
-use crate::gpu::cache::{Cache, sum};
-use crate::gpu::options::CacheFiles;
 use crate::gpu::physical::PhysicalDevice;
+use crate::machine::cache::{Cache, sum};
+use crate::machine::options::CacheFiles;
 use crate::threads::lock;
 
 /// The maximum size of a cache, bytes: all kernels of a card take a few MB.

@@ -8,8 +8,9 @@ use ash::vk;
 
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::shader::Kernel;
 use crate::work::recording::{Bytes, Recording, Resource, Slice, Step, Users};
 

@@ -1,16 +1,18 @@
 //! An opened device, and recovery from its errors: a lost device is opened again, and work that
 //! runs out of memory is repeated in smaller windows.
 
+use std::any::Any;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
+use crate::gpu::clip::ClipBuffers;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::job::ClipBuffers;
-use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::{self, SelfTestReport};
+use crate::machine::Machine;
+use crate::machine::error::{EvaluateError, VulkanError};
+use crate::machine::options::EngineOptions;
 use crate::output::encoding::Encoding;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Form, Kernel};
@@ -32,6 +34,12 @@ pub(crate) struct Opened {
 }
 
 impl Opened {
+    /// The device, if the machine is one.
+    pub(crate) fn of(machine: &dyn Machine) -> Option<&Self> {
+        let machine: &dyn Any = machine;
+        machine.downcast_ref()
+    }
+
     /// Opens a device and runs the self-test; refuses a device that fails it, unless the options
     /// allow inexact ones.
     pub(crate) fn new(
@@ -100,17 +108,23 @@ impl Opened {
         clip: &ClipData,
         mut spare: Option<ClipBuffers>,
     ) -> Result<ClipBuffers, EvaluateError> {
-        self.attempt(|engine| match engine.upload(clip, spare.take()) {
+        let uploaded = self.attempt(|engine| match engine.upload(clip, spare.take()) {
             Err(error) if error.is_out_of_memory() && engine.give_back() => {
                 Ok(engine.upload(clip, None)?)
             }
             done => Ok(done?),
+        });
+        uploaded.map_err(|error| match error {
+            EvaluateError::Vulkan(error) if error.is_out_of_memory() => {
+                EvaluateError::NoRoom(error)
+            }
+            error => error,
         })
     }
 
     /// Makes the pipelines for segments of a form and for evaluation directly from keys, and stores the driver's
     /// compiled kernels.
-    pub(crate) fn warm(&self, form: Form, encoding: Encoding) -> Result<(), EvaluateError> {
+    pub(super) fn compile(&self, form: Form, encoding: Encoding) -> Result<(), EvaluateError> {
         self.attempt(|engine| {
             for list in engine.lists() {
                 engine.pipeline(Kernel::over_segments(form, list, encoding.row().store))?;

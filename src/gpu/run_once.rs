@@ -2,11 +2,11 @@
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
-use crate::gpu::error::VulkanError;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
+use crate::machine::error::VulkanError;
 use crate::work::recording::Slice;
 
 /// Runs a kernel once: copies inputs to the device, and its output back.

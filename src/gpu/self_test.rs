@@ -7,11 +7,11 @@ use bytemuck::Zeroable as _;
 
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::kernel_check::self_test::trial;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-pub(crate) use crate::gpu::reports::{NegativeControl, SelfTestReport};
+use crate::machine::error::VulkanError;
+pub(crate) use crate::machine::reports::{NegativeControl, SelfTestReport};
 use crate::shader::{Kernel, Reply};
 
 /// Runs every expression on a device.

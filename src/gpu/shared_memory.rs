@@ -6,7 +6,8 @@ use std::sync::Mutex;
 
 use ash::vk;
 
-use crate::gpu::error::{Named, VulkanError};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 use crate::threads::lock;
 
 /// The maximum size of a buffer in a shared allocation, bytes; larger buffers have separate allocations.

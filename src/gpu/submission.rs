@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::recorded::{Commands, Recorded};
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
 
 /// The time limit: a dispatch takes milliseconds, so a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::error::VulkanError;
 use crate::gpu::physical::upload_memory::{KernelReads, UploadMemory};
 use crate::gpu::recorded::Recorded;
+use crate::machine::error::VulkanError;
 use crate::work::recording::Resource;
 
 /// Bytes for kernels, in memory that is kept for the next ones.

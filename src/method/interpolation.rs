@@ -11,6 +11,7 @@ use crate::reference::curve::ReferenceCurve;
 use crate::shader::Form;
 use crate::threads::on_threads;
 use crate::time::wrap::{Wrap, WrapMode};
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::key_data::Tcb;
 use crate::tracks::set::{Track, TrackSet};
 
@@ -87,13 +88,15 @@ impl Interpolation {
     /// As [`Interpolation::check`], and whether the quantity is defined outside the keys: a mirrored velocity is not.
     pub(crate) fn check_wraps(&self) -> Result<(), InterpolationError> {
         self.check()?;
-        let wraps = [self.before, self.after];
         match self.quantity {
-            Quantity::Velocity(_) if wraps.contains(&WrapMode::Mirror) => {
-                Err(InterpolationError::MirroredVelocity)
-            }
+            Quantity::Velocity(_) if self.mirrors() => Err(InterpolationError::MirroredVelocity),
             _ => Ok(()),
         }
+    }
+
+    /// Whether tracks are played backwards somewhere.
+    pub(crate) fn mirrors(&self) -> bool {
+        [self.before, self.after].contains(&WrapMode::Mirror)
     }
 
     /// As [`Interpolation::check`], and whether the track `index` of a set fits the ends.
@@ -210,17 +213,8 @@ impl ReferenceCurve {
     }
 }
 
-impl From<Method> for Interpolation {
-    fn from(method: Method) -> Self {
-        Self {
-            method,
-            signs: method.signs.unwrap_or_default(),
-            ends: method.ends,
-            tcb: Tcb::default(),
-            quantity: Quantity::Rotation,
-            speed: Speed::AsKeyed,
-            before: WrapMode::Hold,
-            after: WrapMode::Hold,
-        }
+impl<I: Into<Interpolation>> From<I> for PerTrack<Interpolation> {
+    fn from(interpolation: I) -> Self {
+        Self::All(interpolation.into())
     }
 }

@@ -12,6 +12,7 @@ pub(crate) mod ends;
 pub(crate) mod gltf_cubic;
 pub(crate) mod hermite;
 pub(crate) mod interpolation;
+pub(crate) mod interpolation_options;
 pub(crate) mod kochanek_bartels;
 pub(crate) mod nlerp;
 pub(crate) mod shoemake;

@@ -1,4 +1,4 @@
-//! The curves of translations and scales: a Hermite cubic in each component for each key interval.
+//! The curves of translations, scales and scalars: a Hermite cubic in each component for each key interval.
 
 use glam::DVec3;
 
@@ -27,6 +27,17 @@ impl VectorCubic {
             rise * 3.0 - self.leaving * 2.0 - self.arriving,
             self.leaving + self.arriving - rise * 2.0,
         ]
+    }
+
+    /// The derivative per second of a curve that lasts `duration` seconds.
+    pub(crate) fn derivative(&self, duration: f64) -> Self {
+        let (rise, rate) = (self.end - self.start, ratio(1.0, duration));
+        Self {
+            start: self.leaving * rate,
+            leaving: (rise * 6.0 - self.leaving * 4.0 - self.arriving * 2.0) * rate,
+            arriving: (self.leaving * 2.0 + self.arriving * 4.0 - rise * 6.0) * rate,
+            end: self.arriving * rate,
+        }
     }
 }
 
@@ -74,7 +85,8 @@ impl<'a> VectorCurves<'a> {
         self.key(i + 1) - self.key(i)
     }
 
-    fn duration(&self, i: usize) -> f64 {
+    /// The time from key `i` to the next, seconds.
+    pub(crate) fn duration(&self, i: usize) -> f64 {
         self.track.times[i + 1] - self.track.times[i]
     }
 

@@ -1,6 +1,7 @@
-//! The interpolation methods for translations and scales.
+//! The interpolation methods for translations, scales and scalars, and what is evaluated of them.
 
 use crate::names::names;
+use crate::tracks::per_track::PerTrack;
 
 /// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -32,4 +33,31 @@ names! {
     GltfCubic => "gltf-cubic",
     C2 => "c2",
     BSpline => "b-spline",
+}
+
+impl From<VectorMethod> for PerTrack<VectorMethod> {
+    fn from(method: VectorMethod) -> Self {
+        Self::All(method)
+    }
+}
+
+/// What is evaluated of a scalar or of a vector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ScalarQuantity {
+    /// The number itself.
+    #[default]
+    Value,
+    /// How fast it changes, units per second: the derivative of the curve. At a key it is that of the interval after
+    /// the key, at the last key that of the last interval. It is 0 where a value is held, and of
+    /// [`VectorMethod::Step`].
+    Velocity,
+    /// How fast the velocity changes, units per second squared, with the same rules.
+    Acceleration,
+}
+
+names! {
+    ScalarQuantity, "quantity",
+    Value => "value",
+    Velocity => "velocity",
+    Acceleration => "acceleration",
 }

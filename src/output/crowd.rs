@@ -1,7 +1,6 @@
 //! The values that a crowd's evaluation stores, and their sizes.
 
 use crate::names::names;
-use crate::shader::{CrowdChange, CrowdEntry};
 
 /// The values that are stored for every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -69,33 +68,42 @@ impl CrowdOutput {
     }
 }
 
-/// The changes that a device needs for an evaluation.
-pub(crate) struct CrowdFrame<'a> {
-    /// The clock, ticks.
-    pub(crate) clock: u64,
-    pub(crate) changes: EntryChanges<'a>,
-    /// Number of instances that are evaluated.
-    pub(crate) instances: u32,
-    pub(crate) visible: VisibleInstances<'a>,
-}
-
-/// The entries that changed since the previous evaluation.
-pub(crate) enum EntryChanges<'a> {
-    None,
-    /// The entries from an index on, one after another; some of them may be unchanged.
-    Range(usize, &'a [CrowdEntry]),
-    /// Single entries, no more than [`listed_changes`].
-    List(&'a [CrowdChange]),
-}
-
-/// Which instances are evaluated.
+/// A step of a frame, over all instances or over one: the CPU and devices take the same steps in the same order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum VisibleInstances<'a> {
-    All,
-    /// The instances of the list that the device has.
-    AsBefore,
-    /// The instances of a list that the device does not have yet.
-    List(&'a [u32]),
+pub(crate) enum FrameStep {
+    /// The position of each layer in its clip.
+    Positions,
+    /// Rotations of joints, layers over layers.
+    Rotations,
+    /// Rotations, translations and scales as matrices in the parent's frame.
+    Locals,
+    /// Matrices in the model's frame, parents first.
+    Walk,
+    /// Products with the inverse bind matrices.
+    Skin,
+    /// Rounding to 16 bits.
+    Half,
+}
+
+impl FrameStep {
+    /// The steps of an output, in their order.
+    pub(crate) fn of(output: CrowdOutput) -> impl Iterator<Item = Self> {
+        use CrowdValues::{Model, Rotations, Skinning};
+        let walks = matches!(output.values, Model | Skinning);
+        let joints = match output.values {
+            Rotations => Self::Rotations,
+            _ => Self::Locals,
+        };
+        [
+            Some(Self::Positions),
+            Some(joints),
+            walks.then_some(Self::Walk),
+            (output.values == Skinning).then_some(Self::Skin),
+            output.is_half.then_some(Self::Half),
+        ]
+        .into_iter()
+        .flatten()
+    }
 }
 
 /// The maximum number of changes that are listed, for a crowd with `entries` entries. If more entries changed, all

@@ -30,6 +30,7 @@ pub(crate) struct Representation {
     /// Whether velocities and accelerations can be stored.
     pub(crate) takes_vectors: bool,
     /// The store function of the kernels for this encoding, and its parameter.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) store: Store,
     pub(crate) detail: u32,
     /// Encodes rotations, with the parameter.
@@ -402,6 +403,7 @@ impl Encoding {
     }
 
     /// Every encoding with every value of its options, in the order of [`Encoding::ALL`].
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn with_all_options() -> Vec<Self> {
         let mut all = Vec::new();
         for encoding in Self::ALL {
@@ -418,6 +420,7 @@ impl Encoding {
     }
 
     /// The encodings of a store function of the kernels.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn of_store(store: Store) -> Vec<Self> {
         let mut all = Self::with_all_options();
         all.retain(|encoding| encoding.row().store == store);

@@ -9,6 +9,7 @@ pub(crate) mod encoding;
 pub(crate) mod euler;
 pub(crate) mod pose_error;
 pub(crate) mod rotations;
+pub(crate) mod scalars;
 pub(crate) mod signs;
 pub(crate) mod value;
 pub(crate) mod window;

@@ -9,6 +9,7 @@ use crate::curve::options::{Axes, Quantity};
 use crate::math::quaternion::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::ScalarQuantity;
 use crate::path::body::BodyOnPath;
 use crate::path::carry::RelativePieces;
 use crate::path::fit::fit;
@@ -19,7 +20,7 @@ use crate::path::stretch::{PathStretch, stretches};
 use crate::path::timed_path::{TimedPath, diagonal};
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::prepare::vectors;
+use crate::prepare::vectors::{self, VectorRequest};
 use crate::threads::stop;
 use crate::time::runs::NONE;
 use crate::time::spans::SpanSource;
@@ -70,9 +71,13 @@ impl PreparedPaths {
             .into_iter()
             .map(|([a, b], batch_warnings)| ((a, b), batch_warnings));
         let ((of_positions, of_rotations), warnings): ((Vec<_>, Vec<_>), Vec<_>) = batches.unzip();
+        let clip_data = |groups, interpolation| {
+            let (tracks, span) = (set.track_count(), set.time_span());
+            ClipData::of_groups(groups, tracks, span, interpolation, group_bytes)
+        };
         Ok(Self {
-            positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
-            rotations: ClipData::of_groups(of_rotations, set, rotations, group_bytes),
+            positions: clip_data(of_positions, positions),
+            rotations: clip_data(of_rotations, rotations),
             warnings: warnings.concat(),
         })
     }
@@ -249,6 +254,13 @@ struct PathPreparation<'a> {
 impl PathPreparation<'_> {
     fn add(&self, prepared: &mut Prepared, kind: SampleKind) {
         let follow = self.follow;
+        let of_keys = VectorRequest {
+            quantity: ScalarQuantity::Value,
+            method: follow.method,
+            interpolation: self.interpolation,
+            group_bytes: None,
+            only_for: None,
+        };
         let is_fitted =
             |path: &BodyOnPath| kind == SampleKind::Rotation || path.timed_path.is_retimed();
         let of_fitted = |span: &Span| is_fitted(&self.bodies[span.path as usize]);
@@ -263,13 +275,9 @@ impl PathPreparation<'_> {
             if body.stretches.is_empty() || !is_fitted(body) {
                 match kind {
                     // Positions at the times of the keys are cubics already.
-                    SampleKind::Vector => vectors::add(
-                        prepared,
-                        track,
-                        self.paths[path],
-                        follow.method,
-                        self.interpolation,
-                    ),
+                    SampleKind::Vector => {
+                        vectors::add(prepared, track, self.paths[path], &of_keys);
+                    }
                     // A body that never moves looks along +z.
                     SampleKind::Rotation => {
                         let values = [follow.body_axes().to_array(); 2];

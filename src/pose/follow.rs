@@ -50,7 +50,7 @@ impl Engine {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Followed, Error> {
-        let group_bytes = self.backend.limits().group_bytes;
+        let group_bytes = self.machine.limits().group_bytes;
         let stop = stop::current();
         let prepare = || PreparedPaths::new(set, follow, group_bytes);
         let prepared = on_threads(|| stop::during(stop, prepare))?;

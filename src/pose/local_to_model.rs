@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::Backend;
 use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
@@ -15,7 +14,6 @@ use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
-use crate::threads::on_threads;
 use crate::twin::matrix;
 
 /// The three rows of an affine matrix for column vectors.
@@ -90,10 +88,7 @@ impl Engine {
                 }
             });
         };
-        match &*self.backend {
-            Backend::Cpu(engine) => engine.on_threads(walk_all),
-            Backend::Vulkan(_) => on_threads(walk_all),
-        }?;
+        self.machine.threads().run(walk_all)?;
         Ok(ModelMatrices {
             matrices,
             tracks,

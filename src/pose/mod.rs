@@ -1,11 +1,12 @@
 //! Poses: blending and adding layers of rotations, skeletons with rotations and positions in the
-//! world, and transforms of rotations, translations and scales.
+//! world, transforms of rotations, translations and scales, and scalars.
 
 pub(crate) mod follow;
 pub(crate) mod local_to_model;
 #[cfg(feature = "vulkan")]
 pub(crate) mod pass;
 pub(crate) mod poses;
+pub(crate) mod scalars;
 pub(crate) mod skeleton;
 pub(crate) mod smooth;
 pub(crate) mod transforms;

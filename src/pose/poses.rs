@@ -2,13 +2,11 @@
 //! skeleton are converted to rotations and positions in the world.
 
 use glam::{Quat, Vec3};
-use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::Backend;
-use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::EvaluateError;
+use crate::machine::error::EvaluateError;
+use crate::machine::poses::{Pass, PassRunner};
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::{
@@ -16,11 +14,6 @@ use crate::output::pose_error::{
 };
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
-use crate::shader::Kernel;
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
-use crate::threads::{OutOfThreadsError, on_threads};
-use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
     /// Blends layers: the normalised weighted sum of their rotations. Each layer's rotation has the sign that is
@@ -41,20 +34,14 @@ impl Engine {
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
         check_weights(&weights)?;
         let mut gathered: Vec<Quat> = Vec::new();
-        self.each_rotation(first, layers.len(), |device, start, output| {
+        self.each_rotation(first, layers.len(), |runner, start, output| {
             gathered.clear();
             for &(layer, _) in layers {
                 gathered.extend_from_slice(&layer.as_quats()[start..start + output.len()]);
             }
-            let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
-            let Some(device) = device else {
-                let count = output.len();
-                let blended = |index| pose_blend::pose(values, &weights, count, index);
-                return Ok(set_all(output, blended)?);
-            };
-            let inputs = [bytes(values), bytes(&weights)];
-            let counts = [output.len(), layers.len()];
-            Ok(device.pass(Kernel::PosesBlend, &inputs, counts, output)?)
+            let layers = bytemuck::cast_slice(&gathered);
+            let weights = &weights;
+            runner.run(&Pass::Blend { layers, weights }, output)
         })
     }
 
@@ -66,15 +53,9 @@ impl Engine {
     pub fn mix(&self, from: &Rotations, to: &Rotations, weight: f32) -> Result<Rotations, Error> {
         same_shape(from, to, 1)?;
         check_fraction(weight)?;
-        self.each_rotation(from, 1, |device, start, output| {
-            let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
-            let Some(device) = device else {
-                let mixed = |index: usize| pose_mix::pose(a[index], b[index], weight);
-                return Ok(set_all(output, mixed)?);
-            };
-            let weight = [weight];
-            let inputs = [bytes(a), bytes(b), bytes(&weight)];
-            Ok(device.pass(Kernel::PosesMix, &inputs, [output.len(), 0], output)?)
+        self.each_rotation(from, 1, |runner, start, output| {
+            let [from, to] = [from, to].map(|layer| values(layer, start, output.len()));
+            runner.run(&Pass::Mix { from, to, weight }, output)
         })
     }
 
@@ -96,25 +77,25 @@ impl Engine {
         same_shape(base, layer, 1)?;
         check_fraction(weight)?;
         check_references(reference.len(), base.track_count())?;
-        let mut repeated: Vec<[f32; 4]> = Vec::new();
-        self.each_rotation(base, 1, |device, start, output| {
-            let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
-            repeated.clear();
-            repeated.extend((start..start + output.len()).map(|index| {
+        let mut references: Vec<[f32; 4]> = Vec::new();
+        self.each_rotation(base, 1, |runner, start, output| {
+            references.clear();
+            references.extend((start..start + output.len()).map(|index| {
                 let track = match base.layout() {
                     Layout::TrackMajor => index / base.sample_count(),
                     Layout::FrameMajor => index % base.track_count(),
                 };
                 reference[track].to_array()
             }));
-            let Some(device) = device else {
-                let added =
-                    |index: usize| pose_add::pose(a[index], b[index], repeated[index], weight);
-                return Ok(set_all(output, added)?);
+            references.push([weight, 0.0, 0.0, 0.0]);
+            let [base, layer] = [base, layer].map(|layer| values(layer, start, output.len()));
+            let references = &references;
+            let pass = Pass::Add {
+                base,
+                layer,
+                references,
             };
-            repeated.push([weight, 0.0, 0.0, 0.0]);
-            let inputs = [bytes(a), bytes(b), bytes(&repeated)];
-            Ok(device.pass(Kernel::PosesAdd, &inputs, [output.len(), 0], output)?)
+            runner.run(&pass, output)
         })
     }
 
@@ -142,11 +123,11 @@ impl Engine {
         let (tracks, samples) = (local.track_count(), local.sample_count());
         check_skeleton(skeleton.len(), tracks)?;
         let links = skeleton.links();
-        self.on_device(|device| {
-            let count = tracks.saturating_mul(samples).saturating_mul(2);
-            let mut values: Vec<[f32; 4]> = zeroed(count, "poses in the world")?;
-            let frames = (limit(device) / (2 * tracks).max(1)).max(1);
-            let mut frame_major: Vec<[f32; 4]> = Vec::new();
+        let count = tracks.saturating_mul(samples).saturating_mul(2);
+        let mut values: Vec<[f32; 4]> = zeroed(count, "poses in the world")?;
+        let mut frame_major: Vec<[f32; 4]> = Vec::new();
+        self.machine.passes(&mut |runner| {
+            let frames = (runner.window() / (2 * tracks).max(1)).max(1);
             let windows = values.chunks_mut((2 * tracks * frames).max(1));
             for (first, output) in (0..).step_by(frames).zip(windows) {
                 let count = output.len() / (2 * tracks);
@@ -156,63 +137,37 @@ impl Engine {
                         .map(|track| local.layout().offset(track, frame, tracks, samples));
                     frame_major.extend(indices.map(|index| local.as_quats()[index].to_array()));
                 }
-                match device {
-                    None => on_threads(|| {
-                        let frames = output.par_chunks_mut(2 * tracks);
-                        let frames = frames.zip(frame_major.par_chunks(tracks));
-                        frames.for_each(|(world, local)| pose_world::pose(local, links, world));
-                    })?,
-                    Some(device) => {
-                        let inputs = [bytes(&frame_major), bytes(links)];
-                        device.pass(Kernel::PosesWorld, &inputs, [count, tracks], output)?;
-                    }
-                }
+                let local = &frame_major;
+                runner.run(&Pass::World { local, links }, output)?;
             }
-            Ok(WorldPoses {
-                values,
-                tracks,
-                samples,
-            })
+            Ok(())
+        })?;
+        Ok(WorldPoses {
+            values,
+            tracks,
+            samples,
         })
     }
 
-    /// Makes a result of the same shape as `like`, some rotations at a time. `work` gets the device, the index of the
-    /// first rotation, and the memory of the rotations. It reads `layers` values for each of them.
+    /// Makes a result of the same shape as `like`, some rotations at a time. `work` gets what runs its pass, the index
+    /// of the first rotation, and the memory of the rotations. It reads `layers` values for each of them.
     fn each_rotation(
         &self,
         like: &Rotations,
         layers: usize,
-        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), EvaluateError>,
+        mut work: impl FnMut(&dyn PassRunner, usize, &mut [[f32; 4]]) -> Result<(), EvaluateError>,
     ) -> Result<Rotations, Error> {
-        self.on_device(|device| {
-            let mut made = OutputBuffer::new(like.as_quats().len())?;
-            let max_len = (limit(device) / layers).clamp(1, usize::MAX / 4);
+        let mut made = OutputBuffer::new(like.as_quats().len())?;
+        self.machine.passes(&mut |runner| {
+            let max_len = (runner.window() / layers).clamp(1, usize::MAX / 4);
             for (start, output) in (0..).step_by(max_len).zip(made.chunks_mut(max_len)) {
-                work(device, start, bytemuck::cast_slice_mut(output))?;
+                work(runner, start, bytemuck::cast_slice_mut(output))?;
             }
-            let (tracks, samples, layout) = like.shape();
-            Ok(Rotations::new(Box::new(made), tracks, samples, layout))
-        })
+            Ok(())
+        })?;
+        let (tracks, samples, layout) = like.shape();
+        Ok(Rotations::new(Box::new(made), tracks, samples, layout))
     }
-
-    /// Does work on the engine's device; `None` is the CPU.
-    pub(crate) fn on_device<T>(
-        &self,
-        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, EvaluateError>,
-    ) -> Result<T, Error> {
-        Ok(match &*self.backend {
-            Backend::Cpu(_) => work(None),
-            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| work(Some(engine))),
-        }?)
-    }
-}
-
-/// The number of values of one pass on the CPU: enough for all threads, and gathered in 16 MiB.
-const CPU_PASS: usize = 1 << 20;
-
-/// The maximum number of values of 16 bytes in one pass.
-fn limit(device: Option<&VulkanEngine>) -> usize {
-    device.map_or(CPU_PASS, VulkanEngine::window)
 }
 
 /// Rotations and positions in the world, `[frame][track]`.
@@ -278,45 +233,4 @@ fn same_shape(first: &Rotations, other: &Rotations, layer: usize) -> Result<(), 
 
 fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
     bytemuck::cast_slice(&layer.as_quats()[start..start + count])
-}
-
-pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
-    bytemuck::cast_slice(values)
-}
-
-/// The number of values in one task of the CPU.
-const TASK: usize = 8192;
-
-struct PoseTask<'a, F> {
-    first: usize,
-    output: &'a mut [[f32; 4]],
-    pose: &'a F,
-}
-
-impl<F: Fn(usize) -> [f32; 4]> InLanes for PoseTask<'_, F> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        for (i, value) in self.output.iter_mut().enumerate() {
-            *value = (self.pose)(self.first + i);
-        }
-    }
-}
-
-/// Sets all values, on the CPU.
-fn set_all(
-    output: &mut [[f32; 4]],
-    pose: impl Fn(usize) -> [f32; 4] + Sync,
-) -> Result<(), OutOfThreadsError> {
-    let task = |(task, output): (usize, &mut [[f32; 4]])| {
-        in_lanes(&mut PoseTask {
-            first: task * TASK,
-            output,
-            pose: &pose,
-        });
-    };
-    if output.len() <= TASK {
-        task((0, output));
-        return Ok(());
-    }
-    on_threads(|| output.par_chunks_mut(TASK).enumerate().for_each(task))
 }

@@ -2,13 +2,18 @@
 
 use crate::engine::Engine;
 use crate::engine::clip::Clip;
+use crate::engine::groups::fill_by_group;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::time::frames::SampleTimes;
+use crate::time::frames::{SampleTimes, Timeline};
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
 
@@ -28,7 +33,8 @@ pub struct Transforms {
 
 impl Engine {
     /// Evaluates rotations, translations and scales of a set at the same times. Translations and scales are
-    /// interpolated by the method `vectors`, with the ends and wrap modes of `interpolation`.
+    /// interpolated by the method `vectors`, with the ends and wrap modes of `interpolations`. Both are for all tracks,
+    /// or [for each](PerTrack).
     ///
     /// ```
     /// use glam::{Quat, Vec3};
@@ -50,20 +56,23 @@ impl Engine {
     pub fn transforms(
         &self,
         set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
-        vectors: VectorMethod,
+        interpolations: impl Into<PerTrack<Interpolation>>,
+        vectors: impl Into<PerTrack<VectorMethod>>,
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Transforms, Error> {
-        let interpolation = interpolation.into();
-        let evaluate = |channel| self.vectors(set, channel, vectors, interpolation, frames, layout);
+        let (interpolations, vectors) = (interpolations.into(), vectors.into());
+        let evaluate = |channel| {
+            let (vectors, interpolations) = (vectors.clone(), interpolations.clone());
+            self.vectors(set, channel, vectors, interpolations, frames, layout)
+        };
         Ok(Transforms {
             translations: evaluate(Channel::Translation)?,
+            scales: evaluate(Channel::Scale)?,
             rotations: self
-                .request(set, interpolation, frames)
+                .request(set, interpolations, frames)
                 .layout(layout)
                 .evaluate()?,
-            scales: evaluate(Channel::Scale)?,
             has_translation: (0..set.track_count())
                 .map(|track| set.vectors(Channel::Translation, track).is_some())
                 .collect(),
@@ -78,19 +87,54 @@ impl Engine {
         &self,
         set: &TrackSet,
         channel: Channel,
-        method: VectorMethod,
-        interpolation: impl Into<Interpolation>,
+        methods: impl Into<PerTrack<VectorMethod>>,
+        interpolations: impl Into<PerTrack<Interpolation>>,
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
-        let interpolation = interpolation.into();
-        interpolation.check()?;
-        let group_bytes = self.backend.limits().group_bytes;
-        let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let only_for = Some(&timeline);
-        let data =
-            ClipData::of_vectors(set, channel, method, &interpolation, group_bytes, only_for)?;
-        self.samples_of(data, frames, layout)
+        let tracks = set.track_count();
+        let all = methods.into().zip(interpolations.into(), tracks)?;
+        let timeline = frames.resolve(tracks, set.time_span())?;
+        if let Some((method, interpolation)) = all.uniform(tracks) {
+            let clip = self.clip_of_vectors(set, channel, method, interpolation, &timeline)?;
+            return clip.samples(&timeline, layout);
+        }
+        let groups = all.groups(tracks)?;
+        let lists = groups.iter().map(|group| &*group.tracks);
+        let window = Window::whole(tracks, timeline.len(), layout);
+        let mut quats = OutputBuffer::new(window.len())?;
+        let output = bytemuck::cast_slice_mut(&mut quats);
+        let output = EncodedOutput::of_values(output);
+        fill_by_group(lists, &window, output, |group, part, found| {
+            let (method, interpolation) = groups[group].value;
+            let tracks = &groups[group].tracks[part];
+            let set = set.select(tracks.iter().copied())?;
+            let timeline = timeline.of_listed(tracks);
+            let clip = self.clip_of_vectors(&set, channel, method, interpolation, &timeline)?;
+            let whole = Window::whole(tracks.len(), timeline.len(), layout);
+            clip.fill_window(&timeline, &whole, found)
+        })?;
+        Ok(Samples::new(
+            Box::new(quats),
+            tracks,
+            timeline.len(),
+            layout,
+        ))
+    }
+
+    /// The vectors of a set, prepared for some sample times.
+    fn clip_of_vectors(
+        &self,
+        set: &TrackSet,
+        channel: Channel,
+        method: VectorMethod,
+        interpolation: Interpolation,
+        only_for: &Timeline,
+    ) -> Result<Clip, Error> {
+        let value = ScalarQuantity::Value;
+        let request = self.vector_request(value, method, &interpolation, only_for)?;
+        let data = ClipData::of_vectors(set, channel, &request)?;
+        self.clip_of(data)
     }
 
     /// Evaluates prepared tracks.
@@ -100,8 +144,12 @@ impl Engine {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let uploaded = Uploaded::of_data(&self.backend, data, None)?;
-        let clip = Clip::new(self.clone(), uploaded);
+        let clip = self.clip_of(data)?;
         clip.samples(&clip.timeline(frames)?, layout)
+    }
+
+    fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {
+        let uploaded = Uploaded::of_data(&self.machine, data)?;
+        Ok(Clip::new(self.clone(), uploaded))
     }
 }

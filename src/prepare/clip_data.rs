@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use crate::curve::options::{Axes, InterpolationError, KeySigns, Quantity, Speed};
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::{
     Batch, BatchSize, PART_INTERVALS, Preparation, SetRequest, batches,
 };
 use crate::prepare::prepared::{Prepared, segment_size};
-use crate::prepare::vectors;
+use crate::prepare::vectors::{self, VectorRequest};
 use crate::shader::Form;
 use crate::threads::{self, OutOfThreadsError, on_threads, stop};
 use crate::time::frame_clock::TrackCopy;
@@ -165,21 +165,25 @@ impl ClipData {
         interpolation.check_wraps()?;
         let merged_bytes = request.group_bytes.filter(|_| !request.large_groups);
         let groups = prepare(set, &interpolation, request)?;
-        Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
+        let (tracks, span) = (set.track_count(), set.time_span());
+        Ok(Self::of_groups(
+            groups,
+            tracks,
+            span,
+            interpolation,
+            merged_bytes,
+        ))
     }
 
-    /// Prepares a set's translations or scales, for any timeline or only for one.
+    /// Prepares a set's translations or scales.
     pub(crate) fn of_vectors(
         set: &TrackSet,
         channel: Channel,
-        method: VectorMethod,
-        interpolation: &Interpolation,
-        group_bytes: Option<usize>,
-        only_for: Option<&Timeline>,
+        request: &VectorRequest<'_>,
     ) -> Result<Self, OutOfThreadsError> {
-        let rest = match channel {
-            Channel::Translation => Vec3::ZERO,
-            Channel::Scale => Vec3::ONE,
+        let rest = match (channel, request.quantity) {
+            (Channel::Scale, ScalarQuantity::Value) => Vec3::ONE,
+            _ => Vec3::ZERO,
         };
         // Where a track without vectors is held.
         let still = VectorTrack {
@@ -188,25 +192,56 @@ impl ClipData {
             tangents: Vec::new(),
             ups: Vec::new(),
         };
+        let track = |index| Cow::Borrowed(set.vectors(channel, index).unwrap_or(&still));
+        Self::of_vector_tracks(set.track_count(), set.time_span(), track, request)
+    }
+
+    /// Prepares a set's scalars; each pack is a track ([`TrackSet::scalar_packs`]).
+    pub(crate) fn of_scalars(
+        set: &TrackSet,
+        packs: &[usize],
+        request: &VectorRequest<'_>,
+    ) -> Result<Self, OutOfThreadsError> {
+        let track = |index: usize| Cow::Owned(set.packed_scalars(packs[index]..packs[index + 1]));
+        Self::of_vector_tracks(packs.len() - 1, set.time_span(), track, request)
+    }
+
+    fn of_vector_tracks<'t>(
+        track_count: usize,
+        time_span: Option<(f64, f64)>,
+        track: impl Fn(usize) -> Cow<'t, VectorTrack> + Sync,
+        request: &VectorRequest<'_>,
+    ) -> Result<Self, OutOfThreadsError> {
         // As a velocity, a vector is refused where an output is for rotations only.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
-            ..*interpolation
+            ..*request.interpolation
         };
-        let batches: Vec<usize> = (0..set.track_count()).step_by(VECTOR_BATCH).collect();
+        let request = VectorRequest {
+            interpolation: &interpolation,
+            ..*request
+        };
+        let batches: Vec<usize> = (0..track_count).step_by(VECTOR_BATCH).collect();
         let batch = |first: usize| {
             let mut prepared = Prepared::new(&interpolation);
-            prepared.spans.steps = method == VectorMethod::Step;
-            for index in first..set.track_count().min(first + VECTOR_BATCH) {
-                let track = set.vectors(channel, index).unwrap_or(&still);
-                let track = match only_for {
+            prepared.spans.steps = request.method == VectorMethod::Step;
+            for index in first..track_count.min(first + VECTOR_BATCH) {
+                let track = track(index);
+                let track = match request.only_for {
                     Some(timeline) => {
                         let samples = timeline.times(index);
-                        vectors::thinned(track, method, interpolation.wrap(), samples)
+                        vectors::thinned(&track, request.method, interpolation.wrap(), samples)
                     }
-                    None => Cow::Borrowed(track),
+                    None => Cow::Borrowed(&*track),
                 };
-                vectors::add(&mut prepared, index, &track, method, &interpolation);
+                match request.quantity {
+                    ScalarQuantity::Value => {
+                        vectors::add(&mut prepared, index, &track, &request);
+                    }
+                    ScalarQuantity::Velocity | ScalarQuantity::Acceleration => {
+                        vectors::add_rates(&mut prepared, index, &track, &request);
+                    }
+                }
             }
             prepared
         };
@@ -214,12 +249,19 @@ impl ClipData {
             0 | 1 => batches.into_iter().map(batch).collect(),
             _ => on_threads(|| batches.into_par_iter().map(batch).collect())?,
         };
-        Ok(Self::of_groups(groups, set, interpolation, group_bytes))
+        Ok(Self::of_groups(
+            groups,
+            track_count,
+            time_span,
+            interpolation,
+            request.group_bytes,
+        ))
     }
 
     pub(crate) fn of_groups(
         mut groups: Vec<Prepared>,
-        set: &TrackSet,
+        track_count: usize,
+        time_span: Option<(f64, f64)>,
         interpolation: Interpolation,
         group_bytes: Option<usize>,
     ) -> Self {
@@ -227,7 +269,7 @@ impl ClipData {
             groups = merge(groups, limit);
         }
         let mut parts = Vec::new();
-        let mut tracks = Vec::with_capacity(set.track_count() + 1);
+        let mut tracks = Vec::with_capacity(track_count + 1);
         for (g, group) in groups.iter().enumerate() {
             for (p, part) in group.parts.iter().enumerate() {
                 while tracks.len() <= part.track as usize {
@@ -242,7 +284,7 @@ impl ClipData {
             groups,
             parts,
             tracks,
-            time_span: set.time_span(),
+            time_span,
         }
     }
 

@@ -11,16 +11,12 @@ use crate::fit::exact::fit::IntervalCurve;
 use crate::math::quaternion::round_quat;
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
-use crate::shader::{
-    ArcSegment, END_NEGATED, Form, KEY_OF_INTERVAL, PolynomialSegment, START_NEGATED,
-};
-use crate::time::frame_clock::TrackCopy;
+use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{NONE, Parameter};
 use crate::time::spans::{SpanSource, Spans, TrackExtension, TrackPart};
 use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
-use crate::twin::{COARSE, Evaluate as _};
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 pub(crate) struct Prepared {
@@ -160,34 +156,6 @@ impl Prepared {
         self.exact.extend(other.exact);
     }
 
-    /// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
-    /// those ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)). Of arcs that only the device knows
-    /// it may be true where none has.
-    #[inline(always)]
-    pub(crate) fn may_be_tiny(&self, index: u32) -> bool {
-        let (segments, index) = (&self.segments, index as usize);
-        match segments.form {
-            Form::Arc if segments.are_arcs_listed => self.may_be_tiny_between(index),
-            Form::Arc => !segments.arcs[index].is_canonical(),
-            Form::Polynomial => !segments.polynomials[index].is_canonical(),
-        }
-    }
-
-    /// The same of an arc that is listed: each component of its middle is at least as large as that of half the sum
-    /// of its keys, which [`arc_between`](crate::twin::arc_between::arc_between) lengthens.
-    fn may_be_tiny_between(&self, index: usize) -> bool {
-        let interval = self.segments.intervals[index];
-        let key = (interval & KEY_OF_INTERVAL) as usize;
-        let [start, end] = [self.constants[key], self.constants[key + 1]];
-        let is_start_negated = interval & START_NEGATED != 0;
-        let sign = match is_start_negated == (interval & END_NEGATED != 0) {
-            true => 1.0,
-            false => -1.0,
-        };
-        let is_zero = |c: usize| start[c] == 0.0 && end[c] == 0.0;
-        (0..4).any(|c| ((start[c] + end[c] * sign) * 0.5).abs() < COARSE && !is_zero(c))
-    }
-
     /// The value of a sample by the `index`th curve of `exact`, evaluated in f64.
     pub(crate) fn exact(
         &self,
@@ -203,17 +171,6 @@ impl Prepared {
             Ticks::Times { .. } => timeline.time_at(track, sample).clamp(-LATEST, LATEST),
         };
         round_quat(self.exact[index as usize].value(parameter.at(at)))
-    }
-
-    /// The copies of a part's track among some samples.
-    pub(crate) fn copies(
-        &self,
-        part: &TrackPart,
-        timeline: &Timeline,
-        samples: Range<usize>,
-    ) -> impl Iterator<Item = TrackCopy> {
-        let span = part.extension.as_ref().map(|extension| extension.span);
-        self.wrap.copies(span, timeline, samples)
     }
 
     /// Adds a part: these intervals of a track with keys at these times, the track `index` of its set, with these
@@ -388,6 +345,7 @@ impl Segments {
     }
 
     /// Those that are computed.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self.form {
             Form::Arc => bytemuck::cast_slice(&self.arcs),

@@ -1,4 +1,4 @@
-//! Preparation of translations and scales: a segment is a cubic in each component about the middle of its interval.
+//! Preparation of translations, scales and scalars: a segment is a cubic in each component about the middle of its interval.
 //! It is a polynomial already, so nothing is fitted.
 
 use std::borrow::Cow;
@@ -14,9 +14,10 @@ use crate::math::canonical::{canonical, round_f32};
 use crate::math::quaternion::{ratio, round_quat};
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_curve::{VectorCubic, VectorCurves};
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
+use crate::time::frames::Timeline;
 use crate::time::runs::NONE;
 use crate::time::spans::SpanSource;
 use crate::time::wrap::{Wrap, WrapMode};
@@ -27,6 +28,19 @@ const BESIDE: usize = 3;
 
 /// With fewer keys for each sample, thinning a track takes as long as preparing it.
 const KEYS_OF_A_SAMPLE: usize = 8;
+
+/// The curves through translations, scales or scalars that are prepared, and for which samples.
+#[derive(Clone, Copy)]
+pub(crate) struct VectorRequest<'a> {
+    pub(crate) quantity: ScalarQuantity,
+    pub(crate) method: VectorMethod,
+    /// The ends and the wrap modes.
+    pub(crate) interpolation: &'a Interpolation,
+    /// The largest size of a group's segments, bytes.
+    pub(crate) group_bytes: Option<usize>,
+    /// The only timeline that will be sampled; keys on which no sample of it depends may be left out.
+    pub(crate) only_for: Option<&'a Timeline>,
+}
 
 /// The track with only the keys on which the curves at some times depend, and those at its ends. The whole track if
 /// there are many samples, or if every key has an influence.
@@ -76,9 +90,9 @@ pub(crate) fn add(
     prepared: &mut Prepared,
     index: usize,
     track: &VectorTrack,
-    method: VectorMethod,
-    interpolation: &Interpolation,
+    request: &VectorRequest<'_>,
 ) {
+    let (method, interpolation) = (request.method, request.interpolation);
     let last = track.keys.len() - 1;
     let first_key = prepared.constants.len() as u32;
     let stored = |key: &Vec3| [canonical(key.x), canonical(key.y), canonical(key.z), 0.0];
@@ -120,6 +134,63 @@ pub(crate) fn add(
     {
         let extension = part.extension_mut((track.times[0], track.times[last]));
         [extension.from_before, extension.from_after] = lines;
+    }
+}
+
+/// Adds the velocities or accelerations of the `index`th track's vectors ([`ScalarQuantity`] has the rules at keys and
+/// outside them).
+pub(crate) fn add_rates(
+    prepared: &mut Prepared,
+    index: usize,
+    track: &VectorTrack,
+    request: &VectorRequest<'_>,
+) {
+    let (interpolation, last) = (request.interpolation, track.keys.len() - 1);
+    let still = prepared.constant([0.0; 4]);
+    let curves = VectorCurves::new(track, request.method, interpolation.ends);
+    let rate_of = |i: usize| {
+        let duration = curves.duration(i);
+        let velocity = curves.of(i).derivative(duration);
+        match request.quantity {
+            ScalarQuantity::Acceleration => velocity.derivative(duration),
+            ScalarQuantity::Value | ScalarQuantity::Velocity => velocity,
+        }
+    };
+    let first_span = prepared.spans.len();
+    let mut at_ends = [DVec3::ZERO; 2];
+    for i in 0..last {
+        let start = track.times[i];
+        if curves.is_held(i) {
+            prepared.push_span(start, SpanSource::Constant(still), NONE);
+            continue;
+        }
+        let rate = rate_of(i);
+        prepared.push_segment(start, segment(&rate), NONE);
+        if i == 0 {
+            at_ends[0] = rate.start;
+        }
+        if i + 1 == last {
+            at_ends[1] = rate.end;
+        }
+    }
+    let at_ends = at_ends.map(|rate| prepared.constant(round_quat([rate.x, rate.y, rate.z, 0.0])));
+    let outside = |mode: WrapMode, at_end: u32| match mode {
+        WrapMode::Hold => still,
+        WrapMode::Extrapolate if request.quantity == ScalarQuantity::Acceleration => still,
+        // In copies of the track its ends have the values of its curve.
+        WrapMode::Extrapolate | WrapMode::Loop | WrapMode::Mirror => at_end,
+    };
+    let held = [
+        outside(interpolation.before, at_ends[0]),
+        outside(interpolation.after, at_ends[1]),
+    ];
+    let spans = first_span..first_span + last;
+    prepared.push_part(index, &track.times, &(0..last), spans, held);
+    if last > 0
+        && let Some(part) = prepared.parts.last_mut()
+    {
+        let extension = part.extension_mut((track.times[0], track.times[last]));
+        extension.at_end = at_ends[1];
     }
 }
 

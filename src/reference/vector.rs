@@ -42,6 +42,20 @@ impl VectorCurve {
         self.interval(i)((time - self.times[i]) / self.step(i))[0]
     }
 
+    /// The velocity and the acceleration at a time, per second: at a key those of the interval after it, at the last
+    /// key those of the last interval. They are 0 where a value is held.
+    #[must_use]
+    pub fn derivatives(&self, time: f64) -> [DVec3; 2] {
+        let last = self.keys.len() - 1;
+        if last == 0 || time < self.times[0] || time > self.times[last] {
+            return [DVec3::ZERO; 2];
+        }
+        let i = (self.times.partition_point(|&key| key <= time) - 1).min(last - 1);
+        let h = self.step(i);
+        let [_, by_parameter, twice] = self.interval(i)((time - self.times[i]) / h);
+        [by_parameter / h, twice / (h * h)]
+    }
+
     /// The time from key `i` to the next, seconds.
     fn step(&self, i: usize) -> f64 {
         self.times[i + 1] - self.times[i]

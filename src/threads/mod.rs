@@ -5,6 +5,8 @@
 //! rayon's workers do, run other tasks of that pool while it waits, and such a task could need a lock that the
 //! waiting call or its caller has.
 
+// Devices alone have what one caller at a time uses.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod exclusive;
 pub(crate) mod stop;
 
@@ -126,6 +128,11 @@ pub(crate) fn count() -> usize {
 }
 
 impl Threads {
+    /// The process's threads, which run [`on_threads`].
+    pub(crate) fn of_process() -> &'static Self {
+        &SHARED
+    }
+
     pub(crate) const fn new(count: Option<usize>) -> Self {
         Self {
             count,

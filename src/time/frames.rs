@@ -28,10 +28,10 @@ const LAST_FRAME_TOLERANCE: f64 = 1e-6;
 /// let sparse = SampleTimes::at(vec![0.0, 0.125, 7.5]);     // any times, in any order
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct SampleTimes(SampleRequest);
+pub struct SampleTimes(SampleTimesKind);
 
 #[derive(Debug, Clone, PartialEq)]
-enum SampleRequest {
+enum SampleTimesKind {
     Rate {
         rate: FrameRate,
         start: Option<f64>,
@@ -55,7 +55,7 @@ impl SampleTimes {
     /// `k` whose time is not after the end.
     #[must_use]
     pub fn rate(rate: FrameRate) -> Self {
-        Self(SampleRequest::Rate {
+        Self(SampleTimesKind::Rate {
             rate,
             start: None,
             end: None,
@@ -67,8 +67,8 @@ impl SampleTimes {
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
         match &mut self.0 {
-            SampleRequest::Rate { start, end, .. } => (*start, *end) = (Some(from), Some(to)),
-            request => *request = SampleRequest::TimesInRange,
+            SampleTimesKind::Rate { start, end, .. } => (*start, *end) = (Some(from), Some(to)),
+            request => *request = SampleTimesKind::TimesInRange,
         }
         self
     }
@@ -77,7 +77,7 @@ impl SampleTimes {
     /// the set's first and last key. Explicit times do not change.
     #[must_use]
     pub fn spanning(mut self, (first, last): (f64, f64)) -> Self {
-        if let SampleRequest::Rate { start, end, .. } = &mut self.0 {
+        if let SampleTimesKind::Rate { start, end, .. } = &mut self.0 {
             start.get_or_insert(first);
             end.get_or_insert(last);
         }
@@ -88,14 +88,14 @@ impl SampleTimes {
     #[must_use]
     #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
-        Self(SampleRequest::Shared(Arc::new(times)))
+        Self(SampleTimesKind::Shared(Arc::new(times)))
     }
 
     /// Explicit times for each track, seconds: first all times of the first track, then those of the second, and so
     /// on. Each track has the same number of times.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
-        Self(SampleRequest::PerTrack(Arc::new(times)))
+        Self(SampleTimesKind::PerTrack(Arc::new(times)))
     }
 
     /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span`, seconds.
@@ -116,7 +116,7 @@ impl SampleTimes {
         };
         let (first, last) = span.unwrap_or((0.0, 0.0));
         let (ticks, count) = match &self.0 {
-            SampleRequest::Rate { rate, start, end } => {
+            SampleTimesKind::Rate { rate, start, end } => {
                 if rate.is_zero() {
                     let text = rate.to_string();
                     return Err(SampleTimesError::Rate { text });
@@ -134,14 +134,14 @@ impl SampleTimes {
                 let (rate, start) = (*rate, FrameStart::new(start));
                 (Ticks::Frames { rate, start }, count as usize)
             }
-            SampleRequest::Shared(times) => {
+            SampleTimesKind::Shared(times) => {
                 finite(times)?;
                 check_size(tracks, times.len() as f64)?;
                 let (times, stride) = (Arc::clone(times), 0);
                 let count = times.len();
                 (Ticks::Times { times, stride }, count)
             }
-            SampleRequest::PerTrack(times) => {
+            SampleTimesKind::PerTrack(times) => {
                 finite(times)?;
                 if tracks == 0 || !times.len().is_multiple_of(tracks) {
                     return Err(SampleTimesError::Uneven {
@@ -152,7 +152,7 @@ impl SampleTimes {
                 let (times, stride) = (Arc::clone(times), times.len() / tracks);
                 (Ticks::Times { times, stride }, stride)
             }
-            SampleRequest::TimesInRange => return Err(SampleTimesError::TimesInRange),
+            SampleTimesKind::TimesInRange => return Err(SampleTimesError::TimesInRange),
         };
         Ok(Timeline { ticks, count })
     }
@@ -205,6 +205,16 @@ impl Timeline {
             count: times.len(),
             ticks: Ticks::Times { times, stride: 0 },
         }
+    }
+
+    /// The same sample times for a set that has only these of the tracks.
+    pub(crate) fn of_listed(&self, tracks: &[usize]) -> Self {
+        let mut timeline = self.clone();
+        if let Ticks::Times { times, stride: 1.. } = &mut timeline.ticks {
+            let of_track = |&track: &usize| &times[track * self.count..][..self.count];
+            *times = Arc::new(tracks.iter().flat_map(of_track).copied().collect());
+        }
+        timeline
     }
 
     /// The times for some samples of some tracks, and the index of the first of these samples in it. Explicit times
@@ -271,6 +281,11 @@ impl Timeline {
     pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {
         let count = self.time(track, 0).map_or(0, |_| self.count);
         (0..count).map(move |sample| self.time_at(track, sample))
+    }
+
+    /// Whether times are listed for each track.
+    pub(crate) fn is_per_track(&self) -> bool {
+        matches!(self.ticks, Ticks::Times { stride: 1.., .. })
     }
 
     /// The exact time of a sample within [`Timeline::len`].

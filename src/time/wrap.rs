@@ -101,6 +101,42 @@ impl Wrap {
         }
     }
 
+    /// The copy that contains a frame, as [`Wrap::copy_at`].
+    fn copy_of_frame(
+        self,
+        period: &Period,
+        (rate, start): (FrameRate, FrameStart),
+        frame: usize,
+    ) -> Option<(InCopy, bool)> {
+        let time = Moment::of_frame(start.seconds, rate, frame as u64);
+        let magnitude = time.high.abs().max(start.latest);
+        self.copy_at(period, time, rounding(magnitude, false))
+    }
+
+    /// Whether a sample is in a copy of its track that runs backwards. `span` is the times of the track's first and
+    /// last key, seconds.
+    pub(crate) fn is_backwards(
+        self,
+        span: (f64, f64),
+        timeline: &Timeline,
+        track: usize,
+        sample: usize,
+    ) -> bool {
+        let in_copy = || {
+            let period = Period::new(span)?;
+            match &timeline.ticks {
+                &Ticks::Frames { rate, start } => {
+                    self.copy_of_frame(&period, (rate, start), sample)
+                }
+                Ticks::Times { .. } => {
+                    let time = Moment::new(timeline.time_at(track, sample));
+                    self.copy_at(&period, time, 0.0)
+                }
+            }
+        };
+        in_copy().is_some_and(|(_, backwards)| backwards)
+    }
+
     fn copies_of_frames(
         self,
         span: (f64, f64),
@@ -112,9 +148,7 @@ impl Wrap {
         };
         let length = rate.frames_in(period.length().seconds());
         let position = |sample: usize| {
-            let time = Moment::of_frame(start.seconds, rate, sample as u64);
-            let magnitude = time.high.abs().max(start.latest);
-            let found = self.copy_at(&period, time, rounding(magnitude, false));
+            let found = self.copy_of_frame(&period, (rate, start), sample);
             let Some((found, backwards)) = found else {
                 return CopyPosition::Track;
             };

@@ -3,6 +3,7 @@
 
 pub(crate) mod error;
 pub(crate) mod joints;
+pub(crate) mod per_track;
 pub(crate) mod rotation;
 pub(crate) mod set;
 pub(crate) mod signs;

@@ -4,9 +4,11 @@
 //! on it: every track has at least one key, times are finite and strictly increasing, and keys are unit quaternions.
 
 pub(crate) mod key_data;
+pub(crate) mod scalars;
 pub(crate) mod vectors;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DQuat, DVec3, Quat};
 
@@ -15,6 +17,7 @@ use crate::math::quaternion::unit_f32;
 use crate::tracks::error::{LATEST, NORM_TOLERANCE, TrackError};
 use crate::tracks::rotation::Rotation;
 use crate::tracks::set::key_data::{KeyData, Tcb};
+use crate::tracks::set::scalars::ScalarTrack;
 use crate::tracks::set::vectors::VectorTracks;
 use crate::tracks::signs::{SignBits, Signs};
 
@@ -42,7 +45,9 @@ pub struct TrackSet {
     pub(crate) tcb: KeyData<Tcb>,
     /// Translations and scales, in the order of [`Channel`](crate::tracks::set::vectors::Channel).
     pub(crate) vectors: [VectorTracks; 2],
-    /// First and last key time over all tracks.
+    /// Single numbers over time, which belong to no track.
+    scalars: Vec<Arc<ScalarTrack>>,
+    /// First and last key time over all tracks and scalars.
     span: Option<(f64, f64)>,
     /// Number of keys of the longest track.
     longest: usize,
@@ -180,12 +185,6 @@ impl TrackSet {
         !self.signs.any_long
     }
 
-    /// The signs of the keys of consecutive tracks along the shortest path.
-    pub(crate) fn signs_of(&self, tracks: Range<usize>) -> Signs<'_> {
-        let first = self.first_key(tracks.start);
-        self.signs.of(first..self.first_key(tracks.end))
-    }
-
     /// The signs of a track's keys along the shortest path.
     #[inline]
     pub(crate) fn signs(&self, index: usize) -> Signs<'_> {
@@ -245,6 +244,7 @@ impl TrackSet {
     }
 
     /// The keys of all tracks, one track after another.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn keys(&self) -> &[Quat] {
         &self.keys
     }
@@ -291,7 +291,7 @@ impl TrackSet {
         Ok(())
     }
 
-    /// The first and the last key time of all tracks, seconds; `None` if there are none.
+    /// The first and the last key time of all tracks and scalars, seconds; `None` if there are none.
     #[must_use]
     pub fn time_span(&self) -> Option<(f64, f64)> {
         self.span
@@ -303,12 +303,16 @@ impl TrackSet {
         tracks.iter().copied().eq(0..self.track_count())
     }
 
-    /// Makes a set of some tracks, such as `0..10` or a list, in this order.
+    /// Makes a set of some tracks, such as `0..10` or a list, in this order, and of all scalars.
     ///
     /// # Errors
     /// When a track's index is out of range.
     pub fn select(&self, tracks: impl IntoIterator<Item = usize>) -> Result<Self, TrackError> {
         let mut set = Self::default();
+        for scalar in &self.scalars {
+            set.widen_span(&scalar.times);
+            set.scalars.push(Arc::clone(scalar));
+        }
         for index in tracks {
             self.check_track(index)?;
             let track = self.track(index);

@@ -28,7 +28,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::method;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::VectorMethod;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::method::{METHODS, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
@@ -42,8 +42,8 @@ use crate::time::frames::SampleTimes;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::verify::sets::{
-    SeededRandom, closed_set, crowd_layer, crowd_library, later, paths_set, random_set, shared_set,
-    vectors_set,
+    SeededRandom, closed_set, crowd_layer, crowd_library, later, paths_set, random_set,
+    scalars_set, shared_set, vectors_set,
 };
 
 /// The recorded hashes: a line of a hash and a name for each case.
@@ -93,6 +93,8 @@ enum Evaluation {
     Transforms(Interpolation, VectorMethod, SampleTimes),
     /// Layers that are blended, mixed and added, and a skeleton.
     Poses,
+    /// Scalars, or their velocities or accelerations.
+    Scalars(ScalarQuantity, VectorMethod, Interpolation, SampleTimes),
     /// Bodies on paths.
     Follow(Box<Follow>),
     /// Rotations and translations, smoothed.
@@ -164,6 +166,7 @@ impl Golden {
             ("day", later(&uneven, 86_400.0)),
             ("closed", closed_set()),
             ("vectors", vectors_set()),
+            ("scalars", scalars_set()),
             ("paths", paths_set()),
             ("uneven", uneven),
         ]);
@@ -345,6 +348,24 @@ impl Golden {
             let evaluation =
                 Evaluation::Transforms(shortest(method::SLERP), vectors, frames.clone());
             self.add("vectors", &format!("{vectors} transforms"), evaluation);
+        }
+        self.scalars();
+    }
+
+    /// Cases for every method and quantity of scalars, with changing wrap modes.
+    fn scalars(&mut self) {
+        let frames = SampleTimes::fps(30).between(-9.0, 19.0);
+        let modes = WrapMode::ALL;
+        for (i, how) in VectorMethod::ALL.into_iter().enumerate() {
+            for (j, quantity) in ScalarQuantity::ALL.into_iter().enumerate() {
+                let interpolation = Interpolation {
+                    before: modes[(i + j) % modes.len()],
+                    after: modes[(i + 2 * j + 1) % modes.len()],
+                    ..shortest(method::SLERP)
+                };
+                let evaluation = Evaluation::Scalars(quantity, how, interpolation, frames.clone());
+                self.add("scalars", &format!("{how} {quantity}"), evaluation);
+            }
         }
     }
 
@@ -693,6 +714,10 @@ impl Evaluation {
                 hash.add(found.translations.as_slice());
                 hash.add(found.rotations.as_quats());
                 hash.add(found.scales.as_slice());
+            }
+            Self::Scalars(quantity, how, interpolation, frames) => {
+                let found = engine.scalars(set, *quantity, *how, *interpolation, frames, rows)?;
+                hash.add(found.as_slice());
             }
             Self::Follow(follow) => {
                 let found = engine.follow(set, follow, &SampleTimes::fps(30), rows)?;

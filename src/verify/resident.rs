@@ -8,12 +8,12 @@ use crate::checks::check_encoding;
 use crate::engine::Engine;
 use crate::engine::clip::Clip;
 use crate::error::Error;
-use crate::evaluate::Backend;
 use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::clip::VulkanClip;
 use crate::gpu::engine::VulkanEngine;
 pub use crate::gpu::engine::write_rates::WriteRates;
-use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
+use crate::machine::error::VulkanError;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::time::frames::{SampleTimes, Timeline};
@@ -45,7 +45,7 @@ impl Engine {
     /// # Errors
     /// When the device fails, or has no memory for the test.
     pub fn write_rates(&self) -> Result<Option<WriteRates>, Error> {
-        let Some(opened) = self.backend.opened() else {
+        let Some(opened) = self.opened() else {
             return Ok(None);
         };
         Ok(opened.engine().write_rates()?)
@@ -64,12 +64,12 @@ impl Clip {
         layout: Layout,
         encoding: Encoding,
     ) -> Result<Option<Resident<'_>>, Error> {
-        let Some(opened) = self.engine().backend.opened() else {
+        let Some(opened) = self.engine().opened() else {
             return Ok(None);
         };
         check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.data.folded(&timeline)?;
+        let timeline = self.uploaded()?.data().folded(&timeline)?;
         let engine = opened.engine();
         let count = (self.track_count() * timeline.len()) as u64;
         let bytes = count.saturating_mul(encoding.bytes() as u64);
@@ -109,25 +109,22 @@ impl Resident<'_> {
     /// # Errors
     /// As [`Clip::evaluate`].
     pub fn evaluate(&mut self) -> Result<ResidentTime, Error> {
-        let Backend::Vulkan(opened) = &*self.clip.engine().backend else {
-            return Err(Error::BufferOnCpu);
-        };
+        let on_device = VulkanClip::of(self.clip.uploaded()?.prepared()?);
+        let on_device = on_device.ok_or(Error::BufferOnCpu)?;
         let (layout, bytes, buffer) = (self.layout, self.bytes, &mut self.buffer);
         let _ = self.clip.engine().take_timings();
         let started = Instant::now();
-        self.clip
-            .uploaded
-            .on_device(opened, &self.timeline, self.encoding, |engine, job| {
-                if !Arc::ptr_eq(&engine.device, &buffer.device) {
-                    *buffer = room(engine, bytes)?;
-                }
-                let target = VulkanBuffer {
-                    buffer: buffer.raw,
-                    offset: 0,
-                    size: bytes,
-                };
-                engine.run_into(job, &job.whole(layout), target)
-            })?;
+        on_device.on_device(&self.timeline, self.encoding, |engine, job| {
+            if !Arc::ptr_eq(&engine.device, &buffer.device) {
+                *buffer = room(engine, bytes)?;
+            }
+            let target = VulkanBuffer {
+                buffer: buffer.raw,
+                offset: 0,
+                size: bytes,
+            };
+            engine.run_into(job, &job.whole(layout), target)
+        })?;
         let on_host = started.elapsed();
         let on_device = self.clip.engine().take_timings().on_device;
         Ok(ResidentTime { on_device, on_host })

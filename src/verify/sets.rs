@@ -221,6 +221,24 @@ pub(crate) fn vectors_set() -> TrackSet {
     set
 }
 
+/// Scalars of which some share their key times, and some have tangents.
+pub(crate) fn scalars_set() -> TrackSet {
+    let mut set = TrackSet::new();
+    let mut random = SeededRandom(29);
+    for scalar in 0..17 {
+        let times: Vec<f64> = (0..2 + scalar / 4)
+            .map(|k| f64::from(k) * (0.7 + 0.1 * f64::from(scalar / 5)))
+            .collect();
+        let mut number = || random.between(-3.0, 3.0) as f32;
+        let keys: Vec<f32> = times.iter().map(|_| number()).collect();
+        let tangents: Vec<[f32; 2]> = times.iter().map(|_| [number(), number()]).collect();
+        let count = if scalar % 6 == 5 { 0 } else { tangents.len() };
+        set.push_scalar("", &times, &keys, &tangents[..count])
+            .expect("numbers in order");
+    }
+    set
+}
+
 /// Random walks of points, some of which stand still for a time.
 pub(crate) fn paths_set() -> TrackSet {
     let mut random = SeededRandom(14);

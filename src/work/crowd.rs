@@ -1,50 +1,12 @@
-//! Frames of a crowd: their steps in the only order there is, for the CPU and for devices, and the recording of a
-//! frame for a device.
+//! The recording of a crowd's frames, whose steps and their order are those of [`FrameStep`].
 
-use crate::output::crowd::{CrowdFrame, CrowdOutput, CrowdValues, EntryChanges, VisibleInstances};
+use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
+use crate::output::crowd::{CrowdOutput, FrameStep};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
 };
 use crate::work::recording::{Recording, Resource, Set, Slice, workgroups};
 use crate::work::whole_instances::WholeInstances;
-
-/// A step of a frame, over all instances or over one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FrameStep {
-    /// The position of each layer in its clip.
-    Positions,
-    /// Rotations of joints, layers over layers.
-    Rotations,
-    /// Rotations, translations and scales as matrices in the parent's frame.
-    Locals,
-    /// Matrices in the model's frame, parents first.
-    Walk,
-    /// Products with the inverse bind matrices.
-    Skin,
-    /// Rounding to 16 bits.
-    Half,
-}
-
-impl FrameStep {
-    /// The steps of an output, in their order.
-    pub(crate) fn of(output: CrowdOutput) -> impl Iterator<Item = Self> {
-        use CrowdValues::{Model, Rotations, Skinning};
-        let walks = matches!(output.values, Model | Skinning);
-        let joints = match output.values {
-            Rotations => Self::Rotations,
-            _ => Self::Locals,
-        };
-        [
-            Some(Self::Positions),
-            Some(joints),
-            walks.then_some(Self::Walk),
-            (output.values == Skinning).then_some(Self::Skin),
-            output.is_half.then_some(Self::Half),
-        ]
-        .into_iter()
-        .flatten()
-    }
-}
 
 /// The skeleton and the clips of a crowd, as far as its dispatches depend on them.
 #[derive(Clone)]
@@ -414,6 +376,7 @@ mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
+    use crate::output::crowd::CrowdValues;
     use crate::shader::CrowdChange;
     use crate::work::recording::tests::letters;
 

@@ -14,7 +14,6 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
-use crate::from_keys::dispatches::KeyJob;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -32,6 +31,7 @@ use crate::tracks::set::TrackSet;
 use crate::twin::entries::Global;
 use crate::twin::machine::{Memory, UNTOUCHED, Watch};
 use crate::work::lists::grid::{GridRows, write_blocks};
+use crate::work::lists::keys::KeyJob;
 use crate::work::lists::sample_list::SampleList;
 use crate::work::lists::{Cut, GroupWork, work, write};
 use crate::{Device, Engine};
@@ -144,7 +144,7 @@ impl Watch for Lane {
 
     #[track_caller]
     fn location(&self, at: usize, words: usize) -> usize {
-        if is_planted(Kind::Place) {
+        if is_planted(Kind::Address) {
             at + words
         } else {
             at

@@ -41,7 +41,7 @@ pub(super) enum Kind {
     /// Another constant.
     Constant,
     /// A neighbour of what is loaded or stored.
-    Place,
+    Address,
 }
 
 /// Where a mistake can be: a line and a column of the generated file.
@@ -80,8 +80,8 @@ pub(super) fn is_planted(kind: Kind) -> bool {
     if !matches!(rule, Rule::Listing | Rule::Mistaken(..)) {
         return false;
     }
-    let place = Location::caller();
-    let spot = (place.line(), place.column(), kind);
+    let caller = Location::caller();
+    let spot = (caller.line(), caller.column(), kind);
     if rule == Rule::Listing {
         RECENT.with_borrow_mut(|recent| {
             let bits = (spot.0 << 5 ^ spot.1 << 2) as usize + kind as usize;

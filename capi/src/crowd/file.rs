@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ffi::c_char;
 
-use tumble::{Method, TrackSet, VectorMethod, method};
+use tumble::{Method, TrackSet, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
@@ -84,24 +84,13 @@ fn matched<'a>(
 
 /// The method by which the file interpolates all rotations that change; an error if there are several.
 fn authored_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
-    let moves = |&track: &usize| {
-        let keys = motion
-            .set
-            .get(track)
-            .map(|track| track.keys)
-            .unwrap_or_default();
-        keys.iter().any(|key| *key != keys[0])
-    };
-    let groups = ChannelMethods::AUTHORED.groups_of(motion);
-    let mut moving = groups.iter().filter(|(_, tracks)| tracks.iter().any(moves));
-    match (moving.next(), moving.next()) {
-        (None, _) => Ok(method::SLERP),
-        (Some((method, _)), None) => Ok(*method),
-        (Some((first, _)), Some((second, _))) => Err(refused(format!(
+    let found = ChannelMethods::AUTHORED.moving_method_of(motion);
+    found.map_err(|[first, second]| {
+        refused(format!(
             "clip {clip} has rotations by {} and by {}; give one interpolation for all",
             first.name, second.name
-        ))),
-    }
+        ))
+    })
 }
 
 fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, Failure> {

@@ -9,7 +9,8 @@ use clap::Args;
 use glam::Quat;
 use tumble::vulkan::VulkanError;
 use tumble::{
-    CacheFiles, Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet,
+    CacheFiles, Device, Engine, EngineOptions, Error, Interpolation, Layout, PerTrack, SampleTimes,
+    TrackSet,
 };
 
 use crate::arguments::options::CommandLine;
@@ -289,7 +290,7 @@ impl OpenedDevice {
     pub(crate) fn stream(
         &mut self,
         set: &TrackSet,
-        interpolation: Interpolation,
+        interpolations: &PerTrack<Interpolation>,
         frames: &SampleTimes,
         layout: Layout,
         sink: &mut ChunkSink<'_>,
@@ -301,7 +302,7 @@ impl OpenedDevice {
         let mut done = 0;
         let result = self
             .engine
-            .request(set, interpolation, frames)
+            .request(set, interpolations.clone(), frames)
             .layout(layout)
             .stream(chunk, |chunk| {
                 done = chunk.start + chunk.rows.len();
@@ -311,7 +312,7 @@ impl OpenedDevice {
             Err(ResultError::Evaluating(Error::Vulkan(error))) if self.automatic => {
                 self.fall_back(&error)?;
                 self.engine
-                    .request(set, interpolation, frames)
+                    .request(set, interpolations.clone(), frames)
                     .layout(layout)
                     .stream(chunk, |chunk| {
                         if chunk.start < done {
@@ -358,7 +359,7 @@ impl OpenedDevice {
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let mut rotations = Vec::new();
-        let collected = self.stream(set, interpolation, frames, layout, &mut |chunk| {
+        let collected = self.stream(set, &interpolation.into(), frames, layout, &mut |chunk| {
             rotations.extend_from_slice(chunk.rotations().unwrap_or_default());
             Ok(())
         });

@@ -1,22 +1,21 @@
 //! Options for interpolation: method, signs of keys, ends.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tumble::method::{BESSEL_OVERHAUSER, KOCHANEK_BARTELS};
 use tumble::{
-    Ends, Engine, Error, FrameRate, Interpolation, InterpolationWarning, KeySigns, METHODS, Method,
-    Quantity, SampleTimes, Speed, TrackSet, WrapMode,
+    Ends, Engine, Error, FrameRate, Interpolation, InterpolationOption, InterpolationOptions,
+    InterpolationWarning, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, TrackSet,
+    WrapMode,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::{Outside, OutsideError, OutsideValue};
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
 use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::output::one_of;
-use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -57,12 +56,11 @@ fn finite(text: &str) -> Result<f64, String> {
 }
 
 impl InterpolationArguments {
-    pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
-        tumble::Interpolation {
-            method,
-            signs: method.signs.or(self.path).unwrap_or_default(),
-            ends: self.ends.unwrap_or(method.ends),
-            quantity: tumble::Quantity::Rotation,
+    /// The options as the engine has them.
+    pub(crate) fn options(self) -> InterpolationOptions {
+        InterpolationOptions {
+            signs: self.path,
+            ends: self.ends,
             speed: self.speed,
             before: self.before.wrap_mode(),
             after: self.after.wrap_mode(),
@@ -71,7 +69,13 @@ impl InterpolationArguments {
                 continuity: self.continuity.unwrap_or_default(),
                 bias: self.bias.unwrap_or_default(),
             },
+            ..InterpolationOptions::DEFAULT
         }
+    }
+
+    /// The interpolation by a method.
+    pub(crate) fn with(self, method: Method) -> Interpolation {
+        self.options().with(method)
     }
 
     /// What is done with times outside the keys.
@@ -84,21 +88,10 @@ impl InterpolationArguments {
 
     /// The options that are set, by their names in the npm package.
     pub(crate) fn named(self) -> BTreeMap<&'static str, String> {
-        let number = |value: Option<f64>| value.map(|value| value.to_string());
-        let options = [
-            ("ends", self.ends.map(|ends| ends.to_string())),
-            ("path", self.path.map(|signs| signs.to_string())),
-            ("speed", Some(self.speed.to_string())),
-            ("before", Some(self.before.wrap_mode().to_string())),
-            ("after", Some(self.after.wrap_mode().to_string())),
-            ("tension", number(self.tension)),
-            ("continuity", number(self.continuity)),
-            ("bias", number(self.bias)),
-        ];
-        let present = options
-            .into_iter()
-            .filter_map(|(name, value)| Some((name, value?)));
-        present.collect()
+        let options = self.options();
+        let all = InterpolationOption::ALL.into_iter();
+        all.filter_map(|option| Some((option.name, option.get(&options)?)))
+            .collect()
     }
 
     /// Refuses options that have no effect on the channels of a clip by any of these methods.
@@ -106,13 +99,13 @@ impl InterpolationArguments {
         self,
         name: &str,
         clip: &Motion,
-        methods: &[MethodArgument],
+        methods: &[MethodChoice],
     ) -> Result<(), Failure> {
         let used = methods.iter().flat_map(|&method| {
             let choice = CurveChoice::of_rotations(method, self);
-            choice.with_methods(|methods| methods.groups_of(clip))
+            choice.channel_methods().methods(clip)
         });
-        let used: Vec<Method> = used.map(|group| group.0).collect();
+        let used: Vec<Method> = used.collect();
         let checked = self.check(&each_once(used.iter()));
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
     }
@@ -275,66 +268,33 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// A method for every channel, or `None` for the one that the file states for each.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MethodArgument(pub(crate) Option<Method>);
-
-impl fmt::Display for MethodArgument {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+/// Of these methods those that draw a clip differently: the method of a file that states none is
+/// bessel-overhauser, which is not drawn twice.
+pub(crate) fn distinct_methods(methods: &[MethodChoice], clip: &Motion) -> Vec<MethodChoice> {
+    if !clip.channels.is_empty() {
+        return methods.to_vec();
     }
-}
-
-const AUTHORED: &str = "authored";
-
-impl MethodArgument {
-    pub(crate) fn name(self) -> &'static str {
-        self.0.map_or(AUTHORED, |method| method.name)
+    let meant = MethodChoice(Some(BESSEL_OVERHAUSER));
+    let mut kept = methods.to_vec();
+    if kept.contains(&meant) {
+        kept.retain(|method| method.0.is_some());
     }
-
-    pub(crate) fn summary(self) -> &'static str {
-        let authored =
-            "as the file states for each channel; bessel-overhauser where it states none";
-        self.0.map_or(authored, |method| method.summary)
-    }
-
-    pub(crate) fn colour(self) -> Colour {
-        self.0.map_or(colours::AUTHORED, colours::of_method)
-    }
-
-    /// Of these methods those that draw a clip differently: the method of a file that states none is
-    /// bessel-overhauser, which is not drawn twice.
-    pub(crate) fn distinct(methods: &[Self], clip: &Motion) -> Vec<Self> {
-        if !clip.channels.is_empty() {
-            return methods.to_vec();
-        }
-        let meant = Self(Some(BESSEL_OVERHAUSER));
-        let mut kept = methods.to_vec();
-        if kept.contains(&meant) {
-            kept.retain(|method| method.0.is_some());
-        }
-        let named: Vec<Self> = kept.iter().map(|it| Self(it.0.or(meant.0))).collect();
-        each_once(named.iter())
-    }
-
-    /// `authored`, then all methods.
-    pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let methods = METHODS.into_iter().map(Some);
-        std::iter::once(None).chain(methods).map(Self)
-    }
+    let named = kept.iter().map(|choice| MethodChoice(choice.0.or(meant.0)));
+    let named: Vec<MethodChoice> = named.collect();
+    each_once(named.iter())
 }
 
 /// A method of the command line, with the other options of curves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurveChoice {
-    pub(crate) method: MethodArgument,
+    pub(crate) method: MethodChoice,
     options: InterpolationArguments,
     quantity: Quantity,
 }
 
 impl CurveChoice {
     /// Rotations by a method.
-    pub(crate) fn of_rotations(method: MethodArgument, options: InterpolationArguments) -> Self {
+    pub(crate) fn of_rotations(method: MethodChoice, options: InterpolationArguments) -> Self {
         Self {
             method,
             options,
@@ -352,12 +312,12 @@ impl CurveChoice {
     /// # Errors
     /// When an option has no effect on any of them.
     pub(crate) fn of_clip(
-        methods: &[MethodArgument],
+        methods: &[MethodChoice],
         options: InterpolationArguments,
         name: &str,
         clip: &Motion,
     ) -> Result<Vec<Self>, Failure> {
-        let methods = MethodArgument::distinct(methods, clip);
+        let methods = distinct_methods(methods, clip);
         options.check_clip(name, clip, &methods)?;
         let choices = methods.into_iter();
         Ok(choices
@@ -367,25 +327,24 @@ impl CurveChoice {
 
     /// The curve by a method, with the other options.
     pub(crate) fn interpolation(self, method: Method) -> Interpolation {
-        Interpolation {
-            quantity: self.quantity,
-            ..self.options.with(method)
-        }
+        self.channel_methods().options.with(method)
     }
 
-    /// Gives the methods of a clip's channels to `work`.
-    pub(crate) fn with_methods<T>(self, work: impl FnOnce(&ChannelMethods<'_>) -> T) -> T {
-        work(&ChannelMethods {
-            method: self.method.0,
-            with: &|method| self.interpolation(method),
-        })
+    /// The methods of a clip's channels.
+    pub(crate) fn channel_methods(self) -> ChannelMethods {
+        ChannelMethods {
+            method: self.method,
+            options: InterpolationOptions {
+                quantity: self.quantity,
+                ..self.options.options()
+            },
+        }
     }
 
     /// How the rotations of a track are interpolated.
     pub(crate) fn of_track(self, clip: &Motion, track: usize) -> Interpolation {
-        let groups = self.with_methods(|methods| methods.groups_of(clip));
-        let group = groups.iter().find(|(_, tracks)| tracks.contains(&track));
-        self.interpolation(group.map_or(BESSEL_OVERHAUSER, |(method, _)| *method))
+        let method = self.channel_methods().methods(clip).nth(track);
+        self.interpolation(method.unwrap_or(BESSEL_OVERHAUSER))
     }
 
     /// All channels of a clip.
@@ -395,32 +354,31 @@ impl CurveChoice {
         clip: &Motion,
         frames: &SampleTimes,
     ) -> Result<Samples, Error> {
-        self.with_methods(|methods| methods.sample(engine, clip, frames))
+        self.channel_methods().sample(engine, clip, frames)
     }
 }
 
 fn method_argument_names() -> impl Iterator<Item = PossibleValue> {
-    MethodArgument::all()
-        .map(|argument| PossibleValue::new(argument.name()).help(argument.summary()))
+    MethodChoice::all().map(|argument| PossibleValue::new(argument.name()).help(argument.summary()))
 }
 
-/// Parses the name of one of [`MethodArgument::all`]; help, errors and completions list all of them.
-pub(crate) fn method_argument() -> impl TypedValueParser<Value = MethodArgument> {
+/// Parses the name of one of [`MethodChoice::all`]; help, errors and completions list all of them.
+pub(crate) fn method_argument() -> impl TypedValueParser<Value = MethodChoice> {
     PossibleValuesParser::new(method_argument_names())
-        .map(|name| MethodArgument(Method::named(&name)))
+        .map(|name| MethodChoice(Method::named(&name)))
 }
 
-/// One of [`MethodArgument::all`], or all of them.
+/// One of [`MethodChoice::all`], or all of them.
 #[derive(Debug, Clone)]
-pub(crate) struct MethodArgumentSelection(pub(crate) Vec<MethodArgument>);
+pub(crate) struct MethodArgumentSelection(pub(crate) Vec<MethodChoice>);
 
 /// As [`method_argument`], and `all`.
 pub(crate) fn method_arguments() -> impl TypedValueParser<Value = MethodArgumentSelection> {
     let all = PossibleValue::new(ALL).help("every method");
     PossibleValuesParser::new(std::iter::once(all).chain(method_argument_names())).map(|name| {
         MethodArgumentSelection(match &*name {
-            ALL => MethodArgument::all().collect(),
-            _ => vec![MethodArgument(Method::named(&name))],
+            ALL => MethodChoice::all().collect(),
+            _ => vec![MethodChoice(Method::named(&name))],
         })
     })
 }

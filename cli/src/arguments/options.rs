@@ -46,7 +46,7 @@ pub(crate) enum AppliesTo {
     /// Inputs of formats that take it.
     Inputs(FormatOption),
     /// Results for which this gives no reason against it.
-    Results(fn(&ResultRequest<'_>) -> Option<String>),
+    Results(fn(&ResultDescription<'_>) -> Option<String>),
 }
 
 /// The kind of a result of `tumble eval`.
@@ -69,7 +69,7 @@ impl ResultKind {
 }
 
 /// A result of `tumble eval`, as far as options apply to it or do not.
-pub(crate) struct ResultRequest<'a> {
+pub(crate) struct ResultDescription<'a> {
     pub(crate) kind: ResultKind,
     pub(crate) format: &'static Format,
     pub(crate) output: &'a OutputArguments,
@@ -80,7 +80,7 @@ pub(crate) struct ResultRequest<'a> {
     pub(crate) times_apart: bool,
 }
 
-impl ResultRequest<'_> {
+impl ResultDescription<'_> {
     /// The result, as far as the rule for its end depends on it.
     pub(crate) fn sampled(&self) -> SampledResult<'static> {
         SampledResult {
@@ -121,7 +121,7 @@ const fn reading(name: &'static str, option: FormatOption) -> OptionRule {
 
 const fn of_results(
     name: &'static str,
-    refusal: fn(&ResultRequest<'_>) -> Option<String>,
+    refusal: fn(&ResultDescription<'_>) -> Option<String>,
 ) -> OptionRule {
     OptionRule {
         name,
@@ -246,7 +246,7 @@ pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
     OPTIONS.iter().find(|rule| rule.name == name)
 }
 
-impl ResultRequest<'_> {
+impl ResultDescription<'_> {
     /// Why an option has no effect, where `applies` is false.
     fn unless(&self, applies: bool, option: &str, wants: &str) -> Option<String> {
         (!applies).then(|| {
@@ -258,29 +258,29 @@ impl ResultRequest<'_> {
     }
 }
 
-fn sequence(result: &ResultRequest<'_>) -> Option<String> {
+fn sequence(result: &ResultDescription<'_>) -> Option<String> {
     // Files of angles have them whatever `--output` is (BVH).
     let is_angles = result.kind.is_clip() && result.format.takes(FormatOption::Sequence);
     let applies = result.output.is_euler() || is_angles;
     result.unless(applies, "sequence", "--output euler, or BVH")
 }
 
-fn major(result: &ResultRequest<'_>) -> Option<String> {
+fn major(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.is_matrix();
     result.unless(applies, "major", "--output matrix or matrix-3x4")
 }
 
-fn axes(result: &ResultRequest<'_>) -> Option<String> {
+fn axes(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.is_rate();
     result.unless(applies, "axes", "--output velocity or acceleration")
 }
 
-fn parents(result: &ResultRequest<'_>) -> Option<String> {
+fn parents(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.poses().is_some();
     result.unless(applies, "parents", "--output world or transform")
 }
 
-fn order(result: &ResultRequest<'_>) -> Option<String> {
+fn order(result: &ResultDescription<'_>) -> Option<String> {
     let (output, format) = (result.output, result.format);
     match result.kind {
         ResultKind::Rotations if !output.is_rotations() => Some(format!(
@@ -296,7 +296,7 @@ fn order(result: &ResultRequest<'_>) -> Option<String> {
     }
 }
 
-fn layout(result: &ResultRequest<'_>) -> Option<String> {
+fn layout(result: &ResultDescription<'_>) -> Option<String> {
     let name = result.format.name;
     let (only, rows) = match result.kind {
         ResultKind::Rotations => {
@@ -314,7 +314,7 @@ fn layout(result: &ResultRequest<'_>) -> Option<String> {
     is_refused.then(|| format!("{rows} come frame by frame; leave out --layout track"))
 }
 
-fn encoding(result: &ResultRequest<'_>) -> Option<String> {
+fn encoding(result: &ResultDescription<'_>) -> Option<String> {
     if result.encoding == Encoding::F32 {
         return None;
     }
@@ -335,16 +335,16 @@ fn encoding(result: &ResultRequest<'_>) -> Option<String> {
     }
 }
 
-fn linear(result: &ResultRequest<'_>) -> Option<String> {
+fn linear(result: &ResultDescription<'_>) -> Option<String> {
     let takes = result.kind == ResultKind::Baked && result.format.takes(FormatOption::Linear);
     (!takes).then(|| "--linear is for NPZ that is written again as NPZ; leave it out".to_owned())
 }
 
-fn end_frame(result: &ResultRequest<'_>) -> Option<String> {
+fn end_frame(result: &ResultDescription<'_>) -> Option<String> {
     result.end_frame.for_result(result.sampled()).err()
 }
 
-fn lengths(result: &ResultRequest<'_>, option: &str) -> Option<String> {
+fn lengths(result: &ResultDescription<'_>, option: &str) -> Option<String> {
     (result.kind == ResultKind::Rotations).then(|| {
         format!(
             "--{option} has no effect on rotations alone; leave it out, or write --output world or \

@@ -13,7 +13,7 @@ use tumble_formats::{Code, Diagnostic, Feature, Format};
 
 use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
 use crate::arguments::options::ResultOptions;
-use crate::batch::output_plan::{self, OutputPlan, OutputRequest};
+use crate::batch::output_plan::{self, OutputOptions, OutputPlan};
 use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
 use crate::batch::result_names::ResultNaming;
 use crate::batch::target::{self, Destination, ResultTarget, WrittenFile};
@@ -161,7 +161,7 @@ impl ResultArguments {
         let inputs = &self.based(inputs)?;
         let mut plan = output_plan::plan(
             inputs,
-            OutputRequest {
+            OutputOptions {
                 out: self.out.as_deref(),
                 format: self.format,
                 overwrite: self.overwrite,

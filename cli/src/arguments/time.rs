@@ -55,7 +55,7 @@ pub(crate) struct SamplingArguments {
 }
 
 /// The requested samples, before the tracks are known.
-pub(crate) enum SampleRequest {
+pub(crate) enum SampleChoice {
     Rate {
         rate: FrameRate,
         start: Option<f64>,
@@ -237,7 +237,7 @@ pub(crate) struct AtKeysArguments {
 
 impl AtKeysArguments {
     /// The times of the file; `None` without `--at`.
-    pub(crate) fn samples(&self) -> Result<Option<SampleRequest>, Failure> {
+    pub(crate) fn samples(&self) -> Result<Option<SampleChoice>, Failure> {
         let Some(path) = &self.at else {
             return Ok(None);
         };
@@ -247,7 +247,7 @@ impl AtKeysArguments {
             let message = "--at needs a file with a single animation";
             return Err(Failure::usage(format!("{}: {message}", names::input(path))));
         };
-        Ok(Some(SampleRequest::Keys(KeyTimes {
+        Ok(Some(SampleChoice::Keys(KeyTimes {
             times: clip.key_times(),
             from: clip.time_offset,
         })))
@@ -261,9 +261,9 @@ impl SamplingArguments {
     }
 
     /// Checks what can be checked without the tracks, and reads the list of times.
-    pub(crate) fn samples(&self) -> Result<SampleRequest, Failure> {
+    pub(crate) fn samples(&self) -> Result<SampleChoice, Failure> {
         if let Some(path) = &self.times {
-            return Ok(SampleRequest::Times(times(path)?));
+            return Ok(SampleChoice::Times(times(path)?));
         }
         check_range(self.start, self.end)?;
         if let Some(meant) = broadcast_rate(self.fps) {
@@ -272,7 +272,7 @@ impl SamplingArguments {
                 self.fps.per_second()
             ));
         }
-        Ok(SampleRequest::Rate {
+        Ok(SampleChoice::Rate {
             rate: self.fps,
             start: self.start,
             end: self.end,
@@ -281,7 +281,7 @@ impl SamplingArguments {
     }
 }
 
-impl SampleRequest {
+impl SampleChoice {
     /// The hash of a list of times; empty for a rate.
     pub(crate) fn digest(&self) -> String {
         match self {

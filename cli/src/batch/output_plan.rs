@@ -43,7 +43,7 @@ pub(crate) struct UnplannedInput {
 
 /// The options that decide where results go.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct OutputRequest<'a> {
+pub(crate) struct OutputOptions<'a> {
     pub(crate) out: Option<&'a Path>,
     pub(crate) format: Option<&'static Format>,
     pub(crate) overwrite: bool,
@@ -55,30 +55,30 @@ pub(crate) struct OutputRequest<'a> {
 /// Plans the targets. Refuses, before any work, outputs that exist, that are inputs, or that two inputs share.
 pub(crate) fn plan(
     inputs: &GatheredInputs,
-    request: OutputRequest<'_>,
+    options: OutputOptions<'_>,
 ) -> Result<OutputPlan, Failure> {
-    if request.out.is_none() && io::stdout().is_terminal() {
+    if options.out.is_none() && io::stdout().is_terminal() {
         return Err(Failure::usage(format!(
             "where should the result go? give {}, or -o - for standard output",
             extensions(|name| format!("-o OUT.{name}")).join(", ")
         )));
     }
-    let out = request.out.unwrap_or(Path::new("-"));
+    let out = options.out.unwrap_or(Path::new("-"));
     let paths = inputs.paths();
     // A single input has a single output, however it was found.
     let is_file = out.is_file() || of(out).is_some() || names::is_standard(out);
     let is_folder = out.is_dir() || out.as_os_str().as_encoded_bytes().ends_with(b"/");
     let plan = match &*paths {
         [_] if is_file || !inputs.many && !is_folder => {
-            if request.resume {
+            if options.resume {
                 let message = "--resume is for a directory of results";
                 return Err(Failure::usage(message));
             }
-            if request.prune {
+            if options.prune {
                 return Err(Failure::usage("--prune is for a directory of results"));
             }
-            let format = choose(out, request.format)?;
-            let destination = Destination::new(out, request.overwrite, &paths)?;
+            let format = choose(out, options.format)?;
+            let destination = Destination::new(out, options.overwrite, &paths)?;
             // The surest check is to try.
             destination.check_writable()?;
             destination.refuse_terminal(format)?;
@@ -93,7 +93,7 @@ pub(crate) fn plan(
                 "several inputs need a directory for their results: -o DIRECTORY",
             ));
         }
-        _ => in_folder(inputs, out, request)?,
+        _ => in_folder(inputs, out, options)?,
     };
     if plan.manifest.is_some() {
         check_writable(&plan.targets)?;
@@ -121,27 +121,27 @@ fn check_writable(targets: &[ResultTarget]) -> Result<(), Failure> {
 fn in_folder(
     inputs: &GatheredInputs,
     folder: &Path,
-    request: OutputRequest<'_>,
+    options: OutputOptions<'_>,
 ) -> Result<OutputPlan, Failure> {
-    let format = format(folder, request.format)?;
+    let format = format(folder, options.format)?;
     let files = without_results(inputs.files.clone(), folder)?;
-    let names = name_results(&files, folder, format, request.naming);
+    let names = name_results(&files, folder, format, options.naming);
     let shards = RecordedPlan::read(folder)?;
     if let Some(recorded) = &shards {
-        refuse_shards(recorded, &names, folder, request)?;
+        refuse_shards(recorded, &names, folder, options)?;
     }
     target::create_folder(folder)?;
     let manifest = Manifest::open(
         folder,
         ManifestOptions {
             has_shards: shards.is_some(),
-            overwrite: request.overwrite,
-            prune: request.prune,
+            overwrite: options.overwrite,
+            prune: options.prune,
         },
     )?;
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
-    let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);
+    let overwrites = |name: &str| options.overwrite || options.resume && is_known(name);
     for name in names.iter().flatten().filter(|name| !overwrites(name)) {
         refuse_existing(folder, name, is_known(name))?;
     }
@@ -150,7 +150,7 @@ fn in_folder(
     let mut replaced = ReplacedOwners::default();
     for (found, name) in files.iter().zip(names) {
         let target = name.and_then(|name| {
-            if let Some(owner) = manifest.owner(&name).filter(|_| !request.overwrite) {
+            if let Some(owner) = manifest.owner(&name).filter(|_| !options.overwrite) {
                 replaced.check(found, &folder.join(&name), &owner)?;
             }
             let destination = result_folder.destination(&name, overwrites(&name))?;
@@ -244,10 +244,10 @@ fn refuse_shards(
     recorded: &RecordedPlan,
     names: &[ResultName],
     folder: &Path,
-    request: OutputRequest<'_>,
+    options: OutputOptions<'_>,
 ) -> Result<(), Failure> {
     let shown = folder.display();
-    if !request.resume && !request.overwrite {
+    if !options.resume && !options.overwrite {
         return Err(Failure::usage(format!(
             "{shown}: has shards that are not merged; --resume continues them, `tumble merge {shown}` merges them"
         )));

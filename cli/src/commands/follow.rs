@@ -18,7 +18,7 @@ use crate::arguments::input::{GatheredInputs, InputSelection};
 use crate::arguments::options::{CommandLine, ResultOptions};
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
-use crate::arguments::time::{SampleRequest, SamplingArguments};
+use crate::arguments::time::{SampleChoice, SamplingArguments};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 impl Arguments {
     /// All that decides over the bytes of a result besides its input.
-    fn options(&self, samples: &SampleRequest) -> ResultOptions {
+    fn options(&self, samples: &SampleChoice) -> ResultOptions {
         let mut options = self.command_line.options().of_command("follow");
         options.text += &format!(" times={}", samples.digest());
         options
@@ -130,7 +130,7 @@ impl Arguments {
     fn body(
         &self,
         work: &ClipWork,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         device: &mut OpenedDevice,
     ) -> Result<EvaluatedResult, Failure> {
         let [paths] = work.clips()[..] else {
@@ -193,7 +193,7 @@ fn failed(name: &str, error: &Error) -> Failure {
 fn write(
     paths: &Motion,
     frames: &SampleTimes,
-    samples: &SampleRequest,
+    samples: &SampleChoice,
     found: &Followed,
     target: &ResultTarget,
     name: &str,
@@ -227,8 +227,8 @@ fn write(
         rest: Transform::default(),
     };
     let rate = match samples {
-        SampleRequest::Rate { rate, .. } => Some(*rate),
-        SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
+        SampleChoice::Rate { rate, .. } => Some(*rate),
+        SampleChoice::Times(_) | SampleChoice::Keys(_) => None,
     };
     let clip = Motion {
         set: set.clone(),

@@ -219,7 +219,7 @@ impl Maker {
     pub(crate) fn colour(self) -> Colour {
         match self {
             Self::Frame(frame) => colours::of_frame(frame),
-            Self::Method(choice) => choice.method.colour(),
+            Self::Method(choice) => colours::of_choice(choice.method),
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::arguments::interpolation::{
     InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
 };
 use crate::arguments::options::CommandLine;
-use crate::arguments::time::{SampleRequest, SamplingArguments};
+use crate::arguments::time::{SampleChoice, SamplingArguments};
 use crate::batch::entry::InputEntry;
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
@@ -142,7 +142,7 @@ impl Arguments {
     fn compare(
         &self,
         device: &OpenedDevice,
-        samples: &SampleRequest,
+        samples: &SampleChoice,
         (name, clip): (&str, &Motion),
         methods: &[Method],
         progress: &mut Progress,

@@ -3,6 +3,7 @@
 
 use tumble::paths::PathFrame;
 use tumble::{METHODS, Method};
+use tumble_formats::sample::MethodChoice;
 
 /// Red, green, blue.
 pub(crate) type Colour = [u8; 3];
@@ -46,6 +47,11 @@ const OTHERS: [Colour; 9] = [
 
 /// Of results whose channels each have their own method.
 pub(crate) const AUTHORED: Colour = [0xe7, 0x29, 0x8a];
+
+/// The colour of a choice of method.
+pub(crate) fn of_choice(choice: MethodChoice) -> Colour {
+    choice.0.map_or(AUTHORED, of_method)
+}
 
 /// A method has one colour, wherever it is drawn.
 pub(crate) fn of_method(method: Method) -> Colour {

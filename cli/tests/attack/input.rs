@@ -649,6 +649,7 @@ fn faults_of_inputs_are_no_bugs() {
             "0",
             "--output",
             quantity,
+            "--explain-route",
             "--overwrite",
             "-o",
             "v.npy",
@@ -659,6 +660,9 @@ fn faults_of_inputs_are_no_bugs() {
         };
         let run = attempt(folder.path(), &line);
         assert_eq!(run.code, 0, "{quantity}: {}", run.words);
+        for route in [": 1 track by slerp: ", ": 1 track by step: "] {
+            assert!(run.words.contains(route), "{quantity}: {}", run.words);
+        }
         let bytes = fs::read(folder.path().join("v.npy")).unwrap();
         let file = npyz::NpyFile::new(&bytes[..]).unwrap();
         let width = if quantity == "rotation" { 4 } else { 3 };

@@ -5,10 +5,10 @@ use std::io::BufRead;
 
 use glam::DVec3;
 
-use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::motion::origin::SMALL;
+use crate::motion::{WrittenChannel, WrittenJoint};
 use crate::names::line_name;
-use crate::origin::SMALL;
 use crate::text::lines::Lines;
 use crate::text::number;
 
@@ -36,7 +36,7 @@ pub(super) struct HierarchyJoint {
     /// The axes of the joint's position channels, each with its column in a row.
     pub(super) positions: Vec<(usize, usize)>,
     /// The channels in their order, and the End Sites.
-    pub(super) written: BvhJoint,
+    pub(super) written: WrittenJoint,
 }
 
 /// A word of the hierarchy: its location, and the word.
@@ -173,7 +173,7 @@ impl<R: BufRead> Parser<'_, R> {
             offset: DVec3::ZERO,
             rotations: Vec::new(),
             positions: Vec::new(),
-            written: BvhJoint::default(),
+            written: WrittenJoint::default(),
         });
         self.brace(keyword, Some(joint))
     }
@@ -281,7 +281,7 @@ impl<R: BufRead> Parser<'_, R> {
         block.has_channels = true;
         let joint = block.joint.unwrap_or_default();
         for word in &names {
-            let Some(channel) = BvhChannel::named(&word.text) else {
+            let Some(channel) = WrittenChannel::named(&word.text) else {
                 let message = format!(
                     "`{}` is not a channel; there are Xposition, Xrotation and those of Y and Z",
                     word.text
@@ -290,8 +290,8 @@ impl<R: BufRead> Parser<'_, R> {
             };
             let joint = &mut self.hierarchy.joints[joint];
             let (axis, channels) = match channel {
-                BvhChannel::Position(axis) => (axis, &mut joint.positions),
-                BvhChannel::Rotation(axis) => (axis, &mut joint.rotations),
+                WrittenChannel::Position(axis) => (axis, &mut joint.positions),
+                WrittenChannel::Rotation(axis) => (axis, &mut joint.rotations),
             };
             if channels.iter().any(|&(other, _)| other == axis) {
                 let message = format!("the joint has `{}` twice; remove one", word.text);

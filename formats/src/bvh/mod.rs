@@ -3,11 +3,10 @@
 //! A joint's rotation is a product of rotations about the axes of its rotation channels, with angles in degrees. The
 //! order of the factors is that of `CHANNELS`; each axis is rotated by the rotations before it. Position channels
 //! replace coordinates of the joint's `OFFSET`. End Sites are not joints. They and the order of the channels are kept
-//! with the clip ([`BvhJoint`]), and written again.
+//! with the clip ([`WrittenJoint`](crate::motion::WrittenJoint)), and written again.
 
 mod angles;
 mod hierarchy;
-pub(crate) mod joint;
 mod motion;
 mod write;
 
@@ -15,7 +14,6 @@ use std::io::BufRead;
 use std::path::Path;
 
 use crate::bvh::hierarchy::Hierarchy;
-pub use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::bvh::motion::FrameKeys;
 use crate::bvh::write::write_motion;
 use crate::diagnostic::Diagnostic;

@@ -9,8 +9,8 @@ use tumble::{FrameRate, TrackSet};
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
+use crate::motion::origin::{SMALL, origin_at_rest, relative};
 use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
-use crate::origin::{SMALL, origin_at_rest, relative};
 use crate::quaternion::rounded;
 use crate::rate::{RateSource, itself, noticed_change, of, overridden};
 use crate::text::blocks::Blocks;
@@ -184,12 +184,15 @@ impl FrameKeys {
                     scale: None,
                 })
                 .collect(),
-            bvh: (hierarchy.joints.iter())
+            written_joints: (hierarchy.joints.iter())
                 .map(|joint| joint.written.clone())
                 .collect(),
             ..Motion::default()
         };
-        let mut end_sites = clip.bvh.iter().flat_map(|joint| &joint.end_sites);
+        let mut end_sites = clip
+            .written_joints
+            .iter()
+            .flat_map(|joint| &joint.end_sites);
         if clip.has_unplaced_joints() && end_sites.all(|&site| site == Vec3::ZERO) {
             clip.no_world = Some(NO_OFFSETS.to_owned());
         }

@@ -7,12 +7,13 @@ use std::io::{self, Write};
 use glam::{DVec3, Vec3};
 use tumble::{Channel, EulerSequence, FrameRate};
 
-use crate::bvh::{BvhChannel, angles};
+use crate::bvh::angles;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError, no_offsets};
 use crate::motion::SampledClip;
+use crate::motion::WrittenChannel;
+use crate::motion::origin::coordinate;
 use crate::names::line_name;
-use crate::origin::coordinate;
 use crate::rate::{RateSource, of};
 use crate::warnings::Warnings;
 
@@ -29,7 +30,7 @@ struct WrittenJoint {
     /// The vector to add to its offset and positions.
     origin: DVec3,
     /// The numbers of a row, in their order.
-    channels: Vec<BvhChannel>,
+    channels: Vec<WrittenChannel>,
     /// The axes of its angles, three different ones. Angles about axes without a channel are 0.
     axes: [usize; 3],
     end_sites: Vec<Vec3>,
@@ -83,11 +84,11 @@ pub(super) fn write_motion(
             *before = angles::nearest(rotation.as_dquat().normalize(), node.axes, *before);
             for channel in &node.channels {
                 match channel {
-                    BvhChannel::Position(axis) => {
+                    WrittenChannel::Position(axis) => {
                         text.push_str(&position[*axis]);
                         text.push(' ');
                     }
-                    BvhChannel::Rotation(axis) => {
+                    WrittenChannel::Rotation(axis) => {
                         let mut angles = node.axes.iter().zip(&*before);
                         let angle = angles.find(|(known, _)| *known == axis);
                         let angle = angle.map_or(0.0, |(_, angle)| *angle);
@@ -212,13 +213,13 @@ fn node(
     sequence: Option<[usize; 3]>,
 ) -> WrittenJoint {
     let clip = sampled.clip;
-    let written = clip.bvh.get(track).filter(|_| !clip.is_world);
+    let written = clip.written_joints.get(track).filter(|_| !clip.is_world);
     let samples = 0..sampled.times.len();
     let first = sampled.translation(0, track);
     let rest = clip.rest(Channel::Translation, track);
     let mut channels = written.map_or_else(Vec::new, |joint| joint.channels.clone());
-    let has_positions = |channels: &[BvhChannel]| {
-        let is_position = |channel: &BvhChannel| matches!(channel, BvhChannel::Position(_));
+    let has_positions = |channels: &[WrittenChannel]| {
+        let is_position = |channel: &WrittenChannel| matches!(channel, WrittenChannel::Position(_));
         channels.iter().any(is_position)
     };
     let moves = |axis: usize| {
@@ -231,7 +232,7 @@ fn node(
     let offset = if has_rest { rest } else { first };
     // Coordinates that the file's channels leave to the OFFSET, and that are others now.
     let is_missing = |axis: &usize| {
-        !channels.contains(&BvhChannel::Position(*axis))
+        !channels.contains(&WrittenChannel::Position(*axis))
             && (is_root || moves(*axis) || first[*axis] != offset[*axis])
     };
     let missing: Vec<usize> = match is_moved && !has_positions(&channels) {
@@ -240,11 +241,11 @@ fn node(
     };
     let last = channels
         .iter()
-        .rposition(|channel| matches!(channel, BvhChannel::Position(_)));
+        .rposition(|channel| matches!(channel, WrittenChannel::Position(_)));
     let index = last.map_or(0, |last| last + 1);
-    let missing = missing.into_iter().map(BvhChannel::Position);
+    let missing = missing.into_iter().map(WrittenChannel::Position);
     channels.splice(index..index, missing);
-    let file_axes = BvhChannel::rotations(&channels);
+    let file_axes = WrittenChannel::rotations(&channels);
     let mut axes = sequence.unwrap_or([2, 0, 1]);
     if sequence.is_none() && !file_axes.is_empty() {
         // The file's axes, then those that it leaves out.
@@ -257,13 +258,13 @@ fn node(
     let is_partial = written.is_some() && file_axes.len() < 3;
     if sequence.is_some() || !is_partial || uses_other_axes(sampled, track, axes, &file_axes) {
         // All three, where the file's first rotation is.
-        let is_rotation = |channel: &BvhChannel| matches!(channel, BvhChannel::Rotation(_));
+        let is_rotation = |channel: &WrittenChannel| matches!(channel, WrittenChannel::Rotation(_));
         let first_rotation = channels.iter().position(is_rotation);
         let is_sorted = file_axes == axes;
         if !is_sorted {
             let index = first_rotation.unwrap_or(channels.len());
             channels.retain(|channel| !is_rotation(channel));
-            channels.splice(index..index, axes.map(BvhChannel::Rotation));
+            channels.splice(index..index, axes.map(WrittenChannel::Rotation));
         }
     }
     let end_sites = match written {

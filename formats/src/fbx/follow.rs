@@ -7,7 +7,7 @@
 use glam::DVec4;
 use tumble::FrameRate;
 
-use crate::keys::{just_after, just_before};
+use crate::motion::keys::{just_after, just_before};
 use crate::rate::frame_time;
 
 /// The largest distance between a curve and the keys that follow it: in radians for rotations, otherwise relative to

@@ -34,9 +34,9 @@ use crate::fbx::layers::{LayerFault, StackLayers, is_solo, is_spheric, without_s
 use crate::fbx::times::{ChannelTimes, NodeTimes, Takes, TimeDisorder, was_rounded};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
+use crate::motion::origin::relative;
 use crate::motion::{self, ChannelInterpolation, Channels, Joint, Motion};
 use crate::names::unique_name;
-use crate::origin::relative;
 use crate::quaternion::unit;
 use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of, on_frames};
 use crate::source::Source;

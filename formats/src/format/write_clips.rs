@@ -8,10 +8,10 @@ use tumble::Channel;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Document, Format, FormatOption, MotionOptions, TimeUnit, WriteError};
+use crate::motion::signs::{continue_signs, signs_jump};
 use crate::motion::{ChannelInterpolation, Motion, SampledClip, circle};
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 use crate::printable::printable;
-use crate::signs::{continue_signs, signs_jump};
 
 /// Scales this close to 1 count as 1, because of rounding.
 const UNSCALED: f32 = 1e-5;
@@ -231,7 +231,7 @@ fn loss(
             "that smooth curves join the keys (lines and arcs join them there; more frames are nearer to the curves)",
         ),
         Feature::Bvh => (
-            !clip.bvh.is_empty() && !clip.is_world,
+            !clip.written_joints.is_empty() && !clip.is_world,
             "the order of the channels and the End Sites",
         ),
         Feature::Nanoseconds => {

@@ -95,7 +95,9 @@ pub(super) fn read(
         .collect();
     let mut origins = Vec::new();
     for &node in &tracks.nodes {
-        motion.bvh.extend(nodes.bvh(node).cloned());
+        motion
+            .written_joints
+            .extend(nodes.written_joint(node).cloned());
         let rest = rest(node, reader, nodes, &mut motion)?;
         let keyed = |path| {
             let found = targets.get(&(node, path)).copied();

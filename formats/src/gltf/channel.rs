@@ -6,8 +6,8 @@ use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Accessor, Sampler, TargetPath};
-use crate::keys::{Duplicates, Origin, select};
 use crate::motion;
+use crate::motion::keys::{Duplicates, Origin, select};
 use crate::quaternion::dot;
 use crate::warnings::Warnings;
 

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::value::RawValue;
 use tumble::{FrameRate, SampleTimes};
 
-use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::end_frame::{EndFrame, RateFrames, is_on_frame};
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
@@ -24,6 +22,8 @@ use crate::gltf::schema::{Animation, Channel};
 use crate::gltf::skins;
 use crate::gltf::uri;
 use crate::limits::Limits;
+use crate::motion::carried_mesh::CarriedMesh;
+use crate::motion::end_frame::{EndFrame, RateFrames, is_on_frame};
 use crate::motion::{Motion, SampledClip};
 use crate::rate::Precision;
 use crate::warnings::Warnings;

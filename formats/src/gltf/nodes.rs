@@ -6,14 +6,14 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use glam::{DQuat, DVec3, Vec3};
 use serde_json::value::RawValue;
 
-use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::json::Json;
 use crate::gltf::matrix::split;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Extras, Node, NodeBeside, OriginExtras, Skin};
-use crate::keys::{Duplicates, Origin};
 use crate::motion::Transform;
+use crate::motion::WrittenJoint;
+use crate::motion::keys::{Duplicates, Origin};
 
 /// Every node of a file.
 pub(super) struct Nodes {
@@ -25,8 +25,8 @@ pub(super) struct Nodes {
     skins: Vec<Vec<usize>>,
     /// The skins of each node that is a joint.
     skins_of: HashMap<usize, Vec<usize>>,
-    /// The BVH data of the joints that became nodes; empty if the file does not contain it.
-    bvh: Vec<BvhJoint>,
+    /// How a file of BVH wrote the joints that became nodes; empty if the file does not contain it.
+    written_joints: Vec<WrittenJoint>,
     /// For each node that is only an origin, the vector that it adds to the positions of its children.
     origins: Vec<Option<DVec3>>,
 }
@@ -60,7 +60,7 @@ impl Nodes {
         Ok(Self {
             skins,
             skins_of,
-            bvh: bvh(json),
+            written_joints: written_joints(json),
             origins: origins(json, &list),
             parents: parents(json, &list)?,
             names: names(&list),
@@ -118,9 +118,9 @@ impl Nodes {
         }
     }
 
-    /// The BVH data of the joint that became a node; `None` if the file does not contain it.
-    pub(super) fn bvh(&self, node: usize) -> Option<&BvhJoint> {
-        self.bvh.get(node)
+    /// How a file of BVH wrote the joint that became a node; `None` if the file does not contain it.
+    pub(super) fn written_joint(&self, node: usize) -> Option<&WrittenJoint> {
+        self.written_joints.get(node)
     }
 
     pub(super) fn has_matrix(&self, node: usize) -> bool {
@@ -141,8 +141,8 @@ impl Nodes {
     }
 }
 
-/// The BVH data of joints, if the extras of nodes contain it, as Tumble writes them.
-fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
+/// How a file of BVH wrote the joints, if the extras of nodes contain it, as Tumble writes them.
+fn written_joints(json: &Json<'_>) -> Vec<WrittenJoint> {
     if !json.text.contains("\"bvh\"") {
         return Vec::new();
     }
@@ -154,12 +154,12 @@ fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
             .map(|site| DVec3::from_array(site).as_vec3())
             .collect();
         let is_whole = sites.iter().all(|site| site.is_finite());
-        Some(BvhJoint {
-            channels: BvhJoint::channels_of(&extras.bvh.channels).filter(|_| is_whole)?,
+        Some(WrittenJoint {
+            channels: WrittenJoint::channels_of(&extras.bvh.channels).filter(|_| is_whole)?,
             end_sites: sites,
         })
     };
-    let all: Vec<Option<BvhJoint>> = json.entries("nodes").iter().map(joint).collect();
+    let all: Vec<Option<WrittenJoint>> = json.entries("nodes").iter().map(joint).collect();
     match all.iter().any(Option::is_some) {
         true => all.into_iter().map(Option::unwrap_or_default).collect(),
         false => Vec::new(),

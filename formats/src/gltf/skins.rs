@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 use glam::DMat4;
 
-use crate::carried_mesh::{Bone, CarriedMesh};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::gltf::meshes::{Triangles, add, local_matrix, parents_first, shown};
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Skin};
 use crate::motion::Motion;
+use crate::motion::carried_mesh::{Bone, CarriedMesh};
 
 /// Bytes of memory of a vertex with its bones and weights, while they are read.
 const VERTEX: usize = 160;

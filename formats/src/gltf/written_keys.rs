@@ -4,8 +4,8 @@ use glam::Quat;
 use tumble::Channel;
 
 use crate::gltf::schema::TargetPath;
+use crate::motion::signs::continue_signs;
 use crate::motion::{ChannelInterpolation, Motion};
-use crate::signs::continue_signs;
 
 /// The keys of a channel of a clip.
 pub(super) struct WrittenKeys {

@@ -3,9 +3,9 @@
 use glam::{Quat, Vec3};
 use tumble::{Channel, Engine, Error, FrameRate, SampleTimes, TrackError, TrackSet};
 
-use crate::end_frame::{EndFrame, FramesToEnd, RateFrames, sample_to_end};
+use crate::motion::end_frame::{EndFrame, FramesToEnd, RateFrames, sample_to_end};
+use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::{ChannelInterpolation, Channels, Motion};
-use crate::sample::{ChannelMethods, Samples};
 
 impl Motion {
     /// The key times of all channels, in increasing order, without repetitions.

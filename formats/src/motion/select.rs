@@ -27,9 +27,9 @@ impl Motion {
         let channels = tracks
             .iter()
             .filter_map(|&track| self.channels.get(track).copied());
-        let bvh = tracks
+        let written_joints = tracks
             .iter()
-            .filter_map(|&track| self.bvh.get(track).cloned());
+            .filter_map(|&track| self.written_joints.get(track).cloned());
         let origins = match self.origins.is_empty() {
             true => Vec::new(),
             false => tracks.iter().map(|&track| self.origin(track)).collect(),
@@ -39,7 +39,7 @@ impl Motion {
             origins,
             skeleton: skeleton.collect(),
             channels: channels.collect(),
-            bvh: bvh.collect(),
+            written_joints: written_joints.collect(),
             ..self.without_tracks()
         })
     }

@@ -13,11 +13,11 @@ use flate2::read::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
+use crate::array::{ArrayHeader, Element, LONGEST_START};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::npz::array::Array;
-use crate::npz::header::{ArrayHeader, Element, LONGEST_START};
 
 /// An open archive in memory.
 pub(crate) struct Archive {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use half::f16;
 use rayon::prelude::*;
 
-use crate::npz::header::{ArrayHeader, Element};
+use crate::array::{ArrayHeader, Element};
 
 /// An array whose bytes are complete.
 pub(crate) struct Array<'a> {

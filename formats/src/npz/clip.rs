@@ -5,21 +5,21 @@ use std::ops::Range;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{TrackError, TrackSet};
 
+use crate::array::Element;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::ReadOptions;
-use crate::keys::{Duplicates, Origin, quiet_unit, select};
+use crate::motion::keys::{Duplicates, Origin, quiet_unit, select};
+use crate::motion::origin::relative;
+use crate::motion::signs::continue_signs;
 use crate::motion::{Body, Joint, Motion, Transform};
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, TOGETHER};
 use crate::npz::body_model::shape_of;
-use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::rotation_vector;
-use crate::origin::relative;
 use crate::quaternion::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::quaternion::rounded;
 use crate::rotation_form::RotationForm;
-use crate::signs::continue_signs;
 use crate::warnings::Warnings;
 
 /// Bytes of memory of a key while it is read and in the set: its time, its rotation and its vectors.
@@ -63,7 +63,7 @@ pub(crate) fn read(
             false => None,
         },
         channels: plan.channels.clone(),
-        bvh: plan.bvh.clone(),
+        written_joints: plan.written_joints.clone(),
         ..Motion::default()
     };
     let set = &mut motion.set;

@@ -7,13 +7,13 @@ use std::path::Path;
 use glam::Vec3;
 use tumble::{FrameRate, Layout, SampleTimes};
 
+use crate::array::Element;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::end_frame::{EndFrame, RateFrames};
 use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
+use crate::motion::end_frame::{EndFrame, RateFrames};
 use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
-use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, rate_of_frames, times};
 use crate::npz::{FORMAT, linear, smpl, tumble_layout};

@@ -5,11 +5,11 @@
 
 use tumble::Layout;
 
+use crate::array::shape_text;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::map::{Entry, Map};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
-use crate::npz::header::shape_text;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, check_float};
 use crate::rotation_form::RotationForm;
 

@@ -10,7 +10,6 @@ pub(crate) mod array;
 mod body_model;
 mod clip;
 mod document;
-pub(crate) mod header;
 mod linear;
 mod mapped;
 mod plan;
@@ -23,6 +22,7 @@ pub mod write;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use crate::array::NumberArray;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
@@ -121,15 +121,6 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         document: Some(Arc::new(document)),
         ..Loaded::of(clip, warnings.into_list())
     })
-}
-
-/// The numbers of an NPY file, without their meaning.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NumberArray {
-    /// Length of each axis.
-    pub shape: Vec<usize>,
-    /// All numbers; the last axis is the fastest.
-    pub values: Vec<f64>,
 }
 
 /// Reads the numbers of an NPY file.

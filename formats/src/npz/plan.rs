@@ -9,12 +9,12 @@ use std::ops::Range;
 use glam::DVec3;
 use tumble::{FrameRate, Layout};
 
-use crate::bvh::joint::BvhJoint;
+use crate::array::shape_text;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::WrittenJoint;
 use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
-use crate::npz::header::shape_text;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
@@ -57,8 +57,8 @@ pub(crate) struct ArchivePlan {
     pub(crate) companions: &'static [&'static str],
     /// How the channels of each track are interpolated, or empty.
     pub(crate) channels: Vec<Channels>,
-    /// The BVH data of each track, or empty.
-    pub(crate) bvh: Vec<BvhJoint>,
+    /// How a file of BVH wrote each track, or empty.
+    pub(crate) written_joints: Vec<WrittenJoint>,
     /// Whether the layout is Tumble's, with the notes on how the samples were made.
     pub(crate) is_tumble_layout: bool,
 }

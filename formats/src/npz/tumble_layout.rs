@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3};
 use tumble::Layout;
 
-use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::WrittenJoint;
 use crate::motion::{ChannelInterpolation, Channels, Transform};
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, read_numbers};
@@ -134,11 +134,11 @@ fn read_bvh(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic>
         return Ok(());
     };
     for text in &texts {
-        let Some(channels) = BvhJoint::channels_of(text) else {
+        let Some(channels) = WrittenJoint::channels_of(text) else {
             let message = format!("`{BVH_CHANNELS}` has `{text}`, no channels of BVH");
             return Err(Diagnostic::new(&archive.file, Code::BvhChannel, message));
         };
-        plan.bvh.push(BvhJoint {
+        plan.written_joints.push(WrittenJoint {
             channels,
             end_sites: Vec::new(),
         });
@@ -152,7 +152,7 @@ fn read_bvh(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic>
     for &[track, x, y, z] in rows {
         let site = DVec3::new(x, y, z).as_vec3();
         let joint = (track >= 0.0 && track.fract() == 0.0).then_some(track as usize);
-        let joint = joint.and_then(|joint| plan.bvh.get_mut(joint));
+        let joint = joint.and_then(|joint| plan.written_joints.get_mut(joint));
         match joint.filter(|_| site.is_finite() && rest.is_empty()) {
             Some(joint) => joint.end_sites.push(site),
             None => {

@@ -9,11 +9,11 @@ use tumble::{FrameRate, Layout};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::bvh::BvhJoint;
+use crate::array::{ArrayHeader, Element};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
+use crate::motion::WrittenJoint;
 use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip};
-use crate::npz::header::{ArrayHeader, Element};
 use crate::npz::plan::KeyKind;
 use crate::npz::{rotation_vector, tumble_layout};
 use crate::quaternion::ComponentOrder;
@@ -251,7 +251,7 @@ pub fn write_npz(
     }
     skeleton(&mut members, clip, sampled.has_origins())?;
     samplers(&mut members, clip)?;
-    bvh(&mut members, &clip.bvh)?;
+    written_joints(&mut members, &clip.written_joints)?;
     if clip.is_world {
         let truth = (&Element::Unsigned(1), &[][..]);
         members.numbers("is_world.npy", truth, false, |put| put(1.0))?;
@@ -311,12 +311,12 @@ fn samplers(members: &mut ArchiveWriter, clip: &Motion) -> io::Result<()> {
     }
 }
 
-/// Writes the BVH data of joints.
-fn bvh(members: &mut ArchiveWriter, joints: &[BvhJoint]) -> io::Result<()> {
+/// Writes how a file of BVH wrote the joints.
+fn written_joints(members: &mut ArchiveWriter, joints: &[WrittenJoint]) -> io::Result<()> {
     if joints.is_empty() {
         return Ok(());
     }
-    let texts: Vec<String> = joints.iter().map(BvhJoint::channels_text).collect();
+    let texts: Vec<String> = joints.iter().map(WrittenJoint::channels_text).collect();
     let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
     let path = format!("{}.npy", tumble_layout::BVH_CHANNELS);
     members.texts(&path, &texts, &[texts.len()])?;

@@ -43,8 +43,8 @@ const MAX_NODES: u32 = 1_000_000;
 const MAX_ATTRIBUTES: usize = 256;
 
 /// The largest number of `=` between attributes in one tag, which no element has fewer attributes than.
-fn most_attributes(text: &str) -> usize {
-    let (mut most, mut rest) = (0, text.as_bytes());
+fn largest_attributes(text: &str) -> usize {
+    let (mut largest, mut rest) = (0, text.as_bytes());
     while let Some(start) = rest.iter().position(|&byte| byte == b'<') {
         rest = &rest[start + 1..];
         if let Some(comment) = rest.strip_prefix(b"!--") {
@@ -64,10 +64,10 @@ fn most_attributes(text: &str) -> usize {
             }
             length += 1;
         }
-        most = most.max(count);
+        largest = largest.max(count);
         rest = &rest[length..];
     }
-    most
+    largest
 }
 
 fn parse(file: &TextFile) -> Result<Document<'_>, Diagnostic> {
@@ -76,10 +76,10 @@ fn parse(file: &TextFile) -> Result<Document<'_>, Diagnostic> {
         nodes_limit: MAX_NODES,
         ..ParsingOptions::default()
     };
-    let most = most_attributes(&file.text);
-    if most > MAX_ATTRIBUTES {
+    let attributes = largest_attributes(&file.text);
+    if attributes > MAX_ATTRIBUTES {
         let message =
-            format!("has an element with {most} attributes; elements of robots have a few");
+            format!("has an element with {attributes} attributes; elements of robots have a few");
         return Err(Diagnostic::new(&file.name, Code::RobotXml, message));
     }
     Document::parse_with_options(&file.text, options).map_err(|error| {

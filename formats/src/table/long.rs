@@ -9,12 +9,12 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, Encoding, Layout, Timeline};
 
 use crate::format::{ResultShape, ResultWriter, WriteError};
-use crate::keyed::{at, track_times};
+use crate::motion::keyed::{at, track_times};
+use crate::motion::poses::{Poses, TRANSFORM, WORLD};
+use crate::motion::signs::continue_signs;
 use crate::motion::{Motion, SampledClip};
 use crate::names::distinct_names;
-use crate::poses::{Poses, TRANSFORM, WORLD};
 use crate::quaternion::ComponentOrder;
-use crate::signs::continue_signs;
 use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, TimeColumn, invalid, names};
 use crate::table::skeleton;
 

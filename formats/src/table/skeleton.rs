@@ -130,7 +130,7 @@ mod tests {
             joint(None, Vec3::Y),
             joint(Some(0), Vec3::new(0.1, -0.4, 0.0)),
         ];
-        let samples = crate::keyed::keyed(&written).unwrap();
+        let samples = crate::motion::keyed::keyed(&written).unwrap();
         let (key, text) = note_of(&samples.of(&written, None, &[])).unwrap();
         let notes = [(key.to_owned(), text)];
         let mut read = clip(["knee", "hip"]);

@@ -3,6 +3,8 @@
 
 pub(crate) mod clip;
 pub(crate) mod from_keys;
+mod machine;
+mod poses;
 pub(crate) mod sparse_samples;
 
 use rayon::prelude::*;
@@ -10,13 +12,14 @@ use rayon::prelude::*;
 use crate::cpu::row::Row;
 use crate::cpu::scratch::ScratchPool;
 use crate::cpu::streaming::{EncodedStage, RowOutput, RowStage, Stage};
+use crate::machine::Machine as _;
 use crate::output::encoded::EncodedOutput;
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::{Batch, BatchSize, PART_INTERVALS, SetRequest, batches};
 use crate::shader::Form;
 use crate::simd::dispatch::VectorWidth;
-use crate::threads::{self, OutOfThreadsError, Threads, stop};
+use crate::threads::{OutOfThreadsError, Threads, stop};
 use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::Timeline;
@@ -31,7 +34,7 @@ pub(crate) struct CpuEngine {
     /// Whether results are written by streaming stores; `None` if that depends on the result.
     pub(crate) streaming_stores: Option<bool>,
     /// The engine's threads; `None`: the process's threads.
-    private_threads: Option<Threads>,
+    pub(crate) private_threads: Option<Threads>,
     pub(crate) scratch_pool: ScratchPool,
     /// The limit of the segments of a clip, bytes, if there is one.
     pub(crate) memory: Option<usize>,
@@ -73,15 +76,7 @@ impl CpuEngine {
         &self,
         work: impl FnOnce() -> R + Send,
     ) -> Result<R, OutOfThreadsError> {
-        match &self.private_threads {
-            Some(threads) => threads.run(work),
-            None => threads::on_threads(work),
-        }
-    }
-
-    /// How many threads share work.
-    pub(crate) fn thread_count(&self) -> usize {
-        (self.private_threads.as_ref()).map_or_else(threads::count, Threads::count)
+        self.threads().run(work)
     }
 
     /// Evaluates the samples of a track copy that lie in one part of the track.
@@ -124,7 +119,7 @@ impl CpuEngine {
     ) -> Result<(), SetError> {
         let (set, tracks, timeline) = (request.set, &request.tracks, request.timeline);
         let (samples, rotations) = (request.samples.len(), output.len());
-        let threads = self.thread_count();
+        let threads = self.threads().count();
         // The more tracks a batch has, the better they fill the blocks that are prepared in lanes;
         // but about eight batches are left for each thread, so that all are busy to the end.
         let shared = tracks.len() / (8 * threads);

@@ -8,9 +8,10 @@ use ash::vk;
 
 use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
-use crate::gpu::crowd::CrowdTarget;
+use crate::gpu::crowd::{CrowdTarget, DeviceCrowd, VulkanCrowd};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::recorded::Commands;
+use crate::machine::crowd::MachineCrowd;
 use crate::output::crowd::CrowdOutput;
 use crate::output::pose_error::OFFSET_STEP;
 
@@ -38,7 +39,7 @@ impl Crowd {
     ) -> Result<CrowdTarget, CrowdError> {
         let output = output.into();
         // No application has a buffer on a device that the engine opened.
-        let device = self.device.as_ref();
+        let device = vulkan_crowd(self.device.as_deref());
         let device = device.filter(|device| !device.engine.device.owned);
         let device = device.ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
@@ -82,7 +83,7 @@ impl Crowd {
         target: &CrowdTarget,
         commands: vk::CommandBuffer,
     ) -> Result<(), CrowdError> {
-        let device = self.device.as_ref();
+        let device = vulkan_crowd(self.device.as_deref());
         let Some(device) = device.filter(|device| Arc::ptr_eq(device, &target.crowd)) else {
             return Err(CrowdError::OtherDevice);
         };
@@ -108,4 +109,9 @@ impl Crowd {
     pub fn forget_recorded(&mut self) {
         self.instances.forget();
     }
+}
+
+/// The crowd, if it is on a Vulkan device.
+pub(super) fn vulkan_crowd(crowd: Option<&dyn MachineCrowd>) -> Option<&Arc<DeviceCrowd>> {
+    VulkanCrowd::of(crowd?).map(|crowd| &crowd.device)
 }

@@ -4,9 +4,10 @@ use glam::{Affine3A, Quat};
 
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd::player::Crowd;
+use crate::crowd::player::application_device::vulkan_crowd;
 use crate::device::Device;
 use crate::engine::Engine;
-use crate::gpu::options::{EngineOptions, Mapping};
+use crate::machine::options::{EngineOptions, Mapping};
 use crate::method::slerp::SLERP;
 use crate::method::vector_method::VectorMethod;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
@@ -42,7 +43,7 @@ fn crowd(mapping: Mapping, joints: usize, layers: usize, has_many_bases: bool) -
 
 /// The kernels of an output, by their names.
 fn kernels(crowd: &Crowd, output: CrowdOutput) -> Vec<&'static str> {
-    let device = crowd.device.as_ref().expect("a Vulkan device");
+    let device = vulkan_crowd(crowd.device.as_deref()).expect("a Vulkan device");
     let kernels = device.kernels(output).kernels.into_iter();
     kernels.map(|kernel: Kernel| kernel.code(false).0).collect()
 }

@@ -7,8 +7,6 @@ mod kernels_of_a_frame;
 mod visible;
 mod weights;
 
-use std::sync::Arc;
-
 use bytemuck::Pod;
 
 use crate::crowd::instances::Instances;
@@ -17,15 +15,13 @@ use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, CrowdScene};
 use crate::crowd_error::{CrowdError, MAX_INSTANCES, MAX_LAYERS};
 use crate::engine::Engine;
-use crate::evaluate::Backend;
-use crate::gpu::crowd::{CrowdReader, CrowdTables, DeviceCrowd};
+use crate::machine::crowd::{CrowdSource, MachineCrowd};
 use crate::memory::{reserved, zeroed};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
+use crate::shader::{CrowdDispatch, CrowdEntry};
 use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
-use crate::work::crowd::CrowdShape;
 
 /// The clock's limit, ticks: below it, f64 represents all whole numbers.
 const FARTHEST: f64 = (1u64 << 52) as f64;
@@ -44,11 +40,10 @@ pub struct Crowd {
     pub(crate) instances: Instances,
     /// The push constants that all dispatches share.
     arguments: CrowdDispatch,
-    pub(crate) device: Option<Arc<DeviceCrowd>>,
+    /// The crowd on the engine's machine; `None` where the host evaluates it.
+    pub(crate) device: Option<Box<dyn MachineCrowd>>,
     /// The submission whose result was not taken yet.
     submitted: Option<Submitted>,
-    /// The objects for evaluations on the device whose result is read back, for the last requested output.
-    reader: Option<CrowdReader>,
     /// Memory for the CPU: the entries of the visible instances, if these are not all instances.
     gathered: Vec<CrowdEntry>,
     /// A bit for each instance.
@@ -103,7 +98,6 @@ impl Engine {
             arguments: library.arguments(layers),
             device: None,
             submitted: None,
-            reader: None,
             gathered: Vec::new(),
             seen: Vec::new(),
             cells,
@@ -114,35 +108,22 @@ impl Engine {
 }
 
 impl Crowd {
-    /// The tables on the engine's device; `None` on the CPU.
-    fn uploaded(&self) -> Result<Option<Arc<DeviceCrowd>>, CrowdError> {
-        let Backend::Vulkan(opened) = &*self.engine.backend else {
-            return Ok(None);
-        };
-        let (engine, library) = (opened.engine(), &self.library);
-        let clip_tables = &library.tables;
-        // Behind the links, where each level begins and ends.
-        let mut links = library.links.clone();
-        links.extend(library.levels.windows(2).map(|level| CrowdLink {
-            joint: level[0],
-            parent: level[1],
-        }));
-        let tables = CrowdTables {
+    /// The tables on the engine's machine; `None` where the host evaluates.
+    fn uploaded(&self) -> Result<Option<Box<dyn MachineCrowd>>, CrowdError> {
+        let (library, tables) = (&self.library, &self.library.tables);
+        Ok(self.engine.machine.crowd(&CrowdSource {
             instances: self.instance_count() as u32,
-            shape: CrowdShape {
-                levels: library.levels.clone(),
-                only_arcs: clip_tables.has_only_arcs(),
-                arguments: self.arguments,
-            },
-            clips: engine.crowd_table("tumble crowd clips", &clip_tables.clips)?,
-            bases: engine.crowd_table("tumble crowd time bases", &clip_tables.bases)?,
-            spans: engine.crowd_table("tumble crowd spans", &clip_tables.spans)?,
-            channels: engine.crowd_table("tumble crowd channels", &clip_tables.channels)?,
-            cells: engine.crowd_table("tumble crowd cells", &self.cells)?,
-            links: engine.crowd_table("tumble crowd links", &links)?,
-            bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
-        };
-        Ok(Some(Arc::new(DeviceCrowd::new(engine, tables)?)))
+            clips: &tables.clips,
+            bases: &tables.bases,
+            spans: &tables.spans,
+            channels: &tables.channels,
+            cells: &self.cells,
+            links: &library.links,
+            levels: &library.levels,
+            bind: &library.bind,
+            only_arcs: tables.has_only_arcs(),
+            arguments: self.arguments,
+        })?)
     }
 
     /// Number of instances.
@@ -300,19 +281,12 @@ impl Crowd {
         self.check_idle(output)?;
         let len = self.output_len(output);
         let mut values = None;
-        match &self.device {
+        match &mut self.device {
             Some(device) if len > 0 => {
-                let (instances, all) = (self.visible_count() as u32, self.instance_count() as u32);
-                let kept = self.reader.take();
-                let kept = kept.filter(|reader| reader.fits(output, instances));
-                let room = instances.next_power_of_two().min(all);
-                let reader = kept.map_or_else(|| CrowdReader::new(device, output, room), Ok)?;
-                let reader = self.reader.insert(reader);
                 let layers = self.arguments.layers as usize;
-                if let Err(error) = reader.submit(&self.instances.take_frame(layers)) {
+                if let Err(error) = device.submit(output, &self.instances.take_frame(layers)) {
                     // What was recorded may never have reached the device.
                     self.instances.forget();
-                    self.reader = None;
                     return Err(error.into());
                 }
             }
@@ -346,9 +320,9 @@ impl Crowd {
     /// # Errors
     /// When nothing was submitted, or the device fails.
     pub fn poll(&self) -> Result<bool, CrowdError> {
-        match (&self.submitted, &self.reader) {
+        match (&self.submitted, &self.device) {
             (None, _) => Err(CrowdError::NothingSubmitted),
-            (Some(Submitted { values: None, .. }), Some(reader)) => Ok(reader.results.is_done()?),
+            (Some(Submitted { values: None, .. }), Some(device)) => Ok(device.is_done()?),
             _ => Ok(true),
         }
     }
@@ -391,15 +365,17 @@ impl Crowd {
             }
             return Ok(());
         }
-        let Some(reader) = &mut self.reader else {
+        let Some(device) = &mut self.device else {
             return Err(CrowdError::NothingSubmitted);
         };
-        let read = reader.wait_into(bytemuck::cast_slice_mut(output));
-        if read.is_err() {
-            self.instances.forget();
-            self.reader = None;
+        match device.wait_into(bytemuck::cast_slice_mut(output)) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(CrowdError::NothingSubmitted),
+            Err(error) => {
+                self.instances.forget();
+                Err(error.into())
+            }
         }
-        Ok(read?)
     }
 
     pub(crate) fn check(&self, output: CrowdOutput) -> Result<(), CrowdError> {
@@ -448,10 +424,7 @@ impl Crowd {
                 references: arguments.references,
             },
         };
-        match &*self.engine.backend {
-            Backend::Cpu(engine) => Ok(on_cpu::evaluate(scene, engine, output)?),
-            Backend::Vulkan(_) => Ok(()), // its crowds are on the device
-        }
+        Ok(on_cpu::evaluate(scene, &*self.engine.machine, output)?)
     }
 
     /// The clock's time, ticks.

@@ -1,6 +1,8 @@
-//! A clip: a set prepared for one method, stored on a device, for evaluation at any times.
+//! A clip: a set prepared for its interpolation, or one for each track, stored on a device, for evaluation at any times.
 
 pub(crate) mod request;
+
+use std::sync::Arc;
 
 use glam::Quat;
 
@@ -8,6 +10,7 @@ use crate::checks::{check_encoding, check_window};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::engine::clip::request::Request;
+use crate::engine::groups::GroupedTracks;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
 use crate::output::encoded::EncodedOutput;
@@ -18,16 +21,40 @@ use crate::stream::{Chunk, run};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::{SampleTimes, Timeline};
 
-/// A set that is prepared for one method and stored on its engine's device. It may be evaluated any number of times,
-/// at any sample times.
+/// A set that is prepared for its method, or for the method of each track, and stored on its engine's device. It may be
+/// evaluated any number of times, at any sample times.
 pub struct Clip {
     engine: Engine,
-    pub(crate) uploaded: Uploaded,
+    pub(crate) tracks: ClipTracks,
+}
+
+/// The tracks of a clip.
+pub(crate) enum ClipTracks {
+    /// Tracks with the same interpolation.
+    Alike(Box<Uploaded>),
+    Grouped(Arc<GroupedTracks>),
 }
 
 impl Clip {
     pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
-        Self { engine, uploaded }
+        let tracks = ClipTracks::Alike(Box::new(uploaded));
+        Self { engine, tracks }
+    }
+
+    pub(crate) fn of_groups(engine: Engine, grouped: GroupedTracks) -> Self {
+        let tracks = ClipTracks::Grouped(Arc::new(grouped));
+        Self { engine, tracks }
+    }
+
+    /// The tracks as one set of segments, as results need that stay on a device.
+    ///
+    /// # Errors
+    /// When the tracks have several interpolations.
+    pub(crate) fn uploaded(&self) -> Result<&Uploaded, Error> {
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => Ok(uploaded),
+            ClipTracks::Grouped(_) => Err(Error::SeveralInterpolations),
+        }
     }
 
     /// The engine to which the clip was uploaded.
@@ -37,7 +64,10 @@ impl Clip {
 
     /// Number of tracks.
     pub fn track_count(&self) -> usize {
-        self.uploaded.data.track_count()
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data().track_count(),
+            ClipTracks::Grouped(grouped) => grouped.track_count,
+        }
     }
 
     /// The sample times of `frames` for this clip.
@@ -45,7 +75,11 @@ impl Clip {
     /// # Errors
     /// When the frames do not fit the clip.
     pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
-        frames.resolve(self.track_count(), self.uploaded.data.time_span)
+        let span = match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data().time_span,
+            ClipTracks::Grouped(grouped) => grouped.time_span,
+        };
+        frames.resolve(self.track_count(), span)
     }
 
     /// Evaluates the rotation of every track at every sample, `[track][frame]`. Short for
@@ -68,17 +102,21 @@ impl Clip {
     }
 
     pub(crate) fn quantity(&self) -> Quantity {
-        self.uploaded.data.interpolation.quantity
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.data().interpolation.quantity,
+            ClipTracks::Grouped(grouped) => grouped.quantity,
+        }
     }
 
-    /// The values of any quantity.
+    /// The values of any quantity, of tracks with the same interpolation.
     pub(crate) fn samples<T>(
         &self,
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let timeline = self.uploaded.data.folded(timeline)?;
-        let storage = (self.uploaded).evaluate(&timeline, layout)?;
+        let uploaded = self.uploaded()?;
+        let timeline = uploaded.data().folded(timeline)?;
+        let storage = uploaded.prepared()?.evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -101,7 +139,8 @@ impl Clip {
             .evaluate_values_into(output)
     }
 
-    /// Evaluates a window of the result into `output`, in an encoding; refuses windows and outputs that do not fit.
+    /// Evaluates a window of the result into `output`, in an encoding, of tracks with the same interpolation; refuses
+    /// windows and outputs that do not fit.
     pub(crate) fn fill_window(
         &self,
         timeline: &Timeline,
@@ -115,8 +154,11 @@ impl Clip {
         if output.len() == 0 {
             return Ok(());
         }
-        let timeline = self.uploaded.data.folded(timeline)?;
-        Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
+        let uploaded = self.uploaded()?;
+        let timeline = uploaded.data().folded(timeline)?;
+        Ok(uploaded
+            .prepared()?
+            .evaluate_into(&timeline, window, output)?)
     }
 
     /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
@@ -125,7 +167,7 @@ impl Clip {
         Request::of_clip(self, frames)
     }
 
-    /// Evaluates a window of the result in chunks of about `chunk` values.
+    /// Evaluates a window of the result in chunks of about `chunk` values, of tracks with the same interpolation.
     pub(crate) fn stream_window<E: From<Error>>(
         &self,
         timeline: &Timeline,
@@ -133,10 +175,12 @@ impl Clip {
         chunk: usize,
         sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let timeline = self.uploaded.data.folded(timeline).map_err(Error::from)?;
+        let uploaded = self.uploaded()?;
+        let timeline = uploaded.data().folded(timeline).map_err(Error::from)?;
+        let prepared = uploaded.prepared().map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             let output = EncodedOutput::of_values(bytemuck::cast_slice_mut(output));
-            Ok((self.uploaded).evaluate_into(&timeline, window, output)?)
+            Ok(prepared.evaluate_into(&timeline, window, output)?)
         };
         run(window.cut(chunk), self.quantity(), fill, sink)
     }
@@ -144,9 +188,17 @@ impl Clip {
 
 impl std::fmt::Debug for Clip {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Clip")
-            .field("engine", &self.engine)
-            .field("method", &self.uploaded.data.interpolation.method)
+        let mut fields = f.debug_struct("Clip");
+        fields.field("engine", &self.engine);
+        match &self.tracks {
+            ClipTracks::Alike(uploaded) => {
+                fields.field("method", &uploaded.data().interpolation.method)
+            }
+            ClipTracks::Grouped(grouped) => {
+                fields.field("methods", &grouped.methods().collect::<Vec<_>>())
+            }
+        };
+        fields
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
     }

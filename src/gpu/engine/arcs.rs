@@ -4,12 +4,12 @@
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
-use crate::gpu::options::PrepareArcs;
 use crate::gpu::physical::upload_memory::KernelReads;
-use crate::gpu::reports::DeviceKind;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
+use crate::machine::error::VulkanError;
+use crate::machine::options::PrepareArcs;
+use crate::machine::reports::DeviceKind;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{ArcsDispatch, Kernel};
 use crate::work::recording::{Slice, workgroups};
@@ -95,14 +95,14 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::evaluate::Backend;
-    use crate::gpu::options::{EngineOptions, Reads, Transfer, Uploads};
+    use crate::machine::options::{EngineOptions, Reads, Transfer, Uploads};
     use crate::math::quaternion::dot;
     use crate::method::SLERP;
     use crate::prepare::clip_data::PrepareRequest;
     use crate::prepare::prepared::Prepared;
     use crate::shader::ArcSegment;
     use crate::tracks::set::TrackSet;
+    use crate::work::lists::may_be_tiny;
     use crate::{Device, Engine};
 
     /// Every device of this machine, with arcs prepared on it.
@@ -125,10 +125,7 @@ mod tests {
     }
 
     fn vulkan(engine: &Engine) -> Arc<VulkanEngine> {
-        match &*engine.backend {
-            Backend::Vulkan(opened) => opened.engine(),
-            Backend::Cpu(_) => panic!("a Vulkan device"),
-        }
+        engine.opened().expect("a Vulkan device").engine()
     }
 
     /// The first bytes of a buffer of the device.
@@ -285,7 +282,7 @@ mod tests {
         for (computed, listed) in computed.groups.iter().zip(&listed.groups) {
             assert_eq!(computed.segments.len(), listed.segments.len());
             for index in 0..computed.segments.len() as u32 {
-                let [needs, asks] = [computed, listed].map(|group| group.may_be_tiny(index));
+                let [needs, asks] = [computed, listed].map(|group| may_be_tiny(group, index));
                 counts[usize::from(needs) * 2 + usize::from(asks)] += 1;
             }
         }

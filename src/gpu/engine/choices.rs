@@ -4,14 +4,14 @@ use std::time::{Duration, Instant};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::machine::error::VulkanError;
 
 /// The engine's choices for a device, where options are `Automatic`.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct EngineChoices {
-    /// `samples` or `runs`: the work of neighbouring invocations ([`Mapping`](crate::gpu::options::Mapping)).
+    /// `samples` or `runs`: the work of neighbouring invocations ([`Mapping`](crate::machine::options::Mapping)).
     pub mapping: &'static str,
     /// `texel-buffers` or `storage-buffers`: how kernels read.
     pub reads: &'static str,

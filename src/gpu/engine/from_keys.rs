@@ -8,17 +8,17 @@ use std::sync::atomic::Ordering;
 use glam::Quat;
 
 use crate::from_keys::KeyCurve;
-use crate::from_keys::dispatches::{KeyDispatch, KeyJob};
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::EvaluateError;
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::in_flight::{Finish, InFlight, Target};
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::Binding;
 use crate::gpu::upload::Upload;
+use crate::machine::error::EvaluateError;
 use crate::output::encoding::Encoding;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
+use crate::work::lists::keys::{KeyDispatch, KeyJob};
 use crate::work::recording::Slice;
 
 /// The data that the host writes for one dispatch.

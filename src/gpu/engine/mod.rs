@@ -4,6 +4,7 @@ mod arcs;
 #[cfg(feature = "prove")]
 pub(crate) mod choices;
 pub(crate) mod from_keys;
+mod poses;
 pub(crate) mod run;
 #[cfg(feature = "prove")]
 pub(crate) mod write_rates;
@@ -13,40 +14,40 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
-use bytemuck::NoUninit;
 use glam::Quat;
 
+use crate::cpu::engine::CpuEngine;
 use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::clip::{ClipBuffers, Job};
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::device_queue::DeviceQueue;
 use crate::gpu::engine::from_keys::KeyUploads;
-use crate::gpu::error::{EvaluateError, Named as _, VulkanError};
 use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
-use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kept_lists::WorkLists;
 use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
-use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::pipeline_cache::PipelineCache;
-use crate::gpu::run_once::run_once;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::writable;
+use crate::machine::error::calls::Named as _;
+use crate::machine::error::{EvaluateError, VulkanError};
+use crate::machine::options::{EngineOptions, Timings, Transfer};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::spirv::FloatControls;
-use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
+use crate::shader::{Item, KERNELS, Kernel, KernelCode, List};
+use crate::simd::dispatch::VectorWidth;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
 use crate::work::lists::ListRequest;
-use crate::work::recording::workgroups;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
 /// require fewer.
@@ -85,6 +86,8 @@ pub(crate) struct VulkanEngine {
     /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,
     free: FreeBuffers,
+    /// The CPU, for what the host computes.
+    pub(super) host: CpuEngine,
     pub(crate) timings: Mutex<Timings>,
 }
 
@@ -122,6 +125,7 @@ impl VulkanEngine {
             clip_bytes: half.map(bytes),
             allow_inexact: options.allow_inexact,
             free: Arc::default(),
+            host: CpuEngine::on_shared_threads(VectorWidth::widest()),
             timings: Mutex::default(),
             device,
         }
@@ -482,36 +486,6 @@ impl VulkanEngine {
         }
         drop(free);
         Buffer::new(&self.device, "tumble rotations", bytes, residence)
-    }
-
-    /// Runs the kernel of a pass over poses with these inputs, each of at most as many values of 16 bytes as a window
-    /// has rotations. The kernel has `count` invocations and the parameter `detail`.
-    pub(crate) fn pass(
-        &self,
-        kernel: Kernel,
-        inputs: &[&[u8]],
-        [count, detail]: [usize; 2],
-        output: &mut [[f32; 4]],
-    ) -> Result<(), VulkanError> {
-        let output = bytemuck::cast_slice_mut(output);
-        for bytes in inputs.iter().copied().chain([&*output]) {
-            self.check_size("poses", bytes)?;
-        }
-        let [count, detail] = [count as u32, detail as u32];
-        let (pipeline, groups) = (self.pipeline(kernel)?, workgroups(count));
-        let pass = PoseDispatch { count, detail };
-        run_once(&pipeline, inputs, bytemuck::bytes_of(&pass), groups, output)
-    }
-
-    /// Copies a table of a crowd's library to the device.
-    pub(crate) fn crowd_table<T: NoUninit>(
-        &self,
-        name: &str,
-        table: &[T],
-    ) -> Result<Buffer, VulkanError> {
-        let bytes: &[u8] = bytemuck::cast_slice(table);
-        self.check_size("a crowd's library", bytes)?;
-        self.resident(name, bytes, &mut Vec::new())
     }
 }
 

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use crate::gpu::clip::Job;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
-use crate::gpu::job::Job;
 use crate::gpu::kept_lists::{KeptLists, WorkLists};
 use crate::gpu::recorded::Binding;
 use crate::gpu::submission::Submission;
+use crate::machine::error::{EvaluateError, VulkanError};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
@@ -91,9 +91,13 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         let max_values = || self.window_of(job.encoding);
         // Each is cut again before it starts: windows may have been halved since.
-        let windows = window
-            .cut(max_values())
-            .flat_map(|window| window.within(max_values()));
+        let windows = window.cut(max_values()).flat_map(|window| {
+            let first = window.start;
+            window.cut(max_values()).map(move |part| Window {
+                start: first + part.start,
+                ..part
+            })
+        });
         self.run_pipelined(
             &self.in_flight,
             &mut target,

@@ -7,9 +7,9 @@ use bytemuck::{NoUninit, Zeroable as _};
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::error::VulkanError;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::submission::Submission;
+use crate::machine::error::VulkanError;
 use crate::shader::{
     BLOCK_SAMPLES, Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SAMPLES_EACH,
 };

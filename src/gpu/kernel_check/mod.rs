@@ -13,10 +13,10 @@ mod whole_instances;
 use bytemuck::NoUninit;
 use random::Random;
 
-use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
-pub(crate) use crate::gpu::reports::KernelCheck;
 use crate::gpu::run_once::run_on;
+use crate::machine::error::VulkanError;
+pub(crate) use crate::machine::reports::KernelCheck;
 use crate::shader::Kernel;
 use crate::twin::machine::{Memory, UNTOUCHED};
 

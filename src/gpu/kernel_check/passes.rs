@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::sync::{Arc, Mutex};
 
-use crate::gpu::cache::Cache;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::machine::cache::Cache;
 use crate::simd::dispatch::VectorWidth;
 use crate::threads::lock;
 

@@ -13,12 +13,14 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::{self, Instance};
-use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
 use crate::gpu::physical::queues::{Copies, check_family, compute_family, copies};
 use crate::gpu::physical::upload_memory::is_unified;
-pub(crate) use crate::gpu::reports::{DeviceInfo, DeviceKind};
+use crate::machine::ListedDevice;
+use crate::machine::error::VulkanError;
+use crate::machine::error::calls::Named;
+use crate::machine::options::{EngineOptions, Mapping, Reads, Transfer};
+pub(crate) use crate::machine::reports::{DeviceInfo, DeviceKind};
 use crate::shader::spirv::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.
@@ -65,6 +67,12 @@ pub(crate) struct PhysicalDevice {
     /// The alignment of imported memory, bytes; `None` if memory cannot be imported.
     pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
+}
+
+/// As [`list`], for engines.
+pub(crate) fn listed(validation: bool) -> Result<Vec<Arc<dyn ListedDevice>>, VulkanError> {
+    let devices = list(validation)?.into_iter();
+    Ok(devices.map(|device| Arc::new(device) as _).collect())
 }
 
 /// Lists every device with a compute queue and Vulkan 1.1, fastest kind first; devices of one kind in the loader's

@@ -2,8 +2,8 @@
 
 use ash::vk;
 
-use crate::gpu::error::VulkanError;
-use crate::gpu::options::ReadBack;
+use crate::machine::error::VulkanError;
+use crate::machine::options::ReadBack;
 
 /// A queue of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use crate::gpu::options::Uploads;
+use crate::machine::options::Uploads;
 
 const DIRECT: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
     vk::MemoryPropertyFlags::DEVICE_LOCAL.as_raw()

@@ -6,7 +6,6 @@ use glam::Quat;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::Backend;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::pass_target::{PassJob, PassShape, VALUE};
 use crate::gpu::recovery::Opened;
@@ -141,7 +140,7 @@ impl<'a> PassRequest<'a> {
 
     /// The device, the pass and its weights, if everything fits.
     fn checked(&self, result: VulkanBuffer) -> Result<(&'a Opened, PassJob<'a>, Vec<f32>), Error> {
-        let Backend::Vulkan(opened) = &*self.engine.backend else {
+        let Some(opened) = self.engine.opened() else {
             return Err(Error::BufferOnCpu);
         };
         if opened.engine().device.owned {

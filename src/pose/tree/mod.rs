@@ -5,7 +5,7 @@
 //! * [`Configuration`]: a value for each joint; [`ConfigurationRates`]: how fast they change.
 //! * [`Tree::poses`] and [`Tree::motions`] compute the bodies in f64, with the same bits on every processor.
 //!
-//! The formulas are those of MuJoCo's kinematics (`mj_kinematics`): a body's joints act in their order, each about
+//! The formulas are those of `MuJoCo`'s kinematics (`mj_kinematics`): a body's joints act in their order, each about
 //! its anchor.
 
 mod configuration;
@@ -259,11 +259,11 @@ fn check_names<'a>(
 ) -> Result<(), TreeError> {
     let mut names: Vec<&String> = names.collect();
     names.sort_unstable();
-    match names.array_windows().find(|[a, b]| a == b) {
+    match names.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
-        Some([name, _]) => Err(TreeError::RepeatedName {
+        Some(pair) => Err(TreeError::RepeatedName {
             kind,
-            name: (*name).clone(),
+            name: pair[0].clone(),
         }),
     }
 }

@@ -6,10 +6,10 @@ use crate::pose::tree::Tree;
 /// The order in which bodies are listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum BodyOrder {
-    /// A body is followed by its first child's whole branch, then by the next child's: MuJoCo, mjlab, ProtoMotions.
+    /// A body is followed by its first child's whole branch, then by the next child's: `MuJoCo`, mjlab, `ProtoMotions`.
     #[default]
     DepthFirst,
-    /// All bodies of a level come before those of the next: PhysX, Isaac Sim and IsaacLab.
+    /// All bodies of a level come before those of the next: `PhysX`, Isaac Sim and `IsaacLab`.
     BreadthFirst,
 }
 

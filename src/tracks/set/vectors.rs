@@ -184,7 +184,7 @@ impl TrackSet {
 }
 
 /// Refuses vectors and tangents that are not finite or too large.
-fn check_vectors(
+pub(crate) fn check_vectors(
     track: usize,
     quantity: &'static str,
     keys: &[Vec3],

@@ -1,6 +1,7 @@
 //! The work list of one window of the output: items, each of which is some consecutive samples of one segment.
 
 pub(crate) mod grid;
+pub(crate) mod keys;
 pub(crate) mod sample_list;
 
 use bytemuck::Zeroable as _;
@@ -11,7 +12,8 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::shader::{
-    Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, LINE, List, ListedSample, MAY_BE_TINY,
+    Block, Dispatch, END_NEGATED, Form, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, KEY_OF_INTERVAL,
+    LINE, List, ListedSample, MAY_BE_TINY, START_NEGATED,
 };
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -20,6 +22,7 @@ use crate::time::error::SampleTimesError;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
+use crate::twin::{COARSE, Evaluate as _};
 use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
 use crate::work::lists::sample_list::SampleList;
 use crate::work::recording::{Recording, Resource, Set, workgroups};
@@ -359,7 +362,8 @@ impl InLanes for PartsList<'_> {
         for part in self.parts {
             self.track = part.track as usize;
             let samples = self.window.samples.clone();
-            for copy in prepared.copies(part, timeline, samples) {
+            let span = part.extension.as_ref().map(|extension| extension.span);
+            for copy in prepared.wrap.copies(span, timeline, samples) {
                 let listed = prepared.spans.runs(part, timeline, &copy, self);
                 if listed.is_err() {
                     self.listed = listed;
@@ -398,7 +402,7 @@ impl Emit for PartsList<'_> {
                         first_distance
                     }
                 };
-                if self.cut == Cut::Whole && prepared.may_be_tiny(index) {
+                if self.cut == Cut::Whole && may_be_tiny(prepared, index) {
                     flags = MAY_BE_TINY;
                 }
             }
@@ -462,4 +466,32 @@ pub(crate) fn write(
                 };
             }
         });
+}
+
+/// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
+/// those ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)). Of arcs that only the device knows
+/// it may be true where none has.
+#[inline(always)]
+pub(crate) fn may_be_tiny(prepared: &Prepared, index: u32) -> bool {
+    let (segments, index) = (&prepared.segments, index as usize);
+    match segments.form {
+        Form::Arc if segments.are_arcs_listed => may_be_tiny_between(prepared, index),
+        Form::Arc => !segments.arcs[index].is_canonical(),
+        Form::Polynomial => !segments.polynomials[index].is_canonical(),
+    }
+}
+
+/// The same of an arc that is listed: each component of its middle is at least as large as that of half the sum
+/// of its keys, which [`arc_between`](crate::twin::arc_between::arc_between) lengthens.
+fn may_be_tiny_between(prepared: &Prepared, index: usize) -> bool {
+    let interval = prepared.segments.intervals[index];
+    let key = (interval & KEY_OF_INTERVAL) as usize;
+    let [start, end] = [prepared.constants[key], prepared.constants[key + 1]];
+    let is_start_negated = interval & START_NEGATED != 0;
+    let sign = match is_start_negated == (interval & END_NEGATED != 0) {
+        true => 1.0,
+        false => -1.0,
+    };
+    let is_zero = |c: usize| start[c] == 0.0 && end[c] == 0.0;
+    (0..4).any(|c| ((start[c] + end[c] * sign) * 0.5).abs() < COARSE && !is_zero(c))
 }

@@ -93,7 +93,7 @@ pub(crate) fn hash_of(names: &[ResultName]) -> String {
 }
 
 /// How a library is divided, and what its results are.
-pub(crate) struct ShardRequest {
+pub(crate) struct ShardOptions {
     /// The format of the results, if the command line names one.
     pub(crate) format: Option<&'static Format>,
     pub(crate) naming: ResultNaming,
@@ -109,9 +109,9 @@ impl ShardPlan {
         inputs: GatheredInputs,
         sizes: &[u64],
         folder: &Path,
-        request: ShardRequest,
+        request: ShardOptions,
     ) -> Result<Self, Failure> {
-        let ShardRequest {
+        let ShardOptions {
             format,
             naming,
             options,

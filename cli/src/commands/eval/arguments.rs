@@ -11,17 +11,18 @@ use tumble_formats::quaternion::ComponentOrder;
 
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
+use crate::arguments::interpolation::{InterpolationArguments, method_argument};
 use crate::arguments::options::{
-    AppliesTo, CommandLine, OPTIONS, ResultKind, ResultOptions, ResultRequest,
+    AppliesTo, CommandLine, OPTIONS, ResultDescription, ResultKind, ResultOptions,
 };
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{
-    AtKeysArguments, EndFrameArguments, GapArguments, SampleRequest, SamplingArguments,
+    AtKeysArguments, EndFrameArguments, GapArguments, SampleChoice, SamplingArguments,
 };
 use crate::messages::exit::Failure;
 use crate::messages::words;
+use tumble_formats::sample::MethodChoice;
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
@@ -60,7 +61,7 @@ pub(crate) struct Arguments {
         default_value = "authored",
         value_parser = method_argument()
     )]
-    pub(super) method: MethodArgument,
+    pub(super) method: MethodChoice,
     #[command(flatten)]
     pub(super) sampling: SamplingArguments,
     #[command(flatten)]
@@ -117,7 +118,7 @@ fn layout() -> impl TypedValueParser<Value = Layout> {
 
 impl Arguments {
     /// The samples, after a check that the options apply to the method.
-    pub(super) fn checked_samples(&self) -> Result<SampleRequest, Failure> {
+    pub(super) fn checked_samples(&self) -> Result<SampleChoice, Failure> {
         if let Some(method) = self.method.0 {
             let checked = self.interpolation.check(&[method]);
             checked.map_err(Failure::usage)?;
@@ -136,9 +137,9 @@ impl Arguments {
     }
 
     /// Everything that determines the bytes of a result besides its input.
-    pub(super) fn options(&self, samples: &SampleRequest) -> ResultOptions {
+    pub(super) fn options(&self, samples: &SampleChoice) -> ResultOptions {
         let mut options = self.command_line.options();
-        if let SampleRequest::Times(_) | SampleRequest::Keys(_) = samples {
+        if let SampleChoice::Times(_) | SampleChoice::Keys(_) = samples {
             options.text += &format!(" times={}", samples.digest());
         }
         options
@@ -179,8 +180,12 @@ impl Arguments {
     }
 
     /// The result of a kind in a format.
-    pub(super) fn result(&self, kind: ResultKind, format: &'static Format) -> ResultRequest<'_> {
-        ResultRequest {
+    pub(super) fn result(
+        &self,
+        kind: ResultKind,
+        format: &'static Format,
+    ) -> ResultDescription<'_> {
+        ResultDescription {
             kind,
             format,
             output: &self.output,

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
-use tumble::method::SLERP;
 use tumble::{Engine, Error, Layout, Quantity, SampleTimes, Timeline};
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
@@ -22,7 +21,7 @@ use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
-use crate::arguments::time::{ClipFrames, SampleRequest};
+use crate::arguments::time::{ClipFrames, SampleChoice};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
@@ -69,7 +68,7 @@ impl EvaluationReport {
 /// Evaluates all that a pipeline has; gives the number of rotations in the results that are kept.
 pub(super) fn evaluate_all(
     arguments: &Arguments,
-    samples: &SampleRequest,
+    samples: &SampleChoice,
     device: &mut OpenedDevice,
     pipeline: &mut Pipeline<'_>,
 ) -> u64 {
@@ -96,7 +95,7 @@ pub(super) fn evaluate_all(
 struct EvaluationJob<'a> {
     arguments: &'a Arguments,
     device: &'a mut OpenedDevice,
-    samples: &'a SampleRequest,
+    samples: &'a SampleChoice,
     work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
@@ -197,39 +196,26 @@ impl EvaluationJob<'_> {
         if !self.arguments.explain_route {
             return Ok(());
         }
-        let curve = self.curve();
-        let groups = curve.with_methods(|methods| methods.groups_of(clip));
-        let whole = groups.len() == 1;
-        for (method, tracks) in groups {
-            let set = (clip.set.select(tracks.iter().copied()))
-                .map_err(|error| Failure::evaluating(name, &error.into()))?;
-            let explain = |engine: &Engine| {
-                let request = engine.request(&set, curve.interpolation(method), frames);
-                let request = request.layout(layout);
-                match delivery {
-                    Delivery::InMemory => request.explain(),
-                    Delivery::InChunks => {
-                        request.explain_stream(stream_chunk(layout, set.track_count()))
-                    }
-                }
-            };
-            let samples = frames.resolve(set.track_count(), clip.set.time_span());
-            let route = samples
-                .map_err(Error::from)
-                .and_then(|timeline| {
-                    self.device
-                        .choose(clip.set.track_count() * timeline.len())?;
-                    self.device.work(explain)
-                })
-                .map_err(|error| Failure::evaluating(name, &error))?;
-            words::note(&match whole {
-                true => format!("{name}: {route}"),
-                false => format!(
-                    "{name}, {} by {method}: {route}",
-                    words::count(tracks.len(), "track")
-                ),
-            });
-        }
+        let (set, tracks) = (&clip.set, clip.set.track_count());
+        let interpolations = self.curve().channel_methods().interpolations(clip);
+        let explain = |engine: &Engine| {
+            let request = engine.request(set, interpolations.clone(), frames);
+            let request = request.layout(layout);
+            match delivery {
+                Delivery::InMemory => request.explain(),
+                Delivery::InChunks => request.explain_stream(stream_chunk(layout, tracks)),
+            }
+        };
+        let timeline = frames.resolve(tracks, set.time_span());
+        let routes = timeline
+            .map_err(Error::from)
+            .and_then(|timeline| {
+                self.device.choose(tracks * timeline.len())?;
+                self.device.work(explain)
+            })
+            .map_err(|error| Failure::evaluating(name, &error))?;
+        let lines = routes.lines();
+        lines.for_each(|route| words::note(&format!("{name}: {route}")));
         Ok(())
     }
 
@@ -247,9 +233,8 @@ impl EvaluationJob<'_> {
         let found = timeline.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
             self.device.work(|engine| {
-                curve.with_methods(|methods| {
-                    sample_to_end(methods, engine, clip, frames, samples.end)
-                })
+                let methods = curve.channel_methods();
+                sample_to_end(&methods, engine, clip, frames, samples.end)
             })
         });
         found.map_err(|error| Failure::evaluating(name, &error))
@@ -378,7 +363,7 @@ impl EvaluationJob<'_> {
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (
             Some(document),
-            &SampleRequest::Rate {
+            &SampleChoice::Rate {
                 rate,
                 start: None,
                 end: None,
@@ -525,49 +510,35 @@ impl EvaluationJob<'_> {
             encoding,
             notes: &notes,
         };
-        let curve = self.curve();
-        let delivery = match curve.with_methods(|methods| methods.method_of(clip)) {
-            Some(_) => Delivery::InChunks,
-            None => Delivery::InMemory,
-        };
-        self.explain(name, clip, frames, result.layout, delivery)?;
+        self.explain(name, clip, frames, result.layout, Delivery::InChunks)?;
+        let methods = self.curve().channel_methods();
         let size = (set.track_count(), timeline.len());
         let extent = (size.0, size.1, span(&timeline));
         let quantity = arguments.output.quantity();
         let rows = |engine: &Engine, at: &SampleTimes| {
-            curve.with_methods(|methods| match quantity {
+            match quantity {
                 Quantity::Rotation => methods.rotations(engine, clip, at, result.layout),
                 // Velocities are rows of four numbers too.
                 _ => {
                     let rates = methods.rates(engine, clip, at, result.layout)?;
                     Ok(rates.into_iter().map(Quat::from_vec4).collect())
                 }
-            })
+            }
         };
         let ends = samples.end.map(|end| SampleTimes::at(vec![end.at]));
         let frame_count = timeline.len() - usize::from(ends.is_some());
         let ends = ends.map(|at| self.device.work(|engine| rows(engine, &at)));
         let ends = ends.transpose();
         let ends = ends.map_err(|error| Failure::evaluating(name, &error))?;
-        let mut ends = EndRows::new(ends.unwrap_or_default(), result.layout, frame_count);
-        let Some(method) = curve.with_methods(|methods| methods.method_of(clip)) else {
-            // Tracks of different samplers are evaluated apart, and put together in memory.
-            room::in_memory(name, set, frames, 2)?;
-            let found = self
-                .device
-                .choose(size.0 * size.1)
-                .and_then(|()| self.device.work(|engine| rows(engine, frames)))
-                .map_err(|error| Failure::evaluating(name, &error))?;
-            let written = target.write_whole(&result, &ends.next(&found))?;
-            let method = "each channel's method";
-            return Ok(self.evaluated(extent, method, written, order));
-        };
-        let interpolation = curve.interpolation(method);
+        let ends = EndRows::new(ends.unwrap_or_default(), result.layout, frame_count);
+        let interpolations = methods.interpolations(clip);
         let written = target.write_rotations(&result, ends, |sink| {
             self.device
-                .stream(set, interpolation, frames, result.layout, sink)
+                .stream(set, &interpolations, frames, result.layout, sink)
         })?;
-        Ok(self.evaluated(extent, method.name, written, order))
+        let method =
+            (methods.method_of(clip)).map_or("each channel's method", |method| method.name);
+        Ok(self.evaluated(extent, method, written, order))
     }
 
     /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each of
@@ -692,14 +663,13 @@ impl EvaluationJob<'_> {
             .skeleton(tracks, length)
             .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
         let curve = self.curve();
-        let method = curve.with_methods(|methods| methods.method_of(clip));
-        let interpolation = curve.interpolation(method.unwrap_or(SLERP));
+        let methods = curve.channel_methods();
         let samples = frames.resolve(tracks, set.time_span());
         let evaluated = samples.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
             self.device.work(|engine| {
                 let local = engine
-                    .request(set, interpolation, frames)
+                    .request(set, methods.interpolations(clip), frames)
                     .layout(Layout::FrameMajor)
                     .evaluate()?;
                 match kind {

@@ -7,10 +7,10 @@ use serde_json::Value;
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::arguments::options::ResultOptions;
-use crate::arguments::time::SampleRequest;
+use crate::arguments::time::SampleChoice;
 use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
-use crate::batch::shards::plan::{ShardPlan, ShardRequest};
+use crate::batch::shards::plan::{ShardOptions, ShardPlan};
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
 use crate::batch::target;
@@ -83,13 +83,13 @@ pub(crate) fn size(found: &FoundInput) -> u64 {
 }
 
 /// The checked options of an evaluation.
-pub(crate) struct EvaluationRequest {
-    samples: SampleRequest,
+pub(crate) struct EvaluationOptions {
+    samples: SampleChoice,
     /// Everything that determines results besides their inputs.
     pub(crate) options: ResultOptions,
 }
 
-impl EvaluationRequest {
+impl EvaluationOptions {
     /// Refuses everything that can be refused before the inputs are known.
     pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
         if arguments.sampling.reads_standard_input() {
@@ -114,7 +114,7 @@ impl EvaluationRequest {
         shard_bytes: u64,
     ) -> Result<ShardPlan, Failure> {
         let results = &arguments.results;
-        let request = ShardRequest {
+        let request = ShardOptions {
             format: results.format(),
             naming: results.naming(),
             options: self.options.text.clone(),
@@ -136,7 +136,7 @@ pub(crate) struct EvaluatedShard {
 
 /// A request and an open device, kept for shard after shard.
 pub(crate) struct Evaluator {
-    pub(crate) request: EvaluationRequest,
+    pub(crate) request: EvaluationOptions,
     pub(crate) device: OpenedDevice,
 }
 
@@ -144,7 +144,7 @@ impl Evaluator {
     /// Opens the device.
     pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
         Ok(Self {
-            request: EvaluationRequest::new(arguments)?,
+            request: EvaluationOptions::new(arguments)?,
             device: arguments.device.open()?,
         })
     }

@@ -21,8 +21,8 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, curve_warning,
-    each_once, method_arguments,
+    CurveChoice, InterpolationArguments, MethodArgumentSelection, curve_warning, each_once,
+    method_arguments,
 };
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
@@ -36,6 +36,7 @@ use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
+use tumble_formats::sample::MethodChoice;
 
 /// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
@@ -249,17 +250,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    fn methods(&self) -> Vec<MethodArgument> {
+    fn methods(&self) -> Vec<MethodChoice> {
         let methods = each_once(self.methods.iter().flat_map(|selection| &selection.0));
         match (methods.is_empty(), self.report) {
             (false, _) => methods,
-            (true, false) => vec![MethodArgument(None)],
+            (true, false) => vec![MethodChoice(None)],
             (true, true) => [
                 method::SLERP,
                 method::CATMULL_ROM,
                 method::BESSEL_OVERHAUSER,
             ]
-            .map(|method| MethodArgument(Some(method)))
+            .map(|method| MethodChoice(Some(method)))
             .to_vec(),
         }
     }

@@ -9,7 +9,7 @@ use tumble_formats::outside::Outside;
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::CurveChoice;
-use crate::arguments::time::SampleRequest;
+use crate::arguments::time::SampleChoice;
 use crate::batch::room;
 use crate::commands::plot::figure::TimeAxis;
 use crate::messages::exit::Failure;
@@ -23,7 +23,7 @@ const EVEN_TIMES: usize = 1000;
 
 /// The samples of curves.
 pub(crate) struct PlotSamples {
-    pub(crate) request: SampleRequest,
+    pub(crate) request: SampleChoice,
     /// Whether the command line says the rate of frames; else a curve has as many as the picture needs.
     pub(crate) is_rate_chosen: bool,
     pub(crate) outside: Outside,
@@ -75,7 +75,7 @@ impl<'a> PlotSource<'a> {
             let timeline = frames.resolve(set.track_count(), set.time_span());
             timeline.map_err(|error| Failure::evaluating(&name, &error.into()))
         };
-        if let SampleRequest::Rate { .. } = samples.request
+        if let SampleChoice::Rate { .. } = samples.request
             && let Some(span) = set.time_span()
         {
             // A box alone has the frames of the whole set.
@@ -89,15 +89,13 @@ impl<'a> PlotSource<'a> {
             )));
         }
         let mut about = match samples.request {
-            SampleRequest::Rate { rate, .. } => {
+            SampleChoice::Rate { rate, .. } => {
                 let count = words::count(timeline.len(), "frame");
                 format!("{count}, {rate} per second")
             }
-            SampleRequest::Times(_) | SampleRequest::Keys(_) => {
-                words::count(timeline.len(), "time")
-            }
+            SampleChoice::Times(_) | SampleChoice::Keys(_) => words::count(timeline.len(), "time"),
         };
-        if let SampleRequest::Rate { .. } = samples.request {
+        if let SampleChoice::Rate { .. } = samples.request {
             let times: Vec<f64> = timeline.times(0).collect();
             let last = samples.request.end_of(clip, samples.outside);
             let times = with_keys(times, last, clip, samples.is_rate_chosen);

@@ -13,7 +13,7 @@ use clap::Args;
 
 use crate::arguments::device::vulkan_device;
 use crate::commands::prove::report::Verdict;
-use crate::commands::prove::steps::ProofRequest;
+use crate::commands::prove::steps::ProofOptions;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 use crate::messages::listing;
 
@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = out {
         report::check_output(path, arguments.overwrite)?;
     }
-    let proof = steps::prove(&ProofRequest {
+    let proof = steps::prove(&ProofOptions {
         device,
         seconds: arguments.time_limit,
         quick: arguments.quick,

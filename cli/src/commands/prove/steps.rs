@@ -21,7 +21,7 @@ use crate::commands::prove::{compile, device};
 use crate::messages::words;
 
 /// The options of a run.
-pub(crate) struct ProofRequest {
+pub(crate) struct ProofOptions {
     pub(crate) device: Device,
     pub(crate) seconds: u64,
     /// Run only what a proof needs.
@@ -138,7 +138,7 @@ const FIRST_SETTINGS: usize = 4;
 
 /// A run in progress.
 struct ProofRun<'a> {
-    request: &'a ProofRequest,
+    options: &'a ProofOptions,
     vulkan: &'a VulkanDevice,
     started: Instant,
     cpu: Engine,
@@ -150,16 +150,16 @@ struct ProofRun<'a> {
 }
 
 /// Runs everything on a Vulkan device.
-pub(crate) fn prove(request: &ProofRequest) -> Proof {
+pub(crate) fn prove(options: &ProofOptions) -> Proof {
     let started = Instant::now();
-    let Device::Vulkan(vulkan) = &request.device else {
+    let Device::Vulkan(vulkan) = &options.device else {
         unreachable!("the CPU is refused before")
     };
-    let mut proof = empty(request, vulkan);
+    let mut proof = empty(options, vulkan);
     match Engine::new(Device::Cpu) {
         Ok(cpu) => {
             let mut run = ProofRun {
-                request,
+                options,
                 vulkan,
                 started,
                 cpu,
@@ -179,7 +179,7 @@ pub(crate) fn prove(request: &ProofRequest) -> Proof {
 }
 
 /// A proof of nothing.
-fn empty(request: &ProofRequest, vulkan: &VulkanDevice) -> Proof {
+fn empty(options: &ProofOptions, vulkan: &VulkanDevice) -> Proof {
     let info = vulkan.info().clone();
     Proof {
         format: FORMAT,
@@ -189,7 +189,7 @@ fn empty(request: &ProofRequest, vulkan: &VulkanDevice) -> Proof {
         program: device::program(),
         date: device::now(),
         seconds: 0.0,
-        seconds_allowed: request.seconds,
+        seconds_allowed: options.seconds,
         host: device::host(),
         negative_control: NegativeControl::default(),
         device: DeviceSection {
@@ -203,11 +203,11 @@ fn empty(request: &ProofRequest, vulkan: &VulkanDevice) -> Proof {
         kernels: KernelSection::default(),
         golden: GoldenSection::default(),
         random: RandomSection {
-            seed: request.seed,
+            seed: options.seed,
             ..RandomSection::default()
         },
         renderer: None,
-        validation: request.validate.then(ValidationSection::default),
+        validation: options.validate.then(ValidationSection::default),
         compile_times: CompileTimes::default(),
         figures: None,
         failures: Vec::new(),
@@ -227,10 +227,10 @@ impl ProofRun<'_> {
         self.step("random sets and crowds", Self::random_once);
         self.step_if_time("compiling", COMPILED_BY, Self::compile);
         self.step_if_time("speed", MEASURED_BY, Self::measure);
-        if self.request.validate {
+        if self.options.validate {
             self.step("the validation layer", Self::validate);
         }
-        if self.request.quick {
+        if self.options.quick {
             return;
         }
         let everywhere = "recorded results in every setting";
@@ -243,7 +243,7 @@ impl ProofRun<'_> {
     fn step(&mut self, name: &str, work: fn(&mut Self) -> Result<(), StepError>) {
         let elapsed = self.started.elapsed().as_secs();
         if self.is_past(1.0) {
-            let allowed = self.request.seconds;
+            let allowed = self.options.seconds;
             let reason = format!("{name}: the {allowed} s were over (--time-limit)");
             self.proof.failures.push(reason);
             return;
@@ -272,7 +272,7 @@ impl ProofRun<'_> {
     }
 
     fn left_until(&self, share: f64) -> Duration {
-        let end = Duration::from_secs(self.request.seconds).mul_f64(share);
+        let end = Duration::from_secs(self.options.seconds).mul_f64(share);
         end.saturating_sub(self.started.elapsed())
     }
 
@@ -282,7 +282,7 @@ impl ProofRun<'_> {
         let mut opened_in = [0.0; 2];
         for milliseconds in &mut opened_in {
             let started = Instant::now();
-            let engine = Engine::with_options(self.request.device.clone(), &options)?;
+            let engine = Engine::with_options(self.options.device.clone(), &options)?;
             *milliseconds = started.elapsed().as_secs_f64() * 1e3;
             let device = &mut self.proof.device;
             device.details = engine.device_details();
@@ -297,7 +297,7 @@ impl ProofRun<'_> {
             .and_then(|details| details.pci_address.clone());
         device.bus = address.and_then(|address| device::bus(&address));
         for setting in &self.settings[..FIRST_SETTINGS] {
-            let engine = Engine::with_options(self.request.device.clone(), &setting.options)?;
+            let engine = Engine::with_options(self.options.device.clone(), &setting.options)?;
             self.engines.push(engine);
         }
         Ok(())
@@ -306,7 +306,7 @@ impl ProofRun<'_> {
     /// Every kernel beside its twin: in engines that read by storage buffers and, where the device can, by
     /// texel buffers, for which most kernels have a form of their own.
     fn kernels(&mut self) -> Result<(), StepError> {
-        let allowed = Duration::from_secs(self.request.seconds);
+        let allowed = Duration::from_secs(self.options.seconds);
         let mut ran = BTreeSet::new();
         let mut expected: BTreeSet<&str> = BTreeSet::new();
         // The engines are kept: kernels compiled here are used again for the recorded results.
@@ -346,7 +346,7 @@ impl ProofRun<'_> {
             true => Ok(()),
             false => Err(StepError(format!(
                 "the {} s were over after {} of {} (--time-limit)",
-                self.request.seconds, self.proof.kernels.ran, self.proof.kernels.count
+                self.options.seconds, self.proof.kernels.ran, self.proof.kernels.count
             ))),
         }
     }
@@ -444,7 +444,7 @@ impl ProofRun<'_> {
             let options = self.settings[index].options.clone();
             let engine = match self.engines.get(index) {
                 Some(engine) => engine.clone(),
-                None => Engine::with_options(self.request.device.clone(), &options)?,
+                None => Engine::with_options(self.options.device.clone(), &options)?,
             };
             for case in 0..self.golden.case_count() {
                 let is_done = index < FIRST_SETTINGS && (case + case / 6) % FIRST_SETTINGS == index;
@@ -461,7 +461,7 @@ impl ProofRun<'_> {
     }
 
     fn renderer(&mut self) -> Result<(), StepError> {
-        self.proof.renderer = Some(renderer(self.vulkan, false, self.request.seed)?);
+        self.proof.renderer = Some(renderer(self.vulkan, false, self.options.seed)?);
         Ok(())
     }
 
@@ -471,7 +471,7 @@ impl ProofRun<'_> {
             let number = self.proof.random.rounds;
             let engine = &self.engines[number as usize % self.engines.len()];
             let started = Instant::now();
-            let found = round(engine, &self.cpu, self.request.seed, number)?;
+            let found = round(engine, &self.cpu, self.options.seed, number)?;
             let seconds = started.elapsed().as_secs();
             if seconds >= LONG_ROUND_SECONDS {
                 let description = &found.description;
@@ -532,11 +532,11 @@ impl ProofRun<'_> {
             found.differing += u64::from(!is_same);
         }
         for number in 0..8 {
-            let made = round(&engine, &self.cpu, self.request.seed, number)?;
+            let made = round(&engine, &self.cpu, self.options.seed, number)?;
             found.random_rounds += 1;
             found.differing += made.differing;
         }
-        let renderer = renderer(self.vulkan, true, self.request.seed)?;
+        let renderer = renderer(self.vulkan, true, self.options.seed)?;
         found.renderer_values = renderer.checks.iter().map(|check| check.values).sum();
         found.differing += (renderer.checks.iter())
             .map(|check| check.differing)

@@ -38,7 +38,7 @@ impl Bones {
         let joints = clip.set.track_count();
         let parent = |joint: usize| clip.skeleton.get(joint).and_then(|it| it.parent);
         let parents: Vec<Option<usize>> = (0..joints).map(parent).collect();
-        let sites = clip.bvh.iter().enumerate();
+        let sites = clip.written_joints.iter().enumerate();
         let tips: Vec<(usize, Vec3)> = sites
             .flat_map(|(joint, written)| written.end_sites.iter().map(move |&tip| (joint, tip)))
             .filter(|(_, tip)| tip.length() > 0.0)

@@ -17,8 +17,7 @@ use tumble_formats::carried_mesh::CarriedMesh;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
-    CurveChoice, InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once,
-    method_arguments,
+    CurveChoice, InterpolationArguments, MethodArgumentSelection, each_once, method_arguments,
 };
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
@@ -36,6 +35,7 @@ use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_tra
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, signals, words};
+use tumble_formats::sample::MethodChoice;
 
 /// Chains side by side in one picture.
 const MAX_METHODS: usize = 4;
@@ -329,7 +329,7 @@ impl Arguments {
         &self,
         name: &str,
         source: &TravelSource,
-        methods: Vec<MethodArgument>,
+        methods: Vec<MethodChoice>,
     ) -> Result<Vec<CurveChoice>, Failure> {
         let TravelSource::Clip(clip) = source else {
             return Ok(Vec::new());

@@ -19,7 +19,7 @@ use tumble_formats::motion::Motion;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{
-    InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once, method_arguments,
+    InterpolationArguments, MethodArgumentSelection, each_once, method_arguments,
 };
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
@@ -33,6 +33,7 @@ use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
+use tumble_formats::sample::MethodChoice;
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
 const MAX_PAGE_BYTES: f64 = 256e6;
@@ -270,16 +271,15 @@ impl Arguments {
         if shown.is_empty() {
             return Err(Failure::usage("there is nothing to show: nothing moves"));
         }
-        let choices_by = |methods: &[MethodArgument]| -> Vec<Vec<ResultChoice>> {
+        let choices_by = |methods: &[MethodChoice]| -> Vec<Vec<ResultChoice>> {
             shown.iter().map(|one| one.methods(methods)).collect()
         };
         let asked = each_once(self.methods.iter().flat_map(|selection| &selection.0));
         if asked.is_empty() {
             let common = ["bessel-overhauser", "slerp", "catmull-rom", "b-spline"];
-            let mut first = vec![MethodArgument(None)];
-            first.extend(common.map(|name| MethodArgument(Method::named(name))));
-            let all: Vec<MethodArgument> =
-                first.iter().copied().chain(MethodArgument::all()).collect();
+            let mut first = vec![MethodChoice(None)];
+            first.extend(common.map(|name| MethodChoice(Method::named(name))));
+            let all: Vec<MethodChoice> = first.iter().copied().chain(MethodChoice::all()).collect();
             let all = choices_by(&each_once(all.iter()));
             return match bytes(shown, &all) <= SMALL_PAGE_BYTES {
                 true => Ok(all),

@@ -9,12 +9,13 @@ use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::packed;
 use tumble_routes::mesh::Mesh;
 
-use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
+use crate::arguments::interpolation::InterpolationArguments;
 use crate::commands::travel::Scenery;
 use crate::commands::view::pack::{bytes, differences, doubles, shorts, text, words};
 use crate::commands::view::result::{StoredResult, short};
 use crate::commands::view::shown::{Ghost, ResultChoice, ShownClip};
 use crate::messages::colours::{BOXES, Colour};
+use tumble_formats::sample::MethodChoice;
 
 /// Built from `web/src` by `npm run build` in `web/`; it is stored here so that the package is complete.
 const HTML: &str = include_str!("page.html");
@@ -114,7 +115,7 @@ impl StoredClip {
         if shown.path.is_some() || keys.len() > MAX_KEY_BYTES {
             return None;
         }
-        let all: Vec<MethodArgument> = MethodArgument::all().collect();
+        let all: Vec<MethodChoice> = MethodChoice::all().collect();
         Some(Self {
             bytes: bytes(&keys),
             methods: shown

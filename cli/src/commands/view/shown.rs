@@ -11,7 +11,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::world::world;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::interpolation::{CurveChoice, InterpolationArguments, MethodArgument};
+use crate::arguments::interpolation::{CurveChoice, InterpolationArguments, distinct_methods};
 use crate::arguments::path::frame_summary;
 use crate::batch::room;
 use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of, scene_origin};
@@ -20,6 +20,7 @@ use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::names;
 use crate::messages::words;
+use tumble_formats::sample::MethodChoice;
 
 /// Bytes of one rotation and its speed.
 const ROTATION: f64 = 10.0;
@@ -29,14 +30,14 @@ const POSITION: f64 = 6.0;
 /// What makes a result: a method, for clips, or a frame, for paths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ResultChoice {
-    By(MethodArgument),
+    By(MethodChoice),
     In(PathFrame),
 }
 
 impl ResultChoice {
     /// All methods, then all frames.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        MethodArgument::all()
+        MethodChoice::all()
             .map(Self::By)
             .chain(PathFrame::ALL.map(Self::In))
     }
@@ -57,7 +58,7 @@ impl ResultChoice {
 
     pub(crate) fn colour(self) -> Colour {
         match self {
-            Self::By(method) => method.colour(),
+            Self::By(method) => colours::of_choice(method),
             Self::In(frame) => colours::of_frame(frame),
         }
     }
@@ -230,7 +231,7 @@ impl ShownClip {
 
     /// These methods, or the frames of paths. The method of a file that states none is bessel-overhauser,
     /// which is not shown twice.
-    pub(crate) fn methods(&self, methods: &[MethodArgument]) -> Vec<ResultChoice> {
+    pub(crate) fn methods(&self, methods: &[MethodChoice]) -> Vec<ResultChoice> {
         if let Some(TravelSource::Paths(_, arguments)) = &self.path {
             return arguments
                 .frames()
@@ -238,7 +239,7 @@ impl ShownClip {
                 .map(ResultChoice::In)
                 .collect();
         }
-        let distinct = MethodArgument::distinct(methods, &self.clip);
+        let distinct = distinct_methods(methods, &self.clip);
         distinct.into_iter().map(ResultChoice::By).collect()
     }
 
@@ -304,8 +305,7 @@ impl ShownClip {
                     let layout = Layout::FrameMajor;
                     Ok::<_, Error>((
                         rotations.sample(engine, clip, &frames)?,
-                        velocities
-                            .with_methods(|methods| methods.rates(engine, clip, &frames, layout))?,
+                        (velocities.channel_methods()).rates(engine, clip, &frames, layout)?,
                     ))
                 })
             })

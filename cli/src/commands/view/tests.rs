@@ -8,10 +8,9 @@ use serde_json::Value;
 use tumble::method::{C2, SLERP};
 use tumble::{Device, Engine, SampleTimes, TrackSet};
 use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
-use tumble_formats::sample::ChannelMethods;
+use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::world::{WorldPose, world};
 
-use crate::arguments::interpolation::MethodArgument;
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 
 #[path = "../../../tests/support/browser.rs"]
@@ -108,12 +107,10 @@ fn keys_after_the_end_are_not_shown() {
     assert_eq!(shown.times, [0.0, 0.25, 0.5]);
 }
 
-fn expected(shown: &ShownClip, argument: MethodArgument) -> Vec<WorldPose> {
-    let interpolation = arguments("").interpolation;
-    let with = |method| interpolation.with(method);
+fn expected(shown: &ShownClip, argument: MethodChoice) -> Vec<WorldPose> {
     let methods = ChannelMethods {
-        method: argument.0,
-        with: &with,
+        method: argument,
+        options: arguments("").interpolation.options(),
     };
     let engine = Engine::new(Device::Cpu).unwrap();
     let frames = SampleTimes::at(shown.times.clone());
@@ -161,7 +158,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
         page.choose("#set", &index.to_string());
         page.value("tumble.loaded().then(() => true)");
         let methods = page.value(&texts("#method option"));
-        let authored = MethodArgument(None);
+        let authored = MethodChoice(None);
         let has_channels = !one.clip.channels.is_empty();
         // Where `authored` was shown before and means nothing, the first method is shown instead.
         let first = match has_channels {
@@ -171,7 +168,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
         assert_eq!(page.value("tumble.state.method"), first);
         let starts = methods.as_str().unwrap().starts_with("authored|");
         assert_eq!(starts, has_channels, "{methods}");
-        let mut shown_by = vec![MethodArgument(Some(SLERP)), MethodArgument(Some(C2))];
+        let mut shown_by = vec![MethodChoice(Some(SLERP)), MethodChoice(Some(C2))];
         shown_by.extend(has_channels.then_some(authored));
         for argument in shown_by {
             page.choose("#method", argument.name());
@@ -269,10 +266,10 @@ fn joints_have_names_and_a_click_chooses_one() {
 #[test]
 fn files_without_a_word_of_channels_show_bessel_overhauser_once() {
     let one = ShownClip::new(Path::new("a.tum"), trajectory(), None, false);
-    let named = |names: &[&str]| -> Vec<MethodArgument> {
+    let named = |names: &[&str]| -> Vec<MethodChoice> {
         names
             .iter()
-            .map(|name| MethodArgument(tumble::Method::named(name)))
+            .map(|name| MethodChoice(tumble::Method::named(name)))
             .collect()
     };
     let names_shown = |names: &[&str]| -> Vec<&str> {
@@ -313,7 +310,7 @@ fn what_has_no_place_or_no_room_is_refused() {
         let one = ShownClip::new(Path::new("fox.glb"), clip, None, true);
         let one = arguments.sampled(one).unwrap();
         let result = one.result(
-            ResultChoice::By(MethodArgument(None)),
+            ResultChoice::By(MethodChoice(None)),
             arguments.interpolation,
             &mut device,
         );

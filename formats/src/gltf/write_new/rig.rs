@@ -5,8 +5,8 @@ use std::collections::{HashMap, HashSet};
 use glam::{DAffine3, DMat3, DVec3, Quat, Vec3};
 use tumble::Skeleton;
 
-use crate::bvh::BvhJoint;
 use crate::gltf::write_new::json::{BvhExtras, Extras, Node};
+use crate::motion::WrittenJoint;
 use crate::motion::{Motion, Transform};
 
 /// The nodes of all skeletons of a file.
@@ -96,7 +96,7 @@ impl NewNodes {
                     rotation: rest.rotation.to_array(),
                     scale: rest.scale.to_array(),
                     children: Vec::new(),
-                    extras: clip.bvh.get(track).map(extras),
+                    extras: clip.written_joints.get(track).map(extras),
                 });
                 node
             }));
@@ -226,8 +226,8 @@ fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// The BVH data of a joint, for programs that write it as BVH again.
-fn extras(joint: &BvhJoint) -> Extras {
+/// How a file of BVH wrote a joint, for programs that write it as BVH again.
+fn extras(joint: &WrittenJoint) -> Extras {
     let sites = joint.end_sites.iter();
     Extras {
         bvh: Some(BvhExtras {

@@ -2,11 +2,11 @@
 
 use tumble::FrameRate;
 
+use crate::array::Element;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::motion::grid;
 use crate::npz::archive::Archive;
-use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::rate::{Precision, RateSource, of, on_frames, overridden};
 

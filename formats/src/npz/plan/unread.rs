@@ -1,10 +1,10 @@
 //! The members of an archive that no plan reads, and the warnings about them.
 
+use crate::array::{ArrayHeader, Element};
 use crate::diagnostic::Code;
 use crate::format::ReadOptions;
 use crate::npz::archive::{Archive, Member};
 use crate::npz::body_model::SHAPE;
-use crate::npz::header::{ArrayHeader, Element};
 use crate::npz::plan::ArchivePlan;
 use crate::npz::tumble_layout::CONSTANTS;
 use crate::warnings::{Warnings, listed};

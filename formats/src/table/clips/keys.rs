@@ -4,9 +4,9 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::keys::{Origin, quiet_unit, quiet_unit_f32, select};
-use crate::origin::{origin_of, relative};
-use crate::signs::continue_signs;
+use crate::motion::keys::{Origin, quiet_unit, quiet_unit_f32, select};
+use crate::motion::origin::{origin_of, relative};
+use crate::motion::signs::continue_signs;
 use crate::table::clips::{SharedRows, TableClip, TableTrack};
 use crate::table::columns::{CellReader, Cells, ColumnValues};
 use crate::table::plan::{CellSource, Parts, RotationCells};

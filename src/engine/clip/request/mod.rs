@@ -1,11 +1,10 @@
 //! A request: which samples of a clip or of a set are evaluated, in which layout and encoding, and into which memory.
 
 #[cfg(feature = "vulkan")]
-mod application_device;
-#[cfg(feature = "vulkan")]
-mod exported;
+mod on_device;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::Pod;
 use glam::{Quat, Vec4};
@@ -13,19 +12,10 @@ use glam::{Quat, Vec4};
 use crate::checks::{check_encoding, check_rows, check_within, in_quats};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
-use crate::engine::clip::Clip;
+use crate::engine::clip::{Clip, ClipTracks};
+use crate::engine::groups::{GroupedSet, GroupedTracks};
 use crate::error::Error;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::plan::PREPARED;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::plan::bytes_of;
-#[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::Uploaded;
-#[cfg(feature = "vulkan")]
-use crate::gpu::error::EvaluateError;
-#[cfg(feature = "vulkan")]
-use crate::memory::OutOfMemoryError;
+use crate::machine::plan::PREPARED;
 use crate::memory::zeroed;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
@@ -35,10 +25,9 @@ use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
 use crate::output::window::Window;
 use crate::prepare::preparation::SetRequest;
-#[cfg(feature = "vulkan")]
-use crate::prepare::prepared::SEGMENTS;
 use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
+use crate::tracks::per_track::PerTrack;
 use crate::tracks::set::TrackSet;
 
 /// A request for samples of a clip ([`Clip::request`]) or of a set ([`Engine::request`]).
@@ -77,8 +66,8 @@ pub struct Request<'a> {
 }
 
 /// The clip or the set that is evaluated.
-#[derive(Debug, Clone, Copy)]
-#[allow(clippy::large_enum_variant)] // it lives on the stack of one call, and is copied
+#[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant)] // it lives on the stack of one call
 enum RequestSource<'a> {
     Clip(&'a Clip),
     Set {
@@ -86,81 +75,79 @@ enum RequestSource<'a> {
         set: &'a TrackSet,
         interpolation: Interpolation,
     },
+    /// A set whose tracks have several interpolations.
+    Grouped(GroupedSet<'a>),
 }
 
 impl RequestSource<'_> {
-    fn quantity(&self) -> Quantity {
+    fn quantity(&self) -> Result<Quantity, Error> {
         match self {
-            Self::Clip(clip) => clip.quantity(),
-            Self::Set { interpolation, .. } => interpolation.quantity,
+            Self::Clip(clip) => Ok(clip.quantity()),
+            Self::Set { interpolation, .. } => Ok(interpolation.quantity),
+            Self::Grouped(grouped) => grouped.quantity(),
         }
     }
 
     fn track_count(&self) -> usize {
         match self {
             Self::Clip(clip) => clip.track_count(),
-            Self::Set { set, .. } => set.track_count(),
+            Self::Set { set, .. } | Self::Grouped(GroupedSet { set, .. }) => set.track_count(),
         }
     }
 
     fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, Error> {
         Ok(match self {
             Self::Clip(clip) => clip.timeline(frames)?,
-            Self::Set { set, .. } => frames.resolve(set.track_count(), set.time_span())?,
+            Self::Set { set, .. } | Self::Grouped(GroupedSet { set, .. }) => {
+                frames.resolve(set.track_count(), set.time_span())?
+            }
         })
     }
 
-    #[cfg(feature = "vulkan")]
-    fn engine(&self) -> &Engine {
-        match self {
-            Self::Clip(clip) => clip.engine(),
-            Self::Set { engine, .. } => engine,
-        }
-    }
-
-    /// The clip if its segments are prepared, else what is evaluated of a set.
-    fn prepared_or_set<'r>(&'r self, part: &'r RequestPart) -> Result<&'r Clip, SetWork<'r>> {
+    /// What is evaluated for a part of the result.
+    fn work<'r>(&'r self, part: &'r RequestPart) -> Result<RequestWork<'r>, Error> {
         let (engine, set, interpolation) = match self {
-            Self::Clip(clip) => match &clip.uploaded.unprepared {
-                Some(set) => (clip.engine(), set, &clip.uploaded.data.interpolation),
-                None => return Ok(clip),
+            Self::Clip(clip) => match &clip.tracks {
+                ClipTracks::Alike(uploaded) => match uploaded.unprepared() {
+                    Some(set) => (clip.engine(), set, &uploaded.data().interpolation),
+                    None => return Ok(RequestWork::Prepared(clip)),
+                },
+                ClipTracks::Grouped(groups) => {
+                    let (engine, groups) = (clip.engine(), Arc::clone(groups));
+                    return Ok(RequestWork::Groups { engine, groups });
+                }
             },
             Self::Set {
                 engine,
                 set,
                 interpolation,
             } => (*engine, *set, interpolation),
+            Self::Grouped(grouped) => {
+                let groups = Arc::new(grouped.unprepared(&part.window.tracks)?);
+                let engine = grouped.engine;
+                return Ok(RequestWork::Groups { engine, groups });
+            }
         };
         let request = SetRequest::whole(set, interpolation, &part.timeline);
         let (tracks, samples) = (part.window.tracks.clone(), part.window.samples.clone());
-        Err(SetWork {
+        Ok(RequestWork::Set(SetWork {
             engine,
             request: request.part(tracks, samples),
-        })
+        }))
     }
+}
 
-    /// Calls `work` for a window of the clip, or for the segments of the set that the window needs, with the samples
-    /// and the window relative to them.
-    #[cfg(feature = "vulkan")]
-    fn with_uploaded<T>(
-        &self,
-        part: &RequestPart,
-        work: impl FnOnce(&Uploaded, &Timeline, &Window) -> Result<T, EvaluateError>,
-    ) -> Result<T, Error> {
-        let SetWork { engine, request } = match self.prepared_or_set(part) {
-            Ok(clip) => {
-                let folded = clip.uploaded.data.folded(&part.timeline)?;
-                return Ok(work(&clip.uploaded, &folded, &part.window)?);
-            }
-            Err(of_set) => of_set,
-        };
-        let needed = bytes_of(&request);
-        if (engine.backend.limits().memory).is_some_and(|limit| needed > limit) {
-            return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
-        }
-        let prepared = PreparedWindow::whole(&engine.backend, &request)?;
-        Ok(prepared.with(&part.window, work)?)
-    }
+/// What a request evaluates.
+#[allow(clippy::large_enum_variant)] // it lives on the stack of one call
+enum RequestWork<'r> {
+    /// A clip whose segments are prepared.
+    Prepared(&'r Clip),
+    Set(SetWork<'r>),
+    /// Tracks with several interpolations.
+    Groups {
+        engine: &'r Engine,
+        groups: Arc<GroupedTracks>,
+    },
 }
 
 /// Samples of a set, and the engine that evaluates them.
@@ -185,13 +172,16 @@ impl<'a> Request<'a> {
     pub(crate) fn of_set(
         engine: &'a Engine,
         set: &'a TrackSet,
-        interpolation: Interpolation,
+        interpolations: PerTrack<Interpolation>,
         frames: &'a SampleTimes,
     ) -> Self {
-        let source = RequestSource::Set {
-            engine,
-            set,
-            interpolation,
+        let source = match interpolations.uniform(set.track_count()) {
+            Some(interpolation) => RequestSource::Set {
+                engine,
+                set,
+                interpolation,
+            },
+            None => RequestSource::Grouped(GroupedSet::new(engine, set, interpolations)),
         };
         Self::new(source, frames)
     }
@@ -236,8 +226,9 @@ impl Request<'_> {
     /// The number of values of the result, and the bytes of each.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, the tracks or samples are out of range, or the encoding is for rotations
-    /// and the quantity is a velocity or an acceleration.
+    /// When the frames do not fit the clip, the tracks or samples are out of range, the encoding is for rotations and the
+    /// quantity is a velocity or an acceleration, or the set's interpolations are for another number of tracks or have
+    /// several quantities.
     pub fn size(&self) -> Result<(usize, usize), Error> {
         let RequestPart { window, .. } = self.part()?;
         Ok((window.len(), self.encoding.bytes()))
@@ -249,7 +240,7 @@ impl Request<'_> {
     /// As [`Request::size`]; also when the quantity is a velocity or an acceleration, the encoding is not f32, there
     /// is not enough memory for the result, or the device fails.
     pub fn evaluate(&self) -> Result<Rotations, Error> {
-        check_rows::<Quat>(self.source.quantity())?;
+        check_rows::<Quat>(self.source.quantity()?)?;
         self.values()
     }
 
@@ -259,7 +250,7 @@ impl Request<'_> {
     /// # Errors
     /// As [`Request::evaluate`], but the quantity must not be the rotation.
     pub fn rates(&self) -> Result<Vectors, Error> {
-        check_rows::<Vec4>(self.source.quantity())?;
+        check_rows::<Vec4>(self.source.quantity()?)?;
         self.values()
     }
 
@@ -291,7 +282,7 @@ impl Request<'_> {
         &self,
         output: &mut [R],
     ) -> Result<(), Error> {
-        check_rows::<R>(self.source.quantity())?;
+        check_rows::<R>(self.source.quantity()?)?;
         let part = self.part()?;
         in_quats(output, part.window.len(), |quats| {
             self.fill(&part, bytemuck::cast_slice_mut(quats))
@@ -305,8 +296,10 @@ impl Request<'_> {
     ///
     /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
     /// * otherwise: all segments that the request's samples need, if they take no more than
-    ///   [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory) (256 MiB if it has no limit), and else
+    ///   [`EngineOptions::memory`](crate::machine::options::EngineOptions::memory) (256 MiB if it has no limit), and else
     ///   those of a part of a chunk at a time.
+    ///
+    /// With several interpolations it is also that of the keys, whose tracks are sorted by interpolation.
     ///
     /// ```
     /// # use glam::{Quat, Vec4};
@@ -333,16 +326,22 @@ impl Request<'_> {
     ) -> Result<(), E> {
         self.check_f32()?;
         let part = self.part()?;
-        match self.source.prepared_or_set(&part) {
-            Ok(clip) => clip.stream_window(&part.timeline, &part.window, chunk, sink),
-            Err(of_set) => {
-                (of_set.engine).stream_request(&of_set.request, self.layout, chunk, sink)
+        match self.source.work(&part)? {
+            RequestWork::Prepared(clip) => {
+                clip.stream_window(&part.timeline, &part.window, chunk, sink)
+            }
+            RequestWork::Set(SetWork { engine, request }) => {
+                engine.stream_request(&request, self.layout, chunk, sink)
+            }
+            RequestWork::Groups { engine, groups } => {
+                groups.stream(engine, &part.timeline, &part.window, chunk, sink)
             }
         }
     }
 
     /// Describes in words how this request would be evaluated: what is prepared, in which pieces, and what is done
-    /// with the values. All routes give the same bits.
+    /// with the values. All routes give the same bits. If tracks have several interpolations, there is a line for each of
+    /// them.
     ///
     /// ```
     /// # use tumble::{Device, Encoding, Engine, SampleTimes, TrackSet, method};
@@ -372,11 +371,14 @@ impl Request<'_> {
 
     fn explained(&self, chunk: Option<usize>) -> Result<String, Error> {
         let part = self.part()?;
-        Ok(match self.source.prepared_or_set(&part) {
-            Ok(_) => PREPARED.to_owned(),
-            Err(SetWork { engine, request }) => {
+        Ok(match self.source.work(&part)? {
+            RequestWork::Prepared(_) => PREPARED.to_owned(),
+            RequestWork::Set(SetWork { engine, request }) => {
                 let plan = engine.plan(&request, self.layout, self.encoding, chunk);
                 plan.to_string()
+            }
+            RequestWork::Groups { engine, groups } => {
+                groups.explain(engine, &part.timeline, &part.window, self.encoding, chunk)?
             }
         })
     }
@@ -386,29 +388,46 @@ impl Request<'_> {
         self.check_f32()?;
         let part = self.part()?;
         let window = &part.window;
-        match self.source.prepared_or_set(&part) {
-            Err(SetWork { engine, request }) => return engine.samples(&request, self.layout),
-            Ok(clip)
+        let work = self.source.work(&part)?;
+        match &work {
+            RequestWork::Set(SetWork { engine, request }) => {
+                return engine.samples(request, self.layout);
+            }
+            RequestWork::Prepared(clip)
                 if *window
                     == Window::whole(clip.track_count(), part.timeline.len(), self.layout) =>
             {
                 return clip.samples(&part.timeline, self.layout);
             }
-            Ok(_) => {}
+            _ => {}
         }
         let mut quats = OutputBuffer::new(window.len())?;
-        self.fill(&part, bytemuck::cast_slice_mut(&mut quats))?;
+        self.fill_by(&work, &part, bytemuck::cast_slice_mut(&mut quats))?;
         let (tracks, samples) = (window.tracks.len(), window.samples.len());
         Ok(Samples::new(Box::new(quats), tracks, samples, self.layout))
     }
 
     /// Evaluates a part of the result into `bytes`, in the request's encoding; refuses what does not fit.
     fn fill(&self, part: &RequestPart, bytes: &mut [u8]) -> Result<(), Error> {
+        self.fill_by(&self.source.work(part)?, part, bytes)
+    }
+
+    fn fill_by(
+        &self,
+        work: &RequestWork<'_>,
+        part: &RequestPart,
+        bytes: &mut [u8],
+    ) -> Result<(), Error> {
         let encoding = self.encoding;
         let output = EncodedOutput { encoding, bytes };
-        match self.source.prepared_or_set(part) {
-            Ok(clip) => clip.fill_window(&part.timeline, &part.window, output),
-            Err(SetWork { engine, request }) => engine.fill_request(&request, self.layout, output),
+        match work {
+            RequestWork::Prepared(clip) => clip.fill_window(&part.timeline, &part.window, output),
+            RequestWork::Set(SetWork { engine, request }) => {
+                engine.fill_request(request, self.layout, output)
+            }
+            RequestWork::Groups { engine, groups } => {
+                groups.fill(engine, &part.timeline, &part.window, output)
+            }
         }
     }
 
@@ -422,7 +441,7 @@ impl Request<'_> {
 
     /// The sample times of the request, and the part of them that the result has.
     pub(crate) fn part(&self) -> Result<RequestPart, Error> {
-        check_encoding(self.encoding, self.source.quantity())?;
+        check_encoding(self.encoding, self.source.quantity()?)?;
         let timeline = self.source.timeline(self.frames)?;
         let (tracks, samples) = (self.source.track_count(), timeline.len());
         let part = |asked: &Option<Range<usize>>, all| asked.clone().unwrap_or(0..all);

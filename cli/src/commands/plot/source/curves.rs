@@ -119,7 +119,9 @@ impl PlotSource<'_> {
             let of = |(name, colour): (&str, colours::Colour)| line(name.to_owned(), colour);
             NAMES.into_iter().zip(COMPONENTS).map(of).collect()
         } else {
-            let of = |one: &CurveChoice| line(one.method.name().to_owned(), one.method.colour());
+            let of = |one: &CurveChoice| {
+                line(one.method.name().to_owned(), colours::of_choice(one.method))
+            };
             self.choices.iter().map(of).collect()
         };
         let drawn = match subject {
@@ -164,7 +166,7 @@ impl PlotSource<'_> {
             for &component in components {
                 let (colour, ink) = match together {
                     true => (COMPONENTS[component], COMPONENTS[component]),
-                    false => (choice.method.colour(), INK),
+                    false => (colours::of_choice(choice.method), INK),
                 };
                 let values = rotations.iter().map(|q| value(q, component));
                 curves.push(PlotCurve {
@@ -250,7 +252,7 @@ impl PlotSource<'_> {
             let velocities = velocities.as_slice().iter();
             let speeds = velocities.map(|v| f64::from(v.truncate().length()));
             curves.push(PlotCurve {
-                colour: choice.method.colour(),
+                colour: colours::of_choice(choice.method),
                 width: self.width(order).min(2.5),
                 opacity: 1.0,
                 pieces: vec![thinned(&self.points(speeds), 2000)],
@@ -289,7 +291,7 @@ impl PlotSource<'_> {
                     thinned(&powers.collect::<Vec<_>>(), 2000)
                 });
             curves.push(PlotCurve {
-                colour: choice.method.colour(),
+                colour: colours::of_choice(choice.method),
                 width: 1.2,
                 opacity: 1.0,
                 pieces: pieces.collect(),
@@ -324,7 +326,7 @@ impl PlotSource<'_> {
             let interpolation = self.interpolation(choice, index);
             let rotations = self.evaluate(device, index, interpolation)?;
             let path: Vec<DVec3> = rotations.iter().map(|&q| seen(q, axis)).collect();
-            let colour = choice.method.colour();
+            let colour = colours::of_choice(choice.method);
             for (front, opacity) in [(false, 0.3), (true, 1.0)] {
                 curves.push(PlotCurve {
                     colour,

@@ -1,0 +1,618 @@
+//! Compares two clips at the same sample times.
+
+use std::collections::HashSet;
+
+use glam::{DVec3, Quat, Vec3};
+use serde::Serialize;
+use tumble::reference::angle_between;
+use tumble::{Channel, Engine, FrameRate, JointMatchError, JointPairs, Joints, SampleTimes};
+
+use crate::motion::Motion;
+use crate::motion::compare::CompareError;
+use crate::motion::compare::tally::{Spread, Tally};
+use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::world::world;
+use crate::names::{TRAJECTORY_TRACK, distinct_names};
+
+/// Time spans whose ends differ by less than this are equal, in seconds: f32 times of some hours are not more exact.
+const SAME_END: f64 = 1e-3;
+
+/// Two clips to compare.
+#[derive(Debug, Clone, Copy)]
+pub struct ClipPair<'a> {
+    /// Names of the clips in messages.
+    pub inputs: [&'a str; 2],
+    /// The clips.
+    pub clips: [&'a Motion; 2],
+}
+
+/// The times that two clips have in common, in seconds, on the clock of the first clip.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct CommonTimes {
+    /// First common time, in seconds.
+    pub start: f64,
+    /// Last common time, in seconds.
+    pub end: f64,
+    /// A warning if the time spans of the clips differ; it names both spans and the common one.
+    pub warning: Option<String>,
+}
+
+/// The tracks of two clips that belong together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MatchedTracks {
+    /// The index of each pair's track in the first clip and in the second.
+    pub pairs: Vec<[usize; 2]>,
+    /// Names of the tracks that only the first clip has, and of those that only the second clip has.
+    pub missing: [Vec<String>; 2],
+}
+
+/// The differences of two clips.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct ClipDifference {
+    /// Names of the clips in messages.
+    pub inputs: [String; 2],
+    /// Number of tracks that both clips have.
+    pub tracks: usize,
+    /// Names of the tracks that only the first clip has, and of those that only the second clip has.
+    pub missing: [Vec<String>; 2],
+    /// Number of samples of each track.
+    pub samples: usize,
+    /// First and last sample time, in seconds, on the clock of the first clip.
+    pub span: [f64; 2],
+    /// Number of rotations whose bits are equal, up to the sign of the quaternion.
+    pub identical: u64,
+    /// Angles between the rotations, in degrees.
+    pub rotation: ChannelDifference,
+    /// Distances between the translations, in the files' unit of length; `None` if neither clip has translations.
+    pub translation: Option<ChannelDifference>,
+    /// Lengths of the differences of the scales; `None` if neither clip has scales.
+    pub scale: Option<ChannelDifference>,
+    /// The differences of each track that both clips have, in the order of the first clip.
+    pub joints: Vec<JointDifference>,
+}
+
+/// The differences of one track.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct JointDifference {
+    /// Name of the track.
+    pub track: String,
+    /// Angles between the rotations, in degrees.
+    pub rotation: TimedSpread,
+    /// Distances between the translations, in the files' unit of length; `None` if neither clip has translations.
+    pub translation: Option<TimedSpread>,
+    /// Lengths of the differences of the scales; `None` if neither clip has scales.
+    pub scale: Option<TimedSpread>,
+}
+
+/// Statistics of differences over time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct TimedSpread {
+    /// Mean, root mean square and maximum of the differences.
+    #[serde(flatten)]
+    pub spread: Spread,
+    /// Time of the largest difference, in seconds, on the clock of the first clip.
+    pub time: f64,
+    /// The time in frames of the first clip, from 0 at its first key; half frames lie between two frames. `None` if
+    /// its keys are not frames of a rate.
+    pub frame: Option<f64>,
+}
+
+/// The differences of one channel.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct ChannelDifference {
+    /// Mean, root mean square and maximum of the differences.
+    #[serde(flatten)]
+    pub spread: Spread,
+    /// Name of the track with the largest difference.
+    pub track: String,
+    /// Time of the largest difference, in seconds, on the clock of the first clip.
+    pub time: f64,
+    /// The time in frames of the first clip, from 0 at its first key; half frames lie between two frames. `None` if
+    /// its keys are not frames of a rate.
+    pub frame: Option<f64>,
+}
+
+/// The differences of one channel, of all tracks together and of each.
+struct ChannelTallies {
+    all: Tally,
+    each: Vec<Tally>,
+}
+
+impl ChannelTallies {
+    fn new(tracks: usize) -> Self {
+        Self {
+            all: Tally::default(),
+            each: vec![Tally::default(); tracks],
+        }
+    }
+
+    /// Adds the difference of a track at the next sample.
+    fn add(&mut self, track: usize, difference: f64) {
+        self.all.add(difference);
+        self.each[track].add(difference);
+    }
+}
+
+impl ClipPair<'_> {
+    /// The times that lie in both clips.
+    ///
+    /// # Errors
+    /// When the time spans of the clips do not overlap.
+    pub fn common_times(&self) -> Result<CommonTimes, CompareError> {
+        let shifts = [0.0, self.shift()];
+        let spans = [0, 1].map(|side| {
+            let (first, last) = self.clips[side].set.time_span().unwrap_or((0.0, 0.0));
+            [first - shifts[side], last - shifts[side]]
+        });
+        let clock = self.clips[0].time_offset as f64;
+        let on_clock = |span: [f64; 2]| span.map(|time| time + clock);
+        let start = spans[0][0].max(spans[1][0]);
+        let end = spans[0][1].min(spans[1][1]);
+        let differs = |end: usize| (spans[0][end] - spans[1][end]).abs() > SAME_END;
+        let is_longer = differs(0) || differs(1);
+        if is_longer && start > end {
+            return Err(CompareError::NoTimeInBoth {
+                inputs: self.inputs.map(str::to_owned),
+                spans: spans.map(on_clock),
+            });
+        }
+        let warning = is_longer.then(|| {
+            let [first, second] = [0, 1].map(|side| {
+                let [first, last] = on_clock(spans[side]);
+                format!("{} from {first} to {last} s", self.inputs[side])
+            });
+            let [start, end] = on_clock([start, end]);
+            format!(
+                "the keys of both do not lie at the same times: {first}, {second}; compared from {start} to \
+                 {end} s"
+            )
+        });
+        Ok(CommonTimes {
+            start,
+            end,
+            warning,
+        })
+    }
+
+    /// The sample times of a comparison: `common.start`, `common.end`, all key times of both clips between them, and
+    /// the middle of each interval between these times.
+    #[must_use]
+    pub fn keys(&self, common: &CommonTimes) -> SampleTimes {
+        let (start, end) = (common.start, common.end);
+        let mut times: Vec<f64> = self.clips[0].key_times();
+        let others = self.clips[1].key_times();
+        times.extend(others.iter().map(|time| time - self.shift()));
+        times.retain(|time| (start..=end).contains(time));
+        times.extend([start, end]);
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let middles: Vec<f64> = (times.windows(2))
+            .map(|pair| f64::midpoint(pair[0], pair[1]))
+            .collect();
+        times.extend(middles);
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        SampleTimes::at(times)
+    }
+
+    /// The sample times of a comparison at a rate, from `start` to `end` on the clock of the first clip, or over all
+    /// common times. A range that is longer than these is cut to them.
+    ///
+    /// # Errors
+    /// When the range has no common time.
+    pub fn frames(
+        &self,
+        common: &CommonTimes,
+        rate: FrameRate,
+        start: Option<f64>,
+        end: Option<f64>,
+    ) -> Result<SampleTimes, CompareError> {
+        let whole = (common.start, common.end);
+        let (start, end) = self.clips[0].range_in_set(start, end, whole);
+        if start > common.end || end < common.start {
+            return Err(self.no_common_time(common, start, end));
+        }
+        Ok(SampleTimes::rate(rate).between(start.max(common.start), end.min(common.end)))
+    }
+
+    /// The sample times of a comparison at these times, on the clock of the first clip; those that only one clip has
+    /// are left out.
+    ///
+    /// # Errors
+    /// When none of them is a common time.
+    pub fn at(&self, common: &CommonTimes, times: &[f64]) -> Result<SampleTimes, CompareError> {
+        let times = times.iter().map(|&time| self.clips[0].time_in_set(time));
+        let times: Vec<f64> = times.collect();
+        let low = times.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let within = common.start - SAME_END..=common.end + SAME_END;
+        let shared: Vec<f64> = times.into_iter().filter(|it| within.contains(it)).collect();
+        match shared.is_empty() {
+            true => Err(self.no_common_time(common, low, high)),
+            false => Ok(SampleTimes::at(shared)),
+        }
+    }
+
+    fn no_common_time(&self, common: &CommonTimes, start: f64, end: f64) -> CompareError {
+        let clock = self.clips[0].time_offset as f64;
+        CompareError::RangeOutside {
+            inputs: self.inputs.map(str::to_owned),
+            range: [start, end].map(|time| time + clock),
+            common: [common.start, common.end].map(|time| time + clock),
+        }
+    }
+
+    /// Compares the clips at the times `frames`, in seconds, on the clock of the first clip. With `in_world` the
+    /// poses are relative to the world, otherwise to the parents.
+    ///
+    /// # Errors
+    /// When no track of one clip corresponds to a track of the other, when a track has another parent and the poses are
+    /// relative to the parents, when a clip cannot be sampled, or when poses in the world cannot be computed.
+    pub fn differences(
+        &self,
+        engine: &Engine,
+        frames: &SampleTimes,
+        in_world: bool,
+    ) -> Result<ClipDifference, CompareError> {
+        let (inputs, motions) = (self.inputs, self.clips);
+        let found = self.matched_joints()?;
+        self.check_any_pair(&found)?;
+        if in_world {
+            self.check_known_parents(&found.matched.pairs)?;
+        } else {
+            let [first, second] = &found.joints;
+            first.check_parents(second, &found.matched, inputs)?;
+            self.check_spaces()?;
+        }
+        let missing = found.missing();
+        let pairs = found.matched.pairs;
+        let (first, of_first) = poses(engine, inputs[0], motions[0], frames, in_world)?;
+        let shift = self.shift();
+        let moved;
+        let frames = match shift == 0.0 {
+            true => frames,
+            false => {
+                let times = first.times.iter().map(|time| time + shift);
+                moved = SampleTimes::at(times.collect::<Vec<_>>());
+                &moved
+            }
+        };
+        let (second, of_second) = poses(engine, inputs[1], motions[1], frames, in_world)?;
+        let (sampled, origins) = ([first, second], [of_first, of_second]);
+        let times = &sampled[0].times;
+        let counts = motions.map(|clip| clip.set.track_count());
+        // Differences at [sample][pair].
+        let each = || {
+            let samples = 0..times.len();
+            samples.flat_map(|sample| {
+                let pairs = pairs.iter().enumerate();
+                pairs.map(move |(track, pair)| {
+                    (track, [0, 1].map(|side| sample * counts[side] + pair[side]))
+                })
+            })
+        };
+        let mut angles = ChannelTallies::new(pairs.len());
+        let mut identical = 0;
+        for (track, [a, b]) in each() {
+            let (a, b) = (sampled[0].rotations[a], sampled[1].rotations[b]);
+            let bits = |q: Quat| q.to_array().map(f32::to_bits);
+            identical += u64::from(bits(a) == bits(b) || bits(a) == bits(-b));
+            angles.add(track, angle_between(a.as_dquat(), b.as_dquat()));
+        }
+        let clock = motions[0].time_offset as f64;
+        let frames = FrameNumbers::of(motions[0]);
+        let timed = |tally: Tally, sample: usize, factor| {
+            let time = times.get(sample).copied().unwrap_or(0.0);
+            TimedSpread {
+                spread: tally.times(factor),
+                time: time + clock,
+                frame: frames.map(|frames| frames.of_time(time)),
+            }
+        };
+        let name = |pair: &[usize; 2]| motions[0].set.track_name(pair[0]);
+        let of_all = |tallies: &ChannelTallies, factor| {
+            let (tally, count) = (tallies.all, pairs.len().max(1));
+            let index = tally.largest_at as usize;
+            let TimedSpread {
+                spread,
+                time,
+                frame,
+            } = timed(tally, index / count, factor);
+            ChannelDifference {
+                spread,
+                track: pairs.get(index % count).map_or_else(String::new, name),
+                time,
+                frame,
+            }
+        };
+        let of_track = |tallies: &ChannelTallies, track: usize, factor| {
+            let tally = tallies.each[track];
+            timed(tally, tally.largest_at as usize, factor)
+        };
+        let apart = |values: fn(&Samples) -> &[Vec3], channel| {
+            if sampled.iter().all(|samples| values(samples).is_empty()) {
+                return None;
+            }
+            let value = |side: usize, index: usize| {
+                let rest = || motions[side].rest(channel, index % counts[side]);
+                let relative = values(&sampled[side]).get(index).copied();
+                let origin = match channel {
+                    Channel::Translation => origins[side].get(index % counts[side]).copied(),
+                    Channel::Scale => None,
+                };
+                origin.unwrap_or_default() + relative.unwrap_or_else(rest).as_dvec3()
+            };
+            let mut tallies = ChannelTallies::new(pairs.len());
+            for (track, [a, b]) in each() {
+                tallies.add(track, value(0, a).distance(value(1, b)));
+            }
+            Some(tallies)
+        };
+        let translations = apart(|samples| &samples.translations, Channel::Translation);
+        let scales = apart(|samples| &samples.scales, Channel::Scale);
+        let degrees = 1f64.to_degrees();
+        let joints = pairs.iter().enumerate().map(|(track, pair)| {
+            let lengths = |tallies: &ChannelTallies| of_track(tallies, track, 1.0);
+            JointDifference {
+                track: name(pair),
+                rotation: of_track(&angles, track, degrees),
+                translation: translations.as_ref().map(lengths),
+                scale: scales.as_ref().map(lengths),
+            }
+        });
+        let joints = joints.collect();
+        let lengths = |tallies: &ChannelTallies| of_all(tallies, 1.0);
+        Ok(ClipDifference {
+            inputs: inputs.map(str::to_owned),
+            tracks: pairs.len(),
+            missing,
+            samples: times.len(),
+            span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0) + clock),
+            identical,
+            rotation: of_all(&angles, degrees),
+            translation: translations.as_ref().map(lengths),
+            scale: scales.as_ref().map(lengths),
+            joints,
+        })
+    }
+
+    /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
+    /// different whole seconds.
+    #[must_use]
+    pub fn shift(&self) -> f64 {
+        let [first, second] = self.clips;
+        (first.time_offset - second.time_offset) as f64
+    }
+
+    /// Refuses rotations relative to the parents beside rotations relative to the world.
+    ///
+    /// # Errors
+    /// Which clip has the ones and which the others.
+    pub fn check_spaces(&self) -> Result<(), CompareError> {
+        let [first, second] = self.clips.map(|clip| clip.is_world);
+        let has_parents = |clip: &&Motion| clip.skeleton.iter().any(|joint| joint.parent.is_some());
+        if first == second || !self.clips.iter().any(has_parents) {
+            return Ok(());
+        }
+        let world = usize::from(second);
+        Err(CompareError::Spaces {
+            world: self.inputs[world].to_owned(),
+            local: self.inputs[1 - world].to_owned(),
+        })
+    }
+
+    /// The assumptions by which the clips are compared, for warnings: that two tracks are the same although their names
+    /// differ, because each clip has one track; that joints of one name have the same order in both clips.
+    #[must_use]
+    pub fn assumptions(&self) -> Vec<String> {
+        let of_order = |side: usize| self.clips[side].order_assumption(self.inputs[side]);
+        let by_order = of_order(0).or_else(|| of_order(1));
+        self.single_track_assumption()
+            .into_iter()
+            .chain(by_order)
+            .collect()
+    }
+
+    fn single_track_assumption(&self) -> Option<String> {
+        let [first, second] = self.clips.map(|clip| {
+            let name = clip.set.get(0)?.name?;
+            // Readers of trajectories make up this name.
+            (name != TRAJECTORY_TRACK && clip.set.track_count() == 1).then_some(name)
+        });
+        let (first, second) = (first?, second?);
+        (first != second).then(|| {
+            format!(
+                "`{first}` of {} is compared with `{second}` of {}: each has one track",
+                self.inputs[0], self.inputs[1]
+            )
+        })
+    }
+
+    /// Refuses tracks of `parts` whose parents in these clips are not the same: rotations relative to other parents
+    /// cannot be compared. `parts` are selected tracks of these clips, or all of them.
+    ///
+    /// # Errors
+    /// The first track with another parent.
+    pub fn check_parents(&self, parts: [&Motion; 2]) -> Result<(), CompareError> {
+        let MatchedJoints { joints, matched } = self.matched_joints()?;
+        let selected = parts.map(|part| -> HashSet<String> {
+            let tracks = 0..part.set.track_count();
+            tracks.map(|track| part.set.track_name(track)).collect()
+        });
+        let is_selected = |pair: [usize; 2]| {
+            (0..2).all(|side| selected[side].contains(&joints[side].names()[pair[side]]))
+        };
+        let [first, second] = &joints;
+        first.check_parents_of(second, &matched, is_selected, self.inputs)?;
+        Ok(())
+    }
+
+    /// The tracks of both clips, matched.
+    fn matched_joints(&self) -> Result<MatchedJoints, JointMatchError> {
+        let joints = self.clips.map(Motion::joints);
+        // Two tracks need no name to tell them apart.
+        let matched = if joints.iter().all(|side| side.len() == 1) {
+            JointPairs::in_order(1)
+        } else {
+            // Formats without room for a name that occurs twice number it.
+            let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
+            match first == second {
+                true => JointPairs::in_order(first.len()),
+                false => joints[0].pairs(&joints[1], self.inputs)?,
+            }
+        };
+        Ok(MatchedJoints { joints, matched })
+    }
+
+    /// Refuses, in the world, pairs of tracks of which one has a parent and the other is of a clip without a skeleton.
+    ///
+    /// # Errors
+    /// Names the first such pair.
+    pub fn check_known_parents(&self, pairs: &[[usize; 2]]) -> Result<(), CompareError> {
+        check_known_parents(self.inputs, self.clips, pairs)
+    }
+
+    /// The tracks that both clips have, by their names, and those that only one has.
+    ///
+    /// # Errors
+    /// When the names do not tell the tracks apart, or when the clips have no track in common.
+    pub fn tracks(&self) -> Result<MatchedTracks, CompareError> {
+        let found = self.matched_joints()?;
+        self.check_any_pair(&found)?;
+        Ok(MatchedTracks {
+            missing: found.missing(),
+            pairs: found.matched.pairs,
+        })
+    }
+
+    /// Refuses clips without a common track.
+    fn check_any_pair(&self, found: &MatchedJoints) -> Result<(), CompareError> {
+        if !found.matched.pairs.is_empty() {
+            return Ok(());
+        }
+        let [first, second] = &found.joints;
+        let error = first.order_of(second, self.inputs).err();
+        if let Some(error @ JointMatchError::Unnamed { .. }) = error {
+            return Err(error.into());
+        }
+        Err(CompareError::NoTrackInBoth {
+            inputs: self.inputs.map(str::to_owned),
+            tracks: [first.len(), second.len()],
+            near: error.and_then(|error| match error {
+                JointMatchError::Missing { name, near, .. } => Some([name, near?]),
+                _ => None,
+            }),
+        })
+    }
+}
+
+/// The joints of two clips, and which are the same.
+struct MatchedJoints {
+    joints: [Joints; 2],
+    matched: JointPairs,
+}
+
+impl MatchedJoints {
+    /// The names of the joints that only one clip has.
+    fn missing(&self) -> [Vec<String>; 2] {
+        [0, 1].map(|side| {
+            let lone = self.matched.missing[side].iter();
+            lone.map(|&track| self.joints[side].names()[track].clone())
+                .collect()
+        })
+    }
+}
+
+/// Refuses, in the world, pairs of tracks of which one has a parent and the other is of a clip without a skeleton: its
+/// rotations may be relative to a parent that the clip does not know.
+pub(super) fn check_known_parents(
+    inputs: [&str; 2],
+    clips: [&Motion; 2],
+    pairs: &[[usize; 2]],
+) -> Result<(), CompareError> {
+    let has_parent = |side: usize, track: usize| {
+        let joint = clips[side].skeleton.get(track);
+        joint.is_some_and(|joint| joint.parent.is_some())
+    };
+    for without in [0, 1] {
+        let with = 1 - without;
+        let clip = clips[without];
+        if !clip.skeleton.is_empty() || clip.is_world {
+            continue;
+        }
+        if let Some(pair) = pairs.iter().find(|pair| has_parent(with, pair[with])) {
+            return Err(CompareError::NoSkeleton {
+                without: inputs[without].to_owned(),
+                with: inputs[with].to_owned(),
+                joint: clips[with].set.track_name(pair[with]),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Numbers the frames of a clip, from 0 at its first key.
+#[derive(Debug, Clone, Copy)]
+struct FrameNumbers {
+    first: f64,
+    per_second: f64,
+}
+
+impl FrameNumbers {
+    /// `None` if the keys are not frames of a rate.
+    fn of(clip: &Motion) -> Option<Self> {
+        let rate = clip.rate.or_else(|| clip.rate_of_keys())?;
+        Some(Self {
+            first: clip.set.time_span()?.0,
+            per_second: rate.per_second(),
+        })
+    }
+
+    /// The frame of a time in the set, rounded to a thousandth.
+    fn of_time(self, time: f64) -> f64 {
+        let frame = (time - self.first) * self.per_second;
+        (frame * 1e3).round() / 1e3
+    }
+}
+
+/// All poses of a clip, and the origin to add to the translations of each track.
+fn poses(
+    engine: &Engine,
+    input: &str,
+    clip: &Motion,
+    frames: &SampleTimes,
+    in_world: bool,
+) -> Result<(Samples, Vec<DVec3>), CompareError> {
+    let mut samples = ChannelMethods::AUTHORED
+        .sample(engine, clip, frames)
+        .map_err(|error| CompareError::Evaluating {
+            input: input.to_owned(),
+            error,
+        })?;
+    if !in_world {
+        return Ok((samples, clip.origins.clone()));
+    }
+    let poses = world(clip, &samples).map_err(|error| CompareError::Hierarchy {
+        input: input.to_owned(),
+        error,
+    })?;
+    samples.rotations = poses.iter().map(|pose| pose.rotation).collect();
+    let tracks = clip.set.track_count();
+    let mut origins = vec![DVec3::ZERO; tracks];
+    if !clip.origins.is_empty() {
+        let first = origins.iter_mut().zip(&poses);
+        first.for_each(|(origin, pose)| *origin = pose.position);
+    }
+    let each = poses.iter().enumerate();
+    samples.translations = each
+        .map(|(index, pose)| (pose.position - origins[index % tracks]).as_vec3())
+        .collect();
+    samples.scales.clear();
+    Ok((samples, origins))
+}

@@ -1,0 +1,431 @@
+//! The methods of `tumble.Clip`.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use tumble::{Channel, Layout};
+
+use crate::arrays::{ListArgument, Order};
+use crate::build::{ClipArguments, ClipKeys, KeysLayout};
+use crate::clip::{Clip, counted};
+use crate::engine::{default_engine, layout_named};
+use crate::errors::{guarded, input};
+use crate::options::frame_rate;
+use crate::pickle::{is_same, state};
+use crate::run::work;
+
+impl PartialEq for Clip {
+    /// Whether both have the same tracks, keys and skeleton, whatever files they come from.
+    fn eq(&self, other: &Self) -> bool {
+        is_same(&self.motion, &other.motion)
+    }
+}
+
+#[pymethods]
+impl Clip {
+    #[new]
+    #[pyo3(signature = (
+        times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
+        translations=None, scales=None, velocities=None, tangents=None, tcb=None
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn new(
+        times: &Bound<'_, PyAny>,
+        keys: &Bound<'_, PyAny>,
+        order: &str,
+        layout: Option<&str>,
+        name: Option<String>,
+        names: Option<ListArgument<String>>,
+        parents: Option<ListArgument<Option<i64>>>,
+        offsets: Option<&Bound<'_, PyAny>>,
+        translations: Option<&Bound<'_, PyAny>>,
+        scales: Option<&Bound<'_, PyAny>>,
+        velocities: Option<&Bound<'_, PyAny>>,
+        tangents: Option<&Bound<'_, PyAny>>,
+        tcb: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        guarded(|| {
+            let names = names.map(|names| names.0);
+            let order = Order::named(order)?;
+            let layout = layout.map(layout_named).transpose()?;
+            let arrays = ClipKeys::new(
+                times,
+                keys,
+                order,
+                KeysLayout::Argument {
+                    layout,
+                    has_names: names.is_some(),
+                },
+            )?;
+            let tracks = arrays.track_count();
+            if let Some(names) = names.as_ref().filter(|names| names.len() != tracks) {
+                return Err(input(format!(
+                    "names: there are {} for {tracks} tracks",
+                    names.len()
+                )));
+            }
+            let arguments = ClipArguments {
+                parents: parents.map(|parents| parents.0),
+                offsets,
+                translations,
+                scales,
+                velocities,
+                tangents,
+                tcb,
+            };
+            let layout = layout.unwrap_or(Layout::TrackMajor);
+            let parts = arguments.read(tracks, names.as_deref(), layout)?;
+            let motion = work(times.py(), arrays.key_count(), move || {
+                let mut motion = arrays.clip(names.as_deref())?;
+                parts.put_into(&mut motion, order)?;
+                motion.name = name;
+                Ok(motion)
+            })?;
+            Ok(Self {
+                motion: Arc::new(motion),
+                source: None,
+            })
+        })
+    }
+
+    /// The clip's name, or None.
+    #[getter]
+    fn name(&self) -> Option<&str> {
+        self.motion.name.as_deref()
+    }
+
+    /// The tracks' names; `box1`, `box2` … where there are none.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        let tracks = 0..self.motion.set.track_count();
+        tracks
+            .map(|track| self.motion.set.track_name(track))
+            .collect()
+    }
+
+    /// The index of the parent of each track, None for roots; None without a skeleton.
+    #[getter]
+    fn parents(&self) -> Option<Vec<Option<usize>>> {
+        let skeleton = &self.motion.skeleton;
+        (!skeleton.is_empty()).then(|| skeleton.iter().map(|joint| joint.parent).collect())
+    }
+
+    /// Where each track rests in its parent's frame, (tracks, 3); None without a skeleton.
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let skeleton = &self.motion.skeleton;
+        let offsets = skeleton.iter().map(|joint| joint.rest.translation);
+        if skeleton.is_empty() {
+            return Ok(None);
+        }
+        if self.motion.origins.is_empty() {
+            return vectors(py, offsets).map(Some);
+        }
+        let each = offsets.enumerate();
+        let positions = each.map(|(track, offset)| self.motion.origin(track) + offset.as_dvec3());
+        doubles(py, positions).map(Some)
+    }
+
+    /// The origin that was subtracted from the translations of each track, (tracks, 3), float64, so that f32
+    /// is enough for the rest of positions such as those of maps; None where none was. Positions that the
+    /// package returns or writes have it added again, in float64.
+    #[getter]
+    fn origins<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let tracks = 0..self.motion.set.track_count();
+        match self.motion.origins.is_empty() {
+            true => Ok(None),
+            false => doubles(py, tracks.map(|track| self.motion.origin(track))).map(Some),
+        }
+    }
+
+    /// The rate on whose frames all key times lie, a Fraction in frames per second, or None.
+    #[getter]
+    fn rate<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(rate) = self.motion.rate else {
+            return Ok(None);
+        };
+        let fraction = py.import("fractions")?.getattr("Fraction")?;
+        fraction.call1((rate.to_string(),)).map(Some)
+    }
+
+    /// The first and the last key time, seconds.
+    #[getter]
+    fn span(&self) -> (f64, f64) {
+        self.motion.set.time_span().unwrap_or((0.0, 0.0))
+    }
+
+    /// Seconds from the first key to the last.
+    #[getter]
+    fn duration(&self) -> f64 {
+        let (first, last) = self.span();
+        last - first
+    }
+
+    /// How many keys all tracks have together.
+    #[getter]
+    fn key_count(&self) -> usize {
+        self.motion.set.key_count()
+    }
+
+    /// The whole second from which the times of the clip are counted where the file's clock counts
+    /// from 1970 or so; 0 for most files. `at`, `start` and `end` accept times of the file, too.
+    #[getter]
+    fn time_offset(&self) -> i64 {
+        self.motion.time_offset
+    }
+
+    /// Whether rotations and translations are relative to the world instead of the parent.
+    #[getter]
+    fn is_world(&self) -> bool {
+        self.motion.is_world
+    }
+
+    /// The file that it was read from, or None.
+    #[getter]
+    fn path(&self) -> Option<PathBuf> {
+        Some(self.source.as_ref()?.path.clone())
+    }
+
+    /// That of clips that are the same is the same.
+    fn __hash__(&self) -> u64 {
+        let set = &self.motion.set;
+        let (first, last) = self.span();
+        let mut hasher = DefaultHasher::new();
+        (set.track_count(), set.key_count(), &self.motion.name).hash(&mut hasher);
+        // Both zeros are the same time.
+        [first + 0.0, last + 0.0]
+            .map(f64::to_bits)
+            .hash(&mut hasher);
+        hasher.finish()
+    }
+
+    /// Its arrays, of which pickles of protocol 5 hand on the memory. What is kept of its file beside
+    /// the clip stays behind: a copy is saved as a clip without a file.
+    fn __reduce_ex__<'py>(
+        slf: &Bound<'py, Self>,
+        _protocol: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let again = py.import("tumble._tumble")?.getattr("clip_of_state")?;
+        let state = guarded(|| state(py, slf.get()))?;
+        PyTuple::new(py, [again, PyTuple::new(py, [state])?.into_any()])
+    }
+
+    /// Clips do not change: the copy is the clip.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    /// The number of tracks.
+    fn __len__(&self) -> usize {
+        self.motion.set.track_count()
+    }
+
+    fn __repr__(&self) -> String {
+        let set = &self.motion.set;
+        let name = self.motion.name.as_deref();
+        let name = name.map_or_else(String::new, |name| format!("{name:?}: "));
+        let (first, last) = self.span();
+        let rate = self.motion.rate;
+        let rate = rate.map_or_else(String::new, |rate| format!(", {rate} fps"));
+        format!(
+            "Clip({name}{}, {}, {first} to {last} s{rate})",
+            counted(set.track_count(), "track"),
+            counted(set.key_count(), "key")
+        )
+    }
+
+    /// The key times of a track, by its index or name: (keys,), float64, seconds.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]], names=["hip"])
+    /// >>> clip.times("hip")
+    /// array([0. , 0.5])
+    fn times<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let track = self.track(track)?;
+        Ok(PyArray1::from_slice(py, self.motion.set.track(track).times))
+    }
+
+    /// The keys of a track, by its index or name: (keys, 4), float32; `order` says what the
+    /// components are.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.keys(0, order="wxyz")
+    /// array([[1., 0., 0., 0.],
+    ///        [0., 1., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (track, *, order="xyzw"))]
+    fn keys<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+        order: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let order = Order::named(order)?;
+        let track = self.track(track)?;
+        let keys = self.motion.set.track(track).keys.iter();
+        let numbers: Vec<f32> = keys.flat_map(|key| order.of_xyzw(key.to_array())).collect();
+        let count = numbers.len() / 4;
+        PyArray1::from_vec(py, numbers).reshape([count, 4])
+    }
+
+    /// The translation keys of a track, by its index or name: their times (keys,), seconds, and
+    /// their values (keys, 3), float32 (float64 where the track has one of the `origins`), in the file's
+    /// units; None for a track without.
+    fn translations<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        self.vector_keys(py, Channel::Translation, track)
+    }
+
+    /// The scale keys of a track; otherwise as `translations`.
+    fn scales<'py>(
+        &self,
+        py: Python<'py>,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        self.vector_keys(py, Channel::Scale, track)
+    }
+
+    /// How many frames the clip has at a rate, from its first key to its last.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.frames("30000/1001")
+    /// 60
+    fn frames(&self, fps: &Bound<'_, PyAny>) -> PyResult<usize> {
+        let rate = crate::options::SampleChoice::Rate(frame_rate(fps)?, None, None);
+        Ok(rate.resolved(&self.motion)?.1)
+    }
+
+    /// As `Engine.evaluate`, by an engine that is shared by all calls and chooses its device.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
+    /// array([[0., 0., 0., 1.],
+    ///        [1., 0., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn evaluate<'py>(
+        slf: &Bound<'py, Self>,
+        out: Option<&Bound<'py, PyAny>>,
+        order: &str,
+        layout: &str,
+        as_rotation: bool,
+        dtype: Option<&Bound<'py, PyAny>>,
+        device_array: bool,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let engine = default_engine(slf.py())?;
+        let engine = engine.get();
+        engine.evaluate(
+            slf,
+            out,
+            order,
+            layout,
+            as_rotation,
+            dtype,
+            device_array,
+            options,
+        )
+    }
+
+    /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
+    ///
+    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is an index or a name, `axes` those
+    /// of matplotlib to draw on, the other options are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> axes = clip.plot(method="slerp")  # doctest: +SKIP
+    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options), text_signature = "($self, track=None, *, fps=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes=None)")]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        track: Option<&Bound<'py, PyAny>>,
+        fps: Option<&Bound<'py, PyAny>>,
+        axes: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let notebook = slf.py().import("tumble._notebook")?;
+        notebook.call_method("plot", (slf, track, fps, axes), options)
+    }
+
+    /// The page of `tumble view`: the bones or boxes moving, to be looked at from any side. The last
+    /// value of a notebook's cell is shown in its output; `save(path)` writes the page, `html` is
+    /// its text.
+    ///
+    /// `view(*, methods=None, fps=60, start=None, end=None, height=520)`: the `methods` to choose
+    /// from, names or "all"; `height` is that of the output, pixels.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> page = clip.view(methods=["slerp"])
+    /// >>> page.html.startswith("<!doctype html>")
+    /// True
+    #[pyo3(signature = (**options), text_signature = "($self, *, methods=None, fps=60, start=None, end=None, height=520)")]
+    fn view<'py>(
+        slf: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let notebook = slf.py().import("tumble._notebook")?;
+        notebook.call_method("view", (slf,), options)
+    }
+}
+
+impl Clip {
+    fn vector_keys<'py>(
+        &self,
+        py: Python<'py>,
+        channel: Channel,
+        track: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+        let track = self.track(track)?;
+        let Some(channel_keys) = self.motion.set.vector_keys(channel, track) else {
+            return Ok(None);
+        };
+        let times = PyArray1::from_slice(py, channel_keys.times).into_any();
+        let origin = self.motion.origin(track);
+        if channel == Channel::Translation && origin != DVec3::ZERO {
+            let positions = channel_keys.keys.iter().map(|key| origin + key.as_dvec3());
+            return Ok(Some((times, doubles(py, positions)?)));
+        }
+        Ok(Some((
+            times,
+            vectors(py, channel_keys.keys.iter().copied())?,
+        )))
+    }
+}
+
+/// Vectors as an array (n, 3) of float64.
+fn doubles(py: Python<'_>, of: impl Iterator<Item = DVec3>) -> PyResult<Bound<'_, PyAny>> {
+    let numbers: Vec<f64> = of.flat_map(|vector| vector.to_array()).collect();
+    let count = numbers.len() / 3;
+    Ok(PyArray1::from_vec(py, numbers)
+        .reshape([count, 3])?
+        .into_any())
+}
+
+/// Vectors as an array (n, 3).
+fn vectors(py: Python<'_>, of: impl Iterator<Item = Vec3>) -> PyResult<Bound<'_, PyAny>> {
+    let numbers: Vec<f32> = of.flat_map(|vector| vector.to_array()).collect();
+    let count = numbers.len() / 3;
+    Ok(PyArray1::from_vec(py, numbers)
+        .reshape([count, 3])?
+        .into_any())
+}
