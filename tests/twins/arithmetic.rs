@@ -36,13 +36,13 @@ trait Argument: Copy + Debug + 'static {
 }
 
 macro_rules! arguments {
-    ($($ty:ty as $of_kernels:ty: |$value:ident| $given:expr;)+) => {$(
+    ($($ty:ty as $of_kernels:ty: |$value:ident| $converted:expr;)+) => {$(
         impl Argument for $ty {
             type OfKernels = $of_kernels;
 
             fn of_kernels(self) -> $of_kernels {
                 let $value = self;
-                $given
+                $converted
             }
         }
     )+};
@@ -219,7 +219,7 @@ fn between(random: &mut Random) -> f32 {
 }
 
 /// A rotation, and half a rotation vector that may be too long.
-fn turn(random: &mut Random) -> ([f32; 4], [f32; 4]) {
+fn rotation_and_step(random: &mut Random) -> ([f32; 4], [f32; 4]) {
     let length = if random.once_in(4) { 2.0 } else { 0.8 };
     let [x, y, z] = random.vector().map(|c: f32| length * c);
     (random.rotation(), [x, y, z, 0.0])
@@ -339,7 +339,7 @@ functions! { on, r:
     "slerp" of (r.pair(), r.number()) => |([a, b], t)| entries::slerp(on, a, b, t), slerp(a, b, t);
     "over" of (r.pair(), between(r)) => |([a, b], t)| entries::over(on, a, b, t), cpu::over(a, b, t);
     "rotation_step" of r.pair() => |[a, b]| entries::rotation_step(on, a, b), pose_steps::rotation_step(a, b);
-    "rotated_by" of turn(r) => |(q, v)| entries::rotated_by(on, q, v), cpu::rotated_by(q, v);
+    "rotated_by" of rotation_and_step(r) => |(q, v)| entries::rotated_by(on, q, v), cpu::rotated_by(q, v);
     "evaluate of an arc" of (two(r), r.parameter()) => |((middle, tangent), s)|
         entries::evaluate_arc_segment(on, entries::ArcSegment { middle, tangent }, s),
         ArcSegment { middle, tangent }.at(s).to_array();

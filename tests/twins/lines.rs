@@ -144,7 +144,7 @@ impl Watch for Lane {
 
     #[track_caller]
     fn location(&self, at: usize, words: usize) -> usize {
-        if is_planted(Kind::Place) {
+        if is_planted(Kind::Address) {
             at + words
         } else {
             at

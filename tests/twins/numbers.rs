@@ -41,17 +41,21 @@ pub(super) enum Kind {
     /// Another constant.
     Constant,
     /// A neighbour of what is loaded or stored.
-    Place,
+    Address,
 }
 
 /// Where a mistake can be: a line and a column of the generated file.
 pub(super) type Spot = (u32, u32, Kind);
+
+const RECENT_SPOTS: usize = 1024;
 
 thread_local! {
     static RULE: Cell<Rule> = const { Cell::new(Rule::AsWritten) };
     /// The loads and stores of buffers: a sum of what says which invocation made each, and where.
     static TOUCHED: Cell<u32> = const { Cell::new(0) };
     static LISTED: RefCell<BTreeSet<Spot>> = const { RefCell::new(BTreeSet::new()) };
+    /// Spots that were listed last, by some of their bits: most are met thousands of times.
+    static RECENT: RefCell<[Option<Spot>; RECENT_SPOTS]> = const { RefCell::new([None; RECENT_SPOTS]) };
 }
 
 /// Does something by a rule.
@@ -64,6 +68,7 @@ pub(super) fn by<T>(rule: Rule, action: impl FnOnce() -> T) -> T {
 
 /// Where there can be mistakes in what an action does.
 pub(super) fn spots(action: impl FnOnce()) -> BTreeSet<Spot> {
+    RECENT.set([None; RECENT_SPOTS]);
     by(Rule::Listing, action);
     LISTED.take()
 }
@@ -75,10 +80,16 @@ pub(super) fn is_planted(kind: Kind) -> bool {
     if !matches!(rule, Rule::Listing | Rule::Mistaken(..)) {
         return false;
     }
-    let place = Location::caller();
-    let spot = (place.line(), place.column(), kind);
+    let caller = Location::caller();
+    let spot = (caller.line(), caller.column(), kind);
     if rule == Rule::Listing {
-        LISTED.with_borrow_mut(|listed| listed.insert(spot));
+        RECENT.with_borrow_mut(|recent| {
+            let bits = (spot.0 << 5 ^ spot.1 << 2) as usize + kind as usize;
+            let recent = &mut recent[bits % RECENT_SPOTS];
+            if recent.replace(spot) != Some(spot) {
+                LISTED.with_borrow_mut(|listed| listed.insert(spot));
+            }
+        });
     }
     matches!(rule, Rule::Mistaken(planted, _) if planted == spot)
 }
