@@ -36,7 +36,7 @@ pub(crate) struct Chunks {
 /// How the rotations of a chunk are made.
 enum ChunkSource {
     /// Tracks that are prepared for each chunk.
-    Tracks(PerTrack<Interpolation>),
+    Tracks(Box<PerTrack<Interpolation>>),
     /// Tracks that have been prepared.
     Prepared(tumble::Clip),
 }
@@ -88,7 +88,7 @@ impl Chunks {
         let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
         let interpolations = request.methods(Quantity::Rotation).interpolations(motion);
         let source = match is_prepared {
-            false => ChunkSource::Tracks(interpolations),
+            false => ChunkSource::Tracks(Box::new(interpolations)),
             true => {
                 let clip = engine.upload(&motion.set, interpolations);
                 ChunkSource::Prepared(clip.map_err(|error| of_engine(&error))?)
