@@ -402,31 +402,6 @@ impl Encoding {
         self.row().error_bound.is_some()
     }
 
-    /// Every encoding with every value of its options, in the order of [`Encoding::ALL`].
-    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
-    pub(crate) fn with_all_options() -> Vec<Self> {
-        let mut all = Vec::new();
-        for encoding in Self::ALL {
-            for order in MatrixOrder::ALL {
-                for sequence in EulerSequence::all() {
-                    let encoding = encoding.with(EncodingOptions { order, sequence });
-                    if !all.contains(&encoding) {
-                        all.push(encoding);
-                    }
-                }
-            }
-        }
-        all
-    }
-
-    /// The encodings of a store function of the kernels.
-    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
-    pub(crate) fn of_store(store: Store) -> Vec<Self> {
-        let mut all = Self::with_all_options();
-        all.retain(|encoding| encoding.row().store == store);
-        all
-    }
-
     /// Whether the components are `x y z w`, in any precision.
     #[must_use]
     pub fn is_quaternion(self) -> bool {
@@ -500,6 +475,33 @@ fn of_matrix(number: &StoredNumbers, length: usize, order: u32) -> [f32; 4] {
         _ => columns,
     };
     Quat::from_mat3(&matrix).to_array()
+}
+
+/// What stores of kernels are for.
+#[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
+impl Encoding {
+    /// Every encoding with every value of its options, in the order of [`Encoding::ALL`].
+    pub(crate) fn with_all_options() -> Vec<Self> {
+        let mut all = Vec::new();
+        for encoding in Self::ALL {
+            for order in MatrixOrder::ALL {
+                for sequence in EulerSequence::all() {
+                    let encoding = encoding.with(EncodingOptions { order, sequence });
+                    if !all.contains(&encoding) {
+                        all.push(encoding);
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// The encodings of a store function of the kernels.
+    pub(crate) fn of_store(store: Store) -> Vec<Self> {
+        let mut all = Self::with_all_options();
+        all.retain(|encoding| encoding.row().store == store);
+        all
+    }
 }
 
 #[cfg(test)]

@@ -112,6 +112,6 @@ impl Crowd {
 }
 
 /// The crowd, if it is on a Vulkan device.
-pub(super) fn vulkan_crowd(crowd: Option<&dyn MachineCrowd>) -> Option<&Arc<DeviceCrowd>> {
+fn vulkan_crowd(crowd: Option<&dyn MachineCrowd>) -> Option<&Arc<DeviceCrowd>> {
     VulkanCrowd::of(crowd?).map(|crowd| &crowd.device)
 }

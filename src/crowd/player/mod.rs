@@ -2,8 +2,6 @@
 
 #[cfg(feature = "vulkan")]
 mod application_device;
-#[cfg(all(test, feature = "vulkan"))]
-mod kernels_of_a_frame;
 mod visible;
 mod weights;
 

@@ -31,13 +31,13 @@ pub struct Clip {
 /// The tracks of a clip.
 pub(crate) enum ClipTracks {
     /// Tracks with the same interpolation.
-    Alike(Box<Uploaded>),
+    Alike(Uploaded),
     Grouped(Arc<GroupedTracks>),
 }
 
 impl Clip {
     pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
-        let tracks = ClipTracks::Alike(Box::new(uploaded));
+        let tracks = ClipTracks::Alike(uploaded);
         Self { engine, tracks }
     }
 
