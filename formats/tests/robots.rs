@@ -1,4 +1,4 @@
-//! Robots: against MuJoCo and pinocchio, and their scalars against SciPy, where the sample files are there, and files that are refused.
+//! Robots: against `MuJoCo` and pinocchio, and their scalars against `SciPy`, where the sample files are there, and files that are refused.
 
 use std::fs;
 use std::io::Read;
@@ -59,7 +59,7 @@ fn quaternion(q: &[f64]) -> DQuat {
     DQuat::from_xyzw(q[1], q[2], q[3], q[0])
 }
 
-/// The joints at the numbers of MuJoCo's `qpos` and `qvel`.
+/// The joints at the numbers of `MuJoCo`'s `qpos` and `qvel`.
 fn at_qpos(tree: &Tree, mut q: &[f64], mut v: &[f64]) -> (Configuration, ConfigurationRates) {
     let (mut configuration, mut rates) = (tree.rest(), tree.no_rates());
     let (mut free, mut balls, mut scalars) = (0, 0, 0);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::external::{FILE, HOST_ALLOCATION, usage};
+use crate::gpu::physical::external::{FILE, HOST_ALLOCATION, usage};
 use crate::gpu::shared_memory::{MemoryKind, Share};
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;

@@ -10,14 +10,14 @@ use std::time::Duration;
 use ash::vk::Handle as _;
 use ash::{ext, khr, vk};
 
-use crate::gpu::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
 use crate::gpu::handles::{QueueLock, VulkanQueue};
 use crate::gpu::kernel_check::passes::Passes;
+use crate::gpu::physical::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
 use crate::gpu::physical::queues::{Copies, QueueIndex};
+use crate::gpu::physical::upload_memory::{Placing, direct};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
-use crate::gpu::pipeline::PipelineCache;
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::shared_memory::SharedMemory;
-use crate::gpu::upload::{Placing, direct};
 use crate::machine::cache::Cache;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;

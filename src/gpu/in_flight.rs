@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::clip::ClipBuffers;
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::external::{Exported, ImportedMemory};
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::job::ClipBuffers;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::{Binding, Recorded};
 use crate::gpu::submission::{Semaphore, Spent, Submission};

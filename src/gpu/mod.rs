@@ -23,7 +23,7 @@
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
 //! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples,
-//!    or a grid; [`clip`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
+//!    or a grid; [`job`] keeps the lists of repeated requests. [`upload`] writes them to memory that kernels read.
 //! 4. The copies of the lists and a dispatch for each group of segments become a
 //!    [`Recording`](crate::work::recording::Recording), which [`recorded`] writes into commands with the barriers that
 //!    it needs; [`submission`] submits them.
@@ -39,7 +39,7 @@
 //! | what | memory |
 //! |---|---|
 //! | segments, constants, tables of crowds | device memory |
-//! | lists and keys | device memory if the host can write it ([`UploadMemory`](upload::UploadMemory)), else copied to it, or read in host memory |
+//! | lists and keys | device memory if the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied to it, or read in host memory |
 //! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`external`]); else device memory, copied by the second queue beside later kernels |
 //! | results for CUDA | device memory, exported as a file descriptor ([`external`]) |
 //!
@@ -60,11 +60,14 @@ pub(crate) mod external;
 pub(crate) mod handles;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
+pub(crate) mod job;
 pub(crate) mod kernel_check;
+mod machine;
 pub(crate) mod opened;
 pub(crate) mod passes;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
+pub(crate) mod pipeline_cache;
 pub(crate) mod recorded;
 pub(crate) mod run_once;
 pub(crate) mod self_test;

@@ -2,9 +2,10 @@
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
+use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::Submission;
-use crate::gpu::upload::{KernelReads, Upload};
+use crate::gpu::upload::Upload;
 use crate::machine::error::VulkanError;
 use crate::work::recording::Slice;
 

@@ -1,4 +1,4 @@
-//! MJCF, MuJoCo's XML. The rules are those of its documentation (`XMLreference`, `modeling`); of the elements that do
+//! MJCF, `MuJoCo`'s XML. The rules are those of its documentation (`XMLreference`, `modeling`); of the elements that do
 //! not move frames none is read.
 
 use std::collections::HashMap;
@@ -468,7 +468,7 @@ fn poses(
     Ok(poses)
 }
 
-/// Sets a configuration to the numbers of MuJoCo's `qpos`, whose quaternions are w x y z.
+/// Sets a configuration to the numbers of `MuJoCo`'s `qpos`, whose quaternions are w x y z.
 fn fill(tree: &Tree, configuration: &mut Configuration, mut numbers: &[f64]) {
     let mut next = |count: usize| {
         let (first, rest) = numbers.split_at(count);

@@ -1,7 +1,7 @@
-//! Robots: kinematic trees in MJCF (MuJoCo) and URDF (ROS).
+//! Robots: kinematic trees in MJCF (`MuJoCo`) and URDF (ROS).
 //!
 //! [`Robot::open`] reads the bodies and joints of a file. Meshes, masses but their centres, sensors and actuators are
-//! not read, and no file but those that an MJCF includes is opened. The rules were compared with MuJoCo and pinocchio;
+//! not read, and no file but those that an MJCF includes is opened. The rules were compared with `MuJoCo` and pinocchio;
 //! [docs/robots.md](https://github.com/tumble-rs/tumble/blob/main/docs/robots.md) has them.
 
 mod mjcf;
@@ -24,11 +24,11 @@ pub struct Robot {
     pub name: String,
     /// The kind of file.
     pub format: RobotFormat,
-    /// Its bodies and joints. The bodies are in the order of MuJoCo: depth first, children as in the file.
+    /// Its bodies and joints. The bodies are in the order of `MuJoCo`: depth first, children as in the file.
     pub tree: Tree,
     /// The configurations that the file names, such as `home`.
     pub poses: Vec<(String, Configuration)>,
-    /// How many relations between joints the file has that are not applied (`equality/joint` of MJCF), as MuJoCo's
+    /// How many relations between joints the file has that are not applied (`equality/joint` of MJCF), as `MuJoCo`'s
     /// kinematics do not apply them.
     pub couplings: usize,
     /// Warnings about the file.
@@ -38,7 +38,7 @@ pub struct Robot {
 /// A kind of file with a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RobotFormat {
-    /// MuJoCo's XML.
+    /// `MuJoCo`'s XML.
     Mjcf,
     /// The Unified Robot Description Format of ROS.
     Urdf,

@@ -104,7 +104,7 @@ impl Files {
             included: HashMap::new(),
         };
         // The main file's name, too: it cannot include itself.
-        let mut names = vec![path.file_name().map(Path::new).unwrap_or(path).to_owned()];
+        let mut names = vec![path.file_name().map_or(path, Path::new).to_owned()];
         let mut next = 0;
         while let Some(file) = this.files.get(next) {
             let document = parse(file)?;

@@ -4,8 +4,9 @@
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::submission::Submission;
-use crate::gpu::upload::{KernelReads, Upload};
+use crate::gpu::upload::Upload;
 use crate::machine::error::VulkanError;
 use crate::machine::options::PrepareArcs;
 use crate::machine::reports::DeviceKind;

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use crate::gpu::clip::{Job, KeptLists, WorkLists};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
+use crate::gpu::job::{Job, KeptLists, WorkLists};
 use crate::gpu::recorded::Binding;
 use crate::gpu::submission::Submission;
 use crate::machine::error::{EvaluateError, VulkanError};

@@ -4,7 +4,9 @@
 pub(crate) mod cards;
 #[cfg(feature = "prove")]
 pub(crate) mod details;
+pub(crate) mod external;
 pub(crate) mod queues;
+pub(crate) mod upload_memory;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,7 +15,7 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::instance::{self, Instance};
 use crate::gpu::physical::queues::{Copies, check_family, compute_family, copies};
-use crate::gpu::upload::is_unified;
+use crate::gpu::physical::upload_memory::is_unified;
 use crate::machine::ListedDevice;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;

@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use crate::engine::clip::request::{Request, RequestPart};
 use crate::error::Error;
-use crate::gpu::clip::{ClipTarget, Job};
+use crate::gpu::clip::ClipTarget;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::job::Job;
 use crate::machine::error::VulkanError;
 
 impl Request<'_> {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use crate::engine::clip::request::Request;
 use crate::error::Error;
-use crate::gpu::clip::Job;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::external::{Exported, ExportedResult};
 use crate::gpu::in_flight::Target;
+use crate::gpu::job::Job;
 use crate::machine::error::EvaluateError;
 use crate::memory::OutOfMemoryError;
 use crate::output::window::Window;
