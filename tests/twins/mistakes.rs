@@ -34,7 +34,11 @@ impl Tried {
             assert_eq!(result[..result.len() - 1], stored, "{kernel:?}");
             (trial, result)
         });
-        let trials = trials.collect();
+        let trials: Vec<_> = trials.collect();
+        assert!(
+            !trials.is_empty(),
+            "{kernel:?} has no trial: devices would not be checked"
+        );
         Self { kernel, trials }
     }
 
