@@ -45,6 +45,25 @@ pub(crate) struct OutputForm {
     pub(crate) is_one_track: bool,
 }
 
+impl OutputForm {
+    /// Velocities or accelerations, three numbers.
+    pub(crate) fn of_rates(
+        quantity: Quantity,
+        in_world: bool,
+        layout: Layout,
+        on_card: bool,
+    ) -> Self {
+        Self {
+            quantity,
+            in_world,
+            encoding: Encoding::Vector,
+            layout,
+            on_card,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for OutputForm {
     /// Rotations, x y z w, `[track][frame]`.
     fn default() -> Self {

@@ -45,7 +45,7 @@ pub struct VulkanHandles {
     /// Without a lock, the application must not use the queue during a call that submits. These calls submit:
     /// [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) and [`Engine::warm`](crate::engine::Engine::warm),
     /// uploads, all evaluations and streams, the functions called `to_buffer` and `target`,
-    /// [`Crowd::new`](crate::crowd::player::Crowd::new), and a crowd's `submit`. Functions called `record` and those
+    /// [`Engine::crowd`](crate::engine::Engine::crowd), and a crowd's `submit`. Functions called `record` and those
     /// that change a crowd's library or layers do not, and neither does dropping an object.
     ///
     /// Engines need no lock among themselves: all engines of a process that use one queue take turns. If several

@@ -18,8 +18,8 @@
 //!
 //! # Steps
 //!
-//! 1. A [`VulkanClip`](clip::VulkanClip) makes a [`Job`](clip::Job): prepared segments on the device
-//!    ([`ClipBuffers`](clip::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
+//! 1. A [`VulkanClip`](clip::VulkanClip) makes a [`Job`](job::Job): prepared segments on the device
+//!    ([`ClipBuffers`](job::ClipBuffers)), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] divides the result into windows of at most 2²¹ rotations and runs them in a pipeline: while the
 //!    device evaluates one window, the host lists the next ([`in_flight`]).
 //! 3. [`lists`](crate::work::lists) lists which samples of a window belong to which segment, as runs, single samples,

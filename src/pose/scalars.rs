@@ -54,7 +54,8 @@ impl Engine {
         let request = self.vector_request(quantity, method, &interpolation, &timeline)?;
         let packs = set.scalar_packs(timeline.is_per_track());
         let data = ClipData::of_scalars(set, &packs, &request)?;
-        let of_packs: Vectors = self.samples_of(data, frames, layout)?;
+        let times = |pack: usize| set.scalar(packs[pack]).map_or(&[][..], |first| first.times);
+        let of_packs = self.vector_samples(data, &request, &timeline, layout, times)?;
         let samples = timeline.len();
         let mut scalars = Scalars::new(count, samples, layout)?;
         let pack_of = |scalar: usize| packs.partition_point(|&first| first <= scalar) - 1;
@@ -87,15 +88,6 @@ impl Engine {
                 );
             }
         })?;
-        if quantity == ScalarQuantity::Velocity && interpolation.mirrors() {
-            for (scalar, sample) in (0..count).flat_map(|i| (0..samples).map(move |j| (i, j))) {
-                let times = set.scalar(scalar).map_or(&[][..], |keys| keys.times);
-                if is_backwards(&interpolation, times, &timeline, (scalar, sample)) {
-                    let value = &mut values[layout.offset(scalar, sample, count, samples)];
-                    *value = negated(*value);
-                }
-            }
-        }
         Ok(scalars)
     }
 
@@ -123,19 +115,43 @@ impl Engine {
         let timeline = frames.resolve(tracks, set.time_span())?;
         let request = self.vector_request(quantity, method, &interpolation, &timeline)?;
         let data = ClipData::of_vectors(set, channel, &request)?;
-        let found: Vectors = self.samples_of(data, frames, layout)?;
-        if quantity != ScalarQuantity::Velocity || !interpolation.mirrors() {
+        let times =
+            |track: usize| (set.vectors(channel, track)).map_or(&[][..], |keys| &keys.times);
+        self.vector_samples(data, &request, &timeline, layout, times)
+    }
+
+    /// Evaluates prepared vectors. `times` are the key times of a track, empty if it has none: in mirrored copies of
+    /// it velocities have the other sign.
+    fn vector_samples<'t>(
+        &self,
+        data: ClipData,
+        request: &VectorRequest<'_>,
+        timeline: &Timeline,
+        layout: Layout,
+        times: impl Fn(usize) -> &'t [f64],
+    ) -> Result<Vectors, Error> {
+        let found: Vectors = self.clip_of(data)?.samples(timeline, layout)?;
+        if request.quantity != ScalarQuantity::Velocity || !request.interpolation.mirrors() {
             return Ok(found);
         }
-        let samples = timeline.len();
-        let mut quats = OutputBuffer::new(found.as_arrays().len())?;
+        let (wrap, tracks, samples) = (
+            request.interpolation.wrap(),
+            found.track_count(),
+            found.sample_count(),
+        );
+        let mut quats = OutputBuffer::new(tracks * samples)?;
         let vectors: &mut [[f32; 4]] = bytemuck::cast_slice_mut(&mut quats);
         vectors.copy_from_slice(found.as_arrays());
-        for (track, sample) in (0..tracks).flat_map(|i| (0..samples).map(move |j| (i, j))) {
-            let times = (set.vectors(channel, track)).map_or(&[][..], |keys| &keys.times);
-            if is_backwards(&interpolation, times, &timeline, (track, sample)) {
+        for track in 0..tracks {
+            let &[first, .., last] = times(track) else {
+                continue;
+            };
+            let backwards =
+                |&sample: &usize| wrap.is_backwards((first, last), timeline, track, sample);
+            for sample in (0..samples).filter(backwards) {
                 let vector = &mut vectors[layout.offset(track, sample, tracks, samples)];
-                *vector = vector.map(negated);
+                // Not `-x`, which makes -0 of 0.
+                *vector = vector.map(|x| 0.0 - x);
             }
         }
         Ok(Samples::new(Box::new(quats), tracks, samples, layout))
@@ -158,26 +174,6 @@ impl Engine {
             only_for: Some(only_for),
         })
     }
-}
-
-/// Whether a sample is in a mirrored copy of its track, which has keys at these times; velocities have the other sign
-/// there.
-fn is_backwards(
-    interpolation: &Interpolation,
-    times: &[f64],
-    timeline: &Timeline,
-    (track, sample): (usize, usize),
-) -> bool {
-    let wrap = interpolation.wrap();
-    match times {
-        [first, .., last] => wrap.is_backwards((*first, *last), timeline, track, sample),
-        _ => false,
-    }
-}
-
-/// With the other sign; +0 keeps its.
-fn negated(value: f32) -> f32 {
-    0.0 - value
 }
 
 /// Frames that a task copies at least.

@@ -148,7 +148,7 @@ impl Engine {
         clip.samples(&clip.timeline(frames)?, layout)
     }
 
-    fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {
+    pub(super) fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {
         let uploaded = Uploaded::of_data(&self.machine, data)?;
         Ok(Clip::new(self.clone(), uploaded))
     }

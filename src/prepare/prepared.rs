@@ -295,7 +295,7 @@ pub(crate) struct Segments {
     pub(crate) are_arcs_listed: bool,
     pub(crate) arcs: Vec<ArcSegment>,
     /// The interval of each arc as the device reads it: the index of the constant that is the key before it, with
-    /// [`START_NEGATED`] and [`END_NEGATED`].
+    /// [`START_NEGATED`](crate::shader::START_NEGATED) and [`END_NEGATED`](crate::shader::END_NEGATED).
     pub(crate) intervals: Vec<u32>,
     pub(crate) polynomials: Vec<PolynomialSegment>,
 }

@@ -327,15 +327,7 @@ impl<'a> Reader<'a> {
         };
         // A free joint has no defaults and no constants.
         if kind == JointKind::Free {
-            return Ok(TreeJoint {
-                name,
-                kind,
-                axis: DVec3::Z,
-                anchor: DVec3::ZERO,
-                reference: 0.0,
-                limits: None,
-                mimic: None,
-            });
+            return Ok(TreeJoint::new(name, kind));
         }
         let scale = if kind == JointKind::Slide {
             1.0

@@ -195,14 +195,9 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = OutputForm {
-            quantity: Quantity::Velocity(axes),
-            in_world,
-            encoding: Encoding::Vector,
-            layout: layout_named(layout)?,
-            on_card: device_array,
-            ..OutputForm::default()
-        };
+        let quantity = Quantity::Velocity(axes);
+        let layout = layout_named(layout)?;
+        let result = OutputForm::of_rates(quantity, in_world, layout, device_array);
         self.result(clip, &result, out, options)
     }
 
@@ -223,14 +218,9 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = OutputForm {
-            quantity: Quantity::Acceleration(axes),
-            in_world,
-            encoding: Encoding::Vector,
-            layout: layout_named(layout)?,
-            on_card: device_array,
-            ..OutputForm::default()
-        };
+        let quantity = Quantity::Acceleration(axes);
+        let layout = layout_named(layout)?;
+        let result = OutputForm::of_rates(quantity, in_world, layout, device_array);
         self.result(clip, &result, out, options)
     }
 

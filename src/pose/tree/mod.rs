@@ -64,6 +64,22 @@ pub struct TreeJoint {
     pub mimic: Option<Mimic>,
 }
 
+impl TreeJoint {
+    /// A joint about the body's z axis and origin, with the reference 0 and no limits.
+    #[must_use]
+    pub fn new(name: impl Into<String>, kind: JointKind) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            axis: DVec3::Z,
+            anchor: DVec3::ZERO,
+            reference: 0.0,
+            limits: None,
+            mimic: None,
+        }
+    }
+}
+
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum JointKind {

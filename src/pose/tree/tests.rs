@@ -2,18 +2,6 @@
 
 use super::*;
 
-fn joint(name: &str, kind: JointKind) -> TreeJoint {
-    TreeJoint {
-        name: name.to_owned(),
-        kind,
-        axis: DVec3::Z,
-        anchor: DVec3::ZERO,
-        reference: 0.0,
-        limits: None,
-        mimic: None,
-    }
-}
-
 fn body(name: &str, parent: Option<usize>, joints: Vec<TreeJoint>) -> TreeBody {
     TreeBody {
         name: name.to_owned(),
@@ -32,7 +20,7 @@ fn mimic(name: &str, joint_name: &str, multiplier: f64, offset: f64) -> TreeJoin
             multiplier,
             offset,
         }),
-        ..joint(name, JointKind::Hinge)
+        ..TreeJoint::new(name, JointKind::Hinge)
     }
 }
 
@@ -41,10 +29,14 @@ fn hinges_turn_and_slides_shift_what_hangs_from_them() {
     let slide = TreeJoint {
         axis: DVec3::X,
         reference: 0.5,
-        ..joint("slide", JointKind::Slide)
+        ..TreeJoint::new("slide", JointKind::Slide)
     };
     let bodies = vec![
-        body("base", None, vec![joint("hinge", JointKind::Hinge)]),
+        body(
+            "base",
+            None,
+            vec![TreeJoint::new("hinge", JointKind::Hinge)],
+        ),
         body("arm", Some(0), vec![slide]),
         body("tool", Some(1), Vec::new()),
     ];
@@ -68,7 +60,7 @@ fn joints_that_mimic_are_followed_through_others() {
     let joints = [
         mimic("c", "b", 2.0, 1.0),
         mimic("b", "a", -3.0, 0.5),
-        joint("a", JointKind::Hinge),
+        TreeJoint::new("a", JointKind::Hinge),
     ];
     let values = joint_values(&joints.each_ref()).unwrap().0;
     let expected = [(-6.0, 2.0), (-3.0, 0.5), (1.0, 0.0)];
@@ -87,10 +79,10 @@ fn joints_that_mimic_are_followed_through_others() {
 
 #[test]
 fn bodies_that_are_no_tree_are_refused() {
-    let hinge = |name| joint(name, JointKind::Hinge);
+    let hinge = |name| TreeJoint::new(name, JointKind::Hinge);
     let refused = |bodies: Vec<TreeBody>| Tree::new(bodies).unwrap_err().to_string();
     let with = |joints| vec![body("base", None, joints)];
-    let ball = joint("ball", JointKind::Ball);
+    let ball = TreeJoint::new("ball", JointKind::Ball);
     let mut askew = hinge("a");
     askew.axis = DVec3::new(0.0, 0.0, 2.0);
     let cases = [
@@ -104,7 +96,7 @@ fn bodies_that_are_no_tree_are_refused() {
         ),
         (with(vec![askew]), "the axis, a unit vector, of `a` is"),
         (
-            with(vec![joint("free", JointKind::Free), hinge("a")]),
+            with(vec![TreeJoint::new("free", JointKind::Free), hinge("a")]),
             "a free joint is alone",
         ),
         (with(vec![mimic("a", "b", 1.0, 0.0)]), "does not exist"),

@@ -1,11 +1,12 @@
 //! Scalars: single numbers over time, such as the angle of a robot's joint, at separate times.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
 
 use crate::tracks::error::TrackError;
-use crate::tracks::set::vectors::{VectorTrack, check_vectors};
+use crate::tracks::set::vectors::{VectorTrack, check_magnitudes};
 use crate::tracks::set::{TrackSet, check_length, check_times};
 
 /// The keys of a scalar.
@@ -70,11 +71,8 @@ impl TrackSet {
         if !tangents.is_empty() {
             check_length(index, "tangents", keys.len(), tangents.len())?;
         }
-        let vectors: Vec<Vec3> = keys.iter().map(|&key| Vec3::splat(key)).collect();
-        let of_tangents: Vec<[Vec3; 2]> = (tangents.iter())
-            .map(|both| both.map(Vec3::splat))
-            .collect();
-        check_vectors(index, "scalar or its tangent", &vectors, &of_tangents)?;
+        let magnitude = |number: &f32| number.abs();
+        check_magnitudes(index, "scalar or its tangent", keys, tangents, magnitude)?;
         self.widen_span(times);
         self.scalars.push(Arc::new(ScalarTrack {
             name: name.into(),
@@ -131,17 +129,14 @@ impl TrackSet {
 
     /// The scalars of a pack as the components of a vector; others are 0. Components do not influence each other, so
     /// that a scalar has the same bits in every pack.
-    pub(crate) fn packed_scalars(&self, scalars: std::ops::Range<usize>) -> VectorTrack {
-        let pack = &self.scalars[scalars];
+    pub(crate) fn packed_scalars(&self, scalars: Range<usize>) -> VectorTrack {
+        let (first, pack) = (&self.scalars[scalars.start], &self.scalars[scalars]);
         let gathered = |of: &dyn Fn(&ScalarTrack) -> f32| {
             let mut vector = Vec3::ZERO;
             for (component, scalar) in pack.iter().enumerate() {
                 vector[component] = of(scalar);
             }
             vector
-        };
-        let [first, ..] = pack else {
-            unreachable!("a pack has a scalar")
         };
         VectorTrack {
             times: first.times.clone(),

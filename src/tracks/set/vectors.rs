@@ -113,7 +113,7 @@ impl TrackSet {
         if let Some(key) = ups.iter().position(has_no_length) {
             return Err(TrackError::NoUp { track, key });
         }
-        check_vectors(track, "point of the path", &points, &[])?;
+        check_magnitudes(track, "point of the path", &points, &[], magnitude)?;
         self.push(name, &times[..1], &[Quat::IDENTITY])?;
         self.set_translations(track, times, &points, &[])?;
         if let Some(path) = &mut self.vectors[Channel::Translation as usize][track] {
@@ -150,7 +150,7 @@ impl TrackSet {
         if !tangents.is_empty() {
             check_length(track, "tangents", keys.len(), tangents.len())?;
         }
-        check_vectors(track, "vector or its tangent", &keys, tangents)?;
+        check_magnitudes(track, "vector or its tangent", &keys, tangents, magnitude)?;
         self.widen_span(times);
         let tracks = self.track_count();
         let vectors = &mut self.vectors[channel as usize];
@@ -183,21 +183,30 @@ impl TrackSet {
     }
 }
 
-/// Refuses vectors and tangents that are not finite or too large.
-pub(crate) fn check_vectors(
+/// The largest magnitude of a vector's components; infinite if one is not finite.
+fn magnitude(vector: &Vec3) -> f32 {
+    match vector.is_finite() {
+        true => vector.abs().max_element(),
+        false => f32::INFINITY,
+    }
+}
+
+/// Refuses keys and tangents that are not finite or too large, by their magnitude, which is infinite or NaN if they are
+/// not finite.
+pub(crate) fn check_magnitudes<T>(
     track: usize,
     quantity: &'static str,
-    keys: &[Vec3],
-    tangents: &[[Vec3; 2]],
+    keys: &[T],
+    tangents: &[[T; 2]],
+    magnitude: impl Fn(&T) -> f32,
 ) -> Result<(), TrackError> {
-    check_finite(track, quantity, keys, |key| key.is_finite())?;
-    check_finite(track, quantity, tangents, |[arriving, leaving]| {
-        arriving.is_finite() && leaving.is_finite()
-    })?;
+    let is_finite = |value: &T| magnitude(value).is_finite();
+    check_finite(track, quantity, keys, is_finite)?;
+    check_finite(track, quantity, tangents, |both| both.iter().all(is_finite))?;
     let limit = LARGEST_VECTOR;
-    let is_too_large = |vector: &Vec3| vector.abs().max_element() > limit as f32;
+    let is_too_large = |value: &T| magnitude(value) > limit as f32;
     let key = keys.iter().position(is_too_large);
-    let has_too_large = |both: &[Vec3; 2]| both.iter().any(is_too_large);
+    let has_too_large = |both: &[T; 2]| both.iter().any(is_too_large);
     match key.or_else(|| tangents.iter().position(has_too_large)) {
         Some(key) => Err(TrackError::DataTooLarge {
             track,
