@@ -5,7 +5,7 @@
 //!   runs passes over poses ([`PassRunner`]). A request goes to a machine as its [`Plan`](plan::Plan) says, which depends
 //!   on the machine's [`Limits`] alone.
 //! * [`ListedDevice`]: a device that is not open yet.
-//! * [`EngineOptions`](options::EngineOptions), [`EvaluateError`](error::EvaluateError), [`reports`] and the files that
+//! * [`EngineOptions`], [`EvaluateError`], [`reports`] and the files that
 //!   are kept from process to process ([`cache`]): what every build has, with and without the feature `vulkan`.
 //!
 //! What only a Vulkan device can do, such as write into an application's buffer, is no method of the traits: its callers
