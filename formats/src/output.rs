@@ -249,26 +249,33 @@ pub fn remove_unfinished() -> NoMoreOutputs {
 /// Removes the temporary files in a directory whose writers were killed. Files that are being written are locked, and
 /// remain.
 pub fn remove_abandoned(directory: &Path) {
-    remove_temporary(directory, |folder, name, _| {
-        let file = folder.open_file(name);
-        file.is_ok_and(|file| file.try_lock().is_ok())
-    });
+    remove_temporary(directory, |folder, name, _| unlocked(folder, name));
+}
+
+/// A file with a temporary name, locked, if it was not.
+fn unlocked(folder: &Folder, name: &OsStr) -> Option<File> {
+    let file = folder.open_file(name).ok()?;
+    file.try_lock().ok()?;
+    Some(file)
 }
 
 /// Removes the temporary files in a directory that were created with `mark`, whether or not they are locked: locks
 /// have no effect on other machines.
 pub fn remove_marked(directory: &Path, mark: &str) {
-    remove_temporary(directory, |_, _, of_file| of_file.starts_with(mark));
+    remove_temporary(directory, |_, _, of_file| {
+        of_file.starts_with(mark).then_some(())
+    });
 }
 
-/// Removes those of a directory's temporary files for which `is_removed` is true; it gets the directory, the name and
+/// Removes those of a directory's temporary files for which `claim` returns something, which lives until the file is
+/// removed: a writer that could lock its new file before that would lose it. `claim` gets the directory, the name and
 /// the mark in the name.
-fn remove_temporary(directory: &Path, is_removed: impl Fn(&Folder, &OsStr, &str) -> bool) {
+fn remove_temporary<T>(directory: &Path, claim: impl Fn(&Folder, &OsStr, &str) -> Option<T>) {
     let Ok(folder) = Folder::open(directory) else {
         return;
     };
     for (name, mark) in temporary_files(directory) {
-        if is_removed(&folder, &name, &mark) {
+        if let Some(_claimed) = claim(&folder, &name, &mark) {
             let _ = folder.remove_file(Path::new(&name)); // the next run tries again
         }
     }
@@ -677,17 +684,38 @@ mod tests {
         assert!(left.contains(&current.name.to_str().unwrap().to_owned()));
     }
 
+    /// A writer locks its file just after someone found it without a lock.
+    #[test]
+    fn a_file_that_is_found_without_a_lock_cannot_be_locked_before_it_is_removed() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = Folder::open(directory.path()).unwrap();
+        let name = OsStr::new(".tumble-x1y2z3.part");
+        let written = folder.create_new(name).unwrap();
+        remove_temporary(directory.path(), |folder, name, _| {
+            let claimed = unlocked(folder, name);
+            assert!(claimed.is_some() && written.try_lock().is_err());
+            claimed
+        });
+        assert_eq!(names(directory.path()), Vec::<String>::new());
+        written.try_lock().unwrap();
+    }
+
     /// Writers and those who look for abandoned files run at once.
     #[test]
     fn what_is_being_written_is_never_removed() {
+        use std::sync::mpsc::{TryRecvError, channel};
+
         let directory = tempfile::tempdir().unwrap();
-        let done = std::sync::atomic::AtomicBool::new(false);
+        let path = directory.path();
+        let (writing, ended) = channel::<()>();
         std::thread::scope(|scope| {
-            scope.spawn(|| {
-                while !done.load(std::sync::atomic::Ordering::Relaxed) {
-                    remove_abandoned(directory.path());
+            scope.spawn(move || {
+                // Where the writer fails, its end of the channel is dropped too.
+                while ended.try_recv() != Err(TryRecvError::Disconnected) {
+                    remove_abandoned(path);
                 }
             });
+            let _writing = writing;
             let folder = Folder::open(directory.path()).unwrap();
             for number in 0..300 {
                 let name = number.to_string();
@@ -696,7 +724,6 @@ mod tests {
                 file.persist(&folder, OsStr::new(&name), number % 2 == 0)
                     .unwrap();
             }
-            done.store(true, std::sync::atomic::Ordering::Relaxed);
         });
         assert_eq!(names(directory.path()).len(), 300);
     }
