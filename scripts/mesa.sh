@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# A newer Mesa beside the system's, for tests/mesa: Debian 12 has Mesa 22.3, its backports have
-# 25.0, whose RADV compiles for RDNA 4 too. The packages are unpacked into target/mesa and not
-# installed, and apt's own configuration and lists stay as they are. Where this system has no such
-# package, target/mesa/unavailable says why, and the tests compare nothing with it.
+# Mesa's compilers beside the system's, for tests/mesa: Debian 12 has Mesa 22.3, its backports have
+# 25.0, whose RADV compiles for RDNA 4 too, and Debian 13 has NVK, which compiles for NVIDIA's cards.
+# NVK comes with the libraries that it needs, its C library and loader among them. The packages are
+# unpacked into target/mesa and not installed, and apt's own configuration and lists stay as they are.
+# Where this system has no such package, target/mesa/unavailable says why, and the tests compare
+# nothing with it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 place=$PWD/target/mesa
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-[ -e "$place/complete" ] && exit 0
+[ -e "$place/complete" ] && [ -e "$place/nvk/loader" ] && exit 0
 rm -rf "$place"
 mkdir -p "$place"
 
@@ -26,29 +28,50 @@ command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null ||
 
 echo "unpacking a newer Mesa into target/mesa" >&2
 apt="$place/apt"
-mkdir -p "$apt/lists/partial" "$apt/cache/archives/partial"
-echo "deb [signed-by=$keyring] http://deb.debian.org/debian bookworm-backports main" >"$apt/sources.list"
-private() {
-    apt-get -qq -o Dir::Etc::SourceList="$apt/sources.list" -o Dir::Etc::SourceParts=- \
-        -o Dir::State="$apt" -o Dir::State::Status=/var/lib/dpkg/status \
-        -o Dir::Cache="$apt/cache" -o APT::Sandbox::User=root "$@"
+# Downloads packages into $apt, by lists of their own: a suite, the names, and what is installed already.
+download() {
+    local suite=$1 installed=$2
+    shift 2
+    rm -rf "$apt"
+    mkdir -p "$apt/lists/partial" "$apt/cache/archives/partial"
+    echo "deb [signed-by=$keyring] http://deb.debian.org/debian $suite main" >"$apt/sources.list"
+    local private=(apt-get -qq -o Dir::Etc::SourceList="$apt/sources.list" -o Dir::Etc::SourceParts=-
+        -o Dir::State="$apt" -o Dir::State::Status="$installed"
+        -o Dir::Cache="$apt/cache" -o APT::Sandbox::User=root)
+    "${private[@]}" update && (cd "$apt" && "${private[@]}" download "$@")
 }
-if ! { private update &&
-    (cd "$apt" && private download mesa-vulkan-drivers/bookworm-backports); }; then
+# Extracts files from packages in $apt: a folder, then patterns of their names.
+extract() {
+    local folder=$1 package
+    shift
+    for package in "$apt"/*.deb; do
+        dpkg-deb --fsys-tarfile "$package" | tar --extract --directory "$folder" --wildcards \
+            --no-anchored --exclude '*/lib64/*' --transform 's|.*/||' "$@" 2>/dev/null || true # not every package has each
+    done
+}
+# NVK, and what it is linked to.
+nvk=(mesa-vulkan-drivers mesa-drm-shim libc6 libgcc-s1 libstdc++6 libdrm2 libexpat1 zlib1g libzstd1
+    libwayland-client0 libffi8 libxau6 libxdmcp6 libxcb1 libx11-xcb1 libxcb-dri3-0 libxcb-present0
+    libxcb-xfixes0 libxcb-sync1 libxcb-randr0 libxcb-shm0 libxshmfence1)
+mkdir "$place/nvk"
+touch "$place/none"
+if ! { download bookworm-backports /var/lib/dpkg/status mesa-vulkan-drivers/bookworm-backports &&
+    extract "$place" 'libvulkan_lvp.so' 'libvulkan_radeon.so' 'lvp_icd.json' 'radeon_icd.json' &&
+    download trixie "$place/none" "${nvk[@]}" &&
+    extract "$place/nvk" 'nouveau_icd.json' 'libvulkan_nouveau.so' 'libnouveau_noop_drm_shim.so' 'ld-linux*' \
+        'lib*.so.[0-9]*' && [ -e "$place/libvulkan_lvp.so" ] && [ -e "$place/libvulkan_radeon.so" ] &&
+    [ -e "$place/nvk/libvulkan_nouveau.so" ] && [ -e "$place/nvk/libnouveau_noop_drm_shim.so" ]; }; then
     rm -rf "$place"
-    echo "bookworm-backports could not be read; without it the tests of the newer Mesa say so and" >&2
+    echo "bookworm-backports and trixie could not be read; without them the tests of the newer Mesa say so and" >&2
     echo "compare nothing (where CI is set they fail)" >&2
     exit 0
 fi
-for driver in lvp radeon; do
-    dpkg-deb --fsys-tarfile "$apt"/mesa-vulkan-drivers_*.deb |
-        tar --extract --directory "$place" --wildcards --transform 's|.*/||' \
-            "*/libvulkan_$driver.so" "*/${driver}_icd.json"
-done
-rm -rf "$apt"
+rm -rf "$apt" "$place/none"
+loader=$(cd "$place/nvk" && echo ld-linux*)
+ln -s "$loader" "$place/nvk/loader"
 # A name without a folder is that of an installed driver; the loader looks for others beside the
 # manifest.
-for driver in lvp radeon; do
-    sed -i "s|\"libvulkan_$driver|\"./libvulkan_$driver|" "$place/${driver}_icd.json"
+for manifest in "$place"/*_icd.json "$place/nvk/nouveau_icd.json"; do
+    sed -i 's|"libvulkan_|"./libvulkan_|' "$manifest"
 done
 touch "$place/complete"

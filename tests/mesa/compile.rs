@@ -2,26 +2,28 @@
 //! files. Runs in a separate process, because a driver reads its environment once.
 #![allow(unsafe_code)] // a device that the engine does not open: it cannot compute
 
+use std::collections::BTreeMap;
 use std::ffi::CStr;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::spirv::exactness::spirv::{FloatControls, float_controls, without_decorations};
 use ash::{khr, vk};
 use tumble::Device;
 
 /// Where the child writes its listings.
-pub(super) const FOLDER: &str = "MESA_LISTINGS";
+const FOLDER: &str = "MESA_LISTINGS";
 /// The kernels to compile, with spaces between them; all where it is not set.
-pub(super) const KERNELS: &str = "MESA_KERNELS";
+const KERNELS: &str = "MESA_KERNELS";
 /// Set where the exactness pass is to be undone.
-pub(super) const BARE: &str = "MESA_WITHOUT_THE_PASS";
+const BARE: &str = "MESA_WITHOUT_THE_PASS";
 
 /// The line before each representation of a kernel.
-pub(super) const REPRESENTATION: &str = "#### ";
+const REPRESENTATION: &str = "#### ";
 
 #[test]
-#[ignore = "compiles for the driver of its environment; run by the tests of mesa::radv"]
+#[ignore = "compiles for the driver of its environment; run by the tests of mesa::radv and mesa::nvk"]
 fn every_kernel() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("set by the test that runs it"));
     let requested = std::env::var(KERNELS).ok();
@@ -242,21 +244,103 @@ impl Drop for Compiler {
     }
 }
 
-/// A process of this program that compiles the kernels named, all where none is, and leaves a file
-/// for each in `folder`.
-pub(super) fn child(folder: &Path, kernels: &[&str], is_bare: bool) -> std::process::Command {
-    let mut command = std::process::Command::new(std::env::current_exe().unwrap());
-    command
+/// What a driver makes of kernels (all where none is named), by their names, in a process of its own. `program` runs
+/// this program with the driver; `is_bare` undoes the exactness pass.
+pub(super) fn listings(
+    program: &mut Command,
+    label: &str,
+    kernels: &[&str],
+    is_bare: bool,
+) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mesa-{label}"));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    program
         .args(["--exact", "mesa::compile::every_kernel"])
         .args(["--ignored", "--nocapture"])
-        .env(FOLDER, folder)
+        .env(FOLDER, &folder)
+        .env("XDG_RUNTIME_DIR", &folder)
         .env_remove(KERNELS)
         .env_remove(BARE);
     if !kernels.is_empty() {
-        command.env(KERNELS, kernels.join(" "));
+        program.env(KERNELS, kernels.join(" "));
     }
     if is_bare {
-        command.env(BARE, "1");
+        program.env(BARE, "1");
     }
-    command
+    let output = program.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{label}: {said}{errors}");
+    let named = tumble::vulkan::kernels().map(|(name, _)| name);
+    let named = named.filter(|name| kernels.is_empty() || kernels.contains(name));
+    let texts = named.map(|name| {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        (name.to_owned(), text)
+    });
+    let texts = texts.collect();
+    std::fs::remove_dir_all(&folder).unwrap();
+    texts
+}
+
+/// This program, to be run as another process.
+pub(super) fn this_program() -> Command {
+    Command::new(std::env::current_exe().unwrap())
+}
+
+/// The statistics before the representations, by their names.
+pub(super) fn statistics(text: &str) -> BTreeMap<String, u64> {
+    let (head, _) = text.split_once(REPRESENTATION).expect("representations");
+    let statistics = head.lines().filter_map(|line| {
+        let (name, value) = line.split_once(" = ")?;
+        Some((name.to_owned(), value.parse().ok()?))
+    });
+    statistics.collect()
+}
+
+/// The representations, by their names.
+pub(super) fn representations(text: &str) -> BTreeMap<&str, &str> {
+    text.split(REPRESENTATION)
+        .skip(1)
+        .map(|part| part.split_once('\n').expect("a line with the name"))
+        .collect()
+}
+
+/// How often a kernel divides whole numbers, where its functions are put into their callers. Graphics cards have no such
+/// division: their compilers make it of a reciprocal, taken to a whole number, and of exact steps that make good what
+/// that lacks.
+pub(super) fn divisions(kernel: &str) -> usize {
+    const ENTRY_POINT: u32 = 15;
+    const FUNCTION: u32 = 54;
+    const CALL: u32 = 57;
+    const DIVISION: u32 = 134;
+    const REMAINDER: u32 = 137;
+    let code = tumble::vulkan::kernels()
+        .find(|(name, _)| *name == kernel)
+        .unwrap()
+        .1;
+    let words = code
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
+    let words: Vec<u32> = words.collect();
+    let (mut offset, mut main, mut function) = (5, 0, 0);
+    // Of each function its divisions, and the functions that it calls.
+    let mut functions = BTreeMap::<u32, (usize, Vec<u32>)>::new();
+    while let Some(&word) = words.get(offset) {
+        let body = functions.entry(function).or_default();
+        match word & 0xffff {
+            ENTRY_POINT => main = words[offset + 2],
+            FUNCTION => function = words[offset + 2],
+            CALL => body.1.push(words[offset + 3]),
+            DIVISION | REMAINDER => body.0 += 1,
+            _ => {}
+        }
+        offset += (word >> 16).max(1) as usize;
+    }
+    fn within(function: u32, functions: &BTreeMap<u32, (usize, Vec<u32>)>) -> usize {
+        let (divisions, calls) = &functions[&function];
+        let called = calls.iter().map(|&called| within(called, functions));
+        divisions + called.sum::<usize>()
+    }
+    within(main, &functions)
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::compile::REPRESENTATION;
+use super::compile::{representations, statistics};
 
 /// AMD's generations of processors for graphics, as far as arithmetic differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,16 +26,7 @@ impl Listing {
     /// From the child's file: of the representations the assembler's, else, where the driver has
     /// no assembler for the processor, that of its compiler after registers are allocated.
     pub(super) fn read(text: &str) -> Self {
-        let (head, _) = text.split_once(REPRESENTATION).expect("representations");
-        let statistics = head.lines().filter_map(|line| {
-            let (name, value) = line.split_once(" = ")?;
-            Some((name.to_owned(), value.parse().ok()?))
-        });
-        let representations: BTreeMap<&str, &str> = text
-            .split(REPRESENTATION)
-            .skip(1)
-            .map(|part| part.split_once('\n').expect("a line with the name"))
-            .collect();
+        let representations = representations(text);
         let of = |name: &str| {
             let lines = representations.get(name).copied().unwrap_or_default();
             Self::of_lines(lines.lines())
@@ -49,7 +40,7 @@ impl Listing {
             "no instructions in {:?}",
             representations.keys()
         );
-        listing.statistics = statistics.collect();
+        listing.statistics = statistics(text);
         listing
     }
 

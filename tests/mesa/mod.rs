@@ -1,21 +1,27 @@
-//! Mesa's drivers where there is no card: RADV, which compiles for AMD's processors without one,
-//! and a lavapipe of today beside that of the system. `scripts/mesa.sh` unpacks both.
+//! Mesa's drivers where there is no card: RADV and NVK, which compile for AMD's and NVIDIA's processors
+//! without one, and a lavapipe of today beside that of the system. `scripts/mesa.sh` unpacks them.
 
 mod compile;
 mod lavapipe;
 mod listing;
+mod nvk;
 mod radv;
 mod table;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The manifest of a driver of the newer Mesa. CI must have it where there is such a package.
+/// The manifest of a driver of the newer Mesa.
 fn newer(driver: &str) -> Option<PathBuf> {
+    unpacked(&format!("{driver}_icd.json"))
+}
+
+/// A file of what `scripts/mesa.sh` unpacks. CI must have it where there is such a package.
+fn unpacked(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa");
-    let manifest = folder.join(format!("{driver}_icd.json"));
-    if folder.join("complete").exists() && manifest.exists() {
-        return Some(manifest);
+    let file = folder.join(name);
+    if folder.join("complete").exists() && file.exists() {
+        return Some(file);
     }
     let reason = std::fs::read_to_string(folder.join("unavailable"));
     assert!(
@@ -23,7 +29,7 @@ fn newer(driver: &str) -> Option<PathBuf> {
         "CI must have the newer Mesa: scripts/mesa.sh unpacks it into target/mesa"
     );
     let reason = reason.unwrap_or_else(|_| "scripts/mesa.sh unpacks it".to_owned());
-    eprintln!("NO NEWER MESA ({}): {driver} was not tested", reason.trim());
+    eprintln!("NO NEWER MESA ({}): {name} was not tested", reason.trim());
     None
 }
 

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::compile::child;
+use super::compile::{divisions, listings, this_program};
 use super::listing::{Generation, Listing};
 use super::table::{self, Cost};
 use super::{newer, with_driver};
@@ -43,6 +43,9 @@ const FAMILIES: [Family; 6] = [
     family("gfx1201", None, Generation::Rdna),
 ];
 
+/// The head of the table of docs/gpu.md: what a rotation costs on AMD's processors, kernel by kernel.
+const TABLE: &str = "| kernel | polaris10 |";
+
 /// A processor with so many vector registers for an invocation keeps at least a quarter of the
 /// waves that fit (polaris10 to navi31, waves of 64).
 const MAX_REGISTERS: u64 = 128;
@@ -74,67 +77,13 @@ fn compiled(
     } else {
         "newer"
     };
-    let folder = format!("mesa-{which}-{family}-{}", kernels.len());
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    let mut command = child(&folder, kernels, is_bare);
-    let output = with_driver(&mut command, manifest)
-        .env("RADV_FORCE_FAMILY", family)
-        .env("XDG_RUNTIME_DIR", &folder)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stdout);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{family}: {said}{errors}");
-    let named = tumble::vulkan::kernels().map(|(name, _)| name);
-    let named = named.filter(|name| kernels.is_empty() || kernels.contains(name));
-    let listings = named.map(|name| {
-        let text = std::fs::read_to_string(folder.join(name)).unwrap();
-        (name.to_owned(), Listing::read(&text))
-    });
-    let listings = listings.collect();
-    std::fs::remove_dir_all(&folder).unwrap();
-    listings
-}
-
-/// How often a kernel divides whole numbers, where its functions are put into their callers. Processors of AMD's have
-/// no such division: it is made of a reciprocal, taken to a whole number, and of exact steps that make good what that
-/// lacks.
-fn divisions(kernel: &str) -> usize {
-    const ENTRY_POINT: u32 = 15;
-    const FUNCTION: u32 = 54;
-    const CALL: u32 = 57;
-    const DIVISION: u32 = 134;
-    const REMAINDER: u32 = 137;
-    let code = tumble::vulkan::kernels()
-        .find(|(name, _)| *name == kernel)
-        .unwrap()
-        .1;
-    let words = code
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
-    let words: Vec<u32> = words.collect();
-    let (mut offset, mut main, mut function) = (5, 0, 0);
-    // Of each function its divisions, and the functions that it calls.
-    let mut functions = BTreeMap::<u32, (usize, Vec<u32>)>::new();
-    while let Some(&word) = words.get(offset) {
-        let body = functions.entry(function).or_default();
-        match word & 0xffff {
-            ENTRY_POINT => main = words[offset + 2],
-            FUNCTION => function = words[offset + 2],
-            CALL => body.1.push(words[offset + 3]),
-            DIVISION | REMAINDER => body.0 += 1,
-            _ => {}
-        }
-        offset += (word >> 16).max(1) as usize;
-    }
-    fn within(function: u32, functions: &BTreeMap<u32, (usize, Vec<u32>)>) -> usize {
-        let (divisions, calls) = &functions[&function];
-        let called = calls.iter().map(|&called| within(called, functions));
-        divisions + called.sum::<usize>()
-    }
-    within(main, &functions)
+    let label = format!("{which}-{family}-{}", kernels.len());
+    let mut program = this_program();
+    with_driver(&mut program, manifest).env("RADV_FORCE_FAMILY", family);
+    let texts = listings(&mut program, &label, kernels, is_bare).into_iter();
+    texts
+        .map(|(name, text)| (name, Listing::read(&text)))
+        .collect()
 }
 
 /// What is wrong with a kernel.
@@ -179,7 +128,7 @@ fn every_kernel_is_exact_on_families_in_turn() {
         .chain(older_families)
         .filter_map(|(family, name, manifest)| Some((family, name?, manifest.as_deref()?)))
         .collect();
-    let in_table = table::kernels();
+    let in_table = table::kernels(TABLE);
     let of_all: Vec<_> = asked
         .into_par_iter()
         .enumerate()
@@ -206,7 +155,7 @@ fn every_kernel_is_exact_on_families_in_turn() {
             }
             if newer.as_deref() == Some(manifest) {
                 let cost = Cost {
-                    instructions: listing.vector_instructions_a_sample(),
+                    instructions: listing.vector_instructions_a_sample() as u64,
                     registers: listing.statistic("VGPRs"),
                 };
                 costs.insert((kernel.clone(), family.name), cost);
@@ -214,7 +163,7 @@ fn every_kernel_is_exact_on_families_in_turn() {
         }
     }
     if newer.is_some() {
-        wrong.extend(table::check(&costs));
+        wrong.extend(table::check(TABLE, &costs));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -1,20 +1,18 @@
-//! The table of `docs/gpu.md`: what a rotation costs on AMD's processors, kernel by kernel.
-//! `UPDATE_RADV=1 cargo test --test all mesa::radv` writes what was measured into its cells.
+//! The tables of `docs/gpu.md`: what kernels cost on processors of AMD's and NVIDIA's, one by one.
+//! `UPDATE_LISTINGS=1 cargo test --test all mesa::` writes what was measured into their cells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// What the table has of one kernel on one family.
+/// What a table has of one kernel on one family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cost {
-    /// Vector instructions for a sample.
-    pub(super) instructions: usize,
+    /// Instructions for a sample, or for what the table says.
+    pub(super) instructions: u64,
     /// Vector registers of an invocation.
     pub(super) registers: u64,
 }
-
-/// The first cell of the table's head; the families follow.
-const HEAD: &str = "| kernel | polaris10 |";
 
 fn page() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gpu.md")
@@ -25,22 +23,25 @@ fn cells(line: &str) -> Vec<&str> {
     inner.map(|cell| cell.trim().trim_matches('`')).collect()
 }
 
-/// The kernels that the table has.
-pub(super) fn kernels() -> Vec<String> {
+/// The kernels that a table has. `head` is how the table's first line begins; the families follow in it.
+pub(super) fn kernels(head: &str) -> Vec<String> {
     let text = std::fs::read_to_string(page()).unwrap();
     let lines = text
         .lines()
-        .skip_while(|line| !line.starts_with(HEAD))
+        .skip_while(|line| !line.starts_with(head))
         .skip(2);
     let lines = lines.take_while(|line| line.starts_with('|'));
     lines.map(|line| cells(line)[0].to_owned()).collect()
 }
 
-/// Compares the table with what was measured, by kernel and family; returns what is wrong with it.
-pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
+/// Compares a table with what was measured, by kernel and family; returns what is wrong with it.
+pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
+    // Two tables are on one page, and are written by tests that run at once.
+    static PAGE: Mutex<()> = Mutex::new(());
+    let _page = PAGE.lock().unwrap_or_else(PoisonError::into_inner);
     let text = std::fs::read_to_string(page()).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
-    let head = lines.iter().position(|line| line.starts_with(HEAD));
+    let head = lines.iter().position(|line| line.starts_with(head));
     let head = head.expect("docs/gpu.md has the table");
     let families: Vec<String> = cells(&lines[head])
         .iter()
@@ -68,7 +69,7 @@ pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
         *line = row;
     }
     assert!(rows >= 8, "the table of docs/gpu.md has {rows} rows");
-    if std::env::var_os("UPDATE_RADV").is_some() {
+    if std::env::var_os("UPDATE_LISTINGS").is_some() {
         std::fs::write(page(), lines.join("\n") + "\n").unwrap();
         return Vec::new();
     }
@@ -80,7 +81,7 @@ pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
 fn differs(documented: &str, found: Cost) -> Option<String> {
     let numbers = documented.split_once(", ");
     let numbers = numbers.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-    let Some((instructions, registers)): Option<(usize, u64)> = numbers else {
+    let Some((instructions, registers)): Option<(u64, u64)> = numbers else {
         return Some(format!("`{documented}` is not instructions and registers"));
     };
     let is_near = |documented: f64, found: f64| {
@@ -92,7 +93,7 @@ fn differs(documented: &str, found: Cost) -> Option<String> {
     match instructions_are_near && registers_are_near {
         true => None,
         false => Some(format!(
-            "{found:?}, not {documented} (UPDATE_RADV=1 writes what is measured)"
+            "{found:?}, not {documented} (UPDATE_LISTINGS=1 writes what is measured)"
         )),
     }
 }
