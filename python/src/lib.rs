@@ -27,6 +27,7 @@ mod pickle;
 mod poses;
 mod program;
 mod reduce;
+mod robot;
 mod route;
 mod run;
 mod samples;
@@ -69,6 +70,8 @@ mod _tumble {
     use crate::program::{devices, encodings, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]
     use crate::reduce::{Reduction, reduce};
+    #[pymodule_export]
+    use crate::robot::Robot;
     #[pymodule_export]
     use crate::route::{Route, Surface, Walk, walk};
     #[pymodule_export]

@@ -59,7 +59,7 @@ def test_everything_public_is_documented_with_an_example():
             assert ">>>" in value.__doc__ or name.split(".")[-1] in small, name
 
 
-@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md"])
+@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md"])
 def test_examples_in_documents(document, monkeypatch, tmp_path):
     """Their blocks of Python run one after another, in a folder with a file of each kind."""
     text = (ROOT / document).read_text(encoding="utf-8")
@@ -69,6 +69,9 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
     rng = np.random.default_rng(5)
     poses = 0.1 * rng.normal(size=(40, 3 * 22))
     np.savez("walk.npz", poses=poses, trans=np.zeros((40, 3)), mocap_framerate=np.float64(120))
+    pathlib.Path("robot.xml").write_text(ROBOT)
+    still = np.tile([1.0, 0, 0, 0], (31, 1))
+    np.savez("keys.npz", joint_pos=rng.normal(size=(31, 1)), root_pos=np.zeros((31, 3)), root_quat=still)
     if SHARED.is_dir():
         shutil.copy(SHARED / "gltf" / "Fox.glb", "fox.glb")
     else:
@@ -80,6 +83,10 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, document, "exec"), names)
+
+
+ROBOT = """<mujoco><worldbody><body name="pelvis"><freejoint name="root"/>
+<body name="shin"><joint name="knee"/></body></body></worldbody></mujoco>"""
 
 
 def mypy(*arguments, cwd):

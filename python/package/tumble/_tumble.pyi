@@ -27,6 +27,7 @@ __all__ = [
     "Plan",
     "Record",
     "Reduction",
+    "Robot",
     "Route",
     "Spread",
     "Surface",
@@ -447,6 +448,35 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
+    def bodies(
+        self,
+        robot: Robot,
+        joint_pos: _Array,
+        root_pos: _Array | None = None,
+        root_quat: _Array | _Rotation | None = None,
+        *,
+        order: _Order,
+        source_fps: _Rate | None = None,
+        source_times: _Array | None = None,
+        joint_names: Sequence[str] | None = None,
+        body_order: _BodyOrder = "depth-first",
+        siblings: _Siblings = "file",
+        velocity_at: _VelocityPoint = "origin",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Outside | None = None,
+        after: _Outside | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> dict[str, _Single]: ...
     @overload
     def velocity(
         self,
@@ -1549,6 +1579,44 @@ class Surface:
         max_slope: float | None = None,
         up: _Up = (0.0, 1.0, 0.0),
     ) -> list[Route | None]: ...
+
+_BodyOrder: TypeAlias = Literal["depth-first", "breadth-first"]
+_Siblings: TypeAlias = Literal["file", "body-name", "joint-name"]
+_VelocityPoint: TypeAlias = Literal["origin", "mass"]
+
+@final
+class Robot:
+    @staticmethod
+    def load(path: _Path) -> Robot: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def root_names(self) -> list[str]: ...
+    @property
+    def ball_names(self) -> list[str]: ...
+    @property
+    def limits(self) -> _Double: ...
+    def body_names(
+        self, body_order: _BodyOrder = "depth-first", *, siblings: _Siblings = "file"
+    ) -> list[str]: ...
+    def forward(
+        self,
+        joint_pos: _Array,
+        root_pos: _Array | None = None,
+        root_quat: _Array | None = None,
+        *,
+        order: _Order,
+        joint_vel: _Array | None = None,
+        root_lin_vel: _Array | None = None,
+        root_ang_vel: _Array | None = None,
+        ball_quat: _Array | None = None,
+        ball_vel: _Array | None = None,
+        body_order: _BodyOrder = "depth-first",
+        siblings: _Siblings = "file",
+        velocity_at: _VelocityPoint = "origin",
+    ) -> dict[str, _Double]: ...
 
 @final
 class Route:

@@ -24,6 +24,7 @@ use crate::names::option_named;
 use crate::options::{EvaluationKeywords, method_named, request_arrays, samples_of};
 use crate::output::{encoding_named, quaternions_of};
 use crate::poses;
+use crate::robot::{self, BodyNames, JointKeys, Robot};
 use crate::run::{interruptible, stoppable};
 use crate::samples;
 use crate::stream::Chunks;
@@ -173,6 +174,65 @@ impl Engine {
             ..OutputForm::default()
         };
         self.result(clip, &result, out, options)
+    }
+
+    /// The joints and bodies of a robot at samples of a motion: a dict of float32 arrays with the names of mjlab's
+    /// files, `joint_pos` and `joint_vel` (frames, joints), `body_pos_w` (frames, bodies, 3), `body_quat_w` (…, 4),
+    /// `body_lin_vel_w` and `body_ang_vel_w` (…, 3), in the world.
+    ///
+    /// `bodies(robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None,
+    /// joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", …)`
+    ///
+    /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys, 3)
+    /// and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times`, seconds. `order`: "wxyz"
+    /// or "xyzw", of keys and results; it has no default, because files differ. `body_order`, `siblings` and
+    /// `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
+    ///
+    /// Joints are interpolated, and bodies follow from them. Velocities are derivatives of the curves. Angles of
+    /// hinges without limits are unwrapped first. Joints without keys stay where the file has them, and joints that
+    /// leave their limits are reported, both as warnings.
+    ///
+    /// >>> import pathlib, tempfile, tumble
+    /// >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.urdf")
+    /// >>> _ = path.write_text('<robot name="arm"><link name="base"/><link name="hand"/>'
+    /// ...     '<joint name="elbow" type="continuous"><parent link="base"/><child link="hand"/>'
+    /// ...     '<axis xyz="0 0 1"/></joint></robot>')
+    /// >>> robot = tumble.Robot.load(path)
+    /// >>> found = tumble.Engine("cpu").bodies(robot, [[3.0], [3.5]], order="wxyz", source_fps=2, fps=4)
+    /// >>> found["joint_pos"].ravel()
+    /// array([3.  , 3.25, 3.5 ], dtype=float32)
+    #[pyo3(signature = (robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", **options), text_signature = "($self, robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order='depth-first', siblings='file', velocity_at='origin', fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn bodies<'py>(
+        &self,
+        robot: &Bound<'py, Robot>,
+        joint_pos: &Bound<'py, PyAny>,
+        root_pos: Option<&Bound<'py, PyAny>>,
+        root_quat: Option<&Bound<'py, PyAny>>,
+        order: &str,
+        source_fps: Option<&Bound<'py, PyAny>>,
+        source_times: Option<&Bound<'py, PyAny>>,
+        joint_names: Option<ListArgument<String>>,
+        body_order: &str,
+        siblings: &str,
+        velocity_at: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let keys = JointKeys {
+            joint_pos,
+            root_pos,
+            root_quat,
+            joint_names: joint_names.map(|names| names.0),
+            source_fps,
+            source_times,
+        };
+        let names = BodyNames {
+            order,
+            body_order,
+            siblings,
+            velocity_at,
+        };
+        robot::bodies(self, robot, &keys, &names, options)
     }
 
     /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,

@@ -1,0 +1,431 @@
+//! The bodies of a robot at each sample of a motion: its joints are interpolated, and the bodies follow from them.
+
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+use tumble::trees::{
+    BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
+    Siblings, Tree, TreeBody, TreeError, TreeJoint,
+};
+use tumble::{
+    Axes, Channel, Engine, Error, Interpolation, Layout, Quantity, SampleTimes, ScalarQuantity,
+    TrackSet, VectorMethod, names,
+};
+
+/// What is computed of a robot's motion.
+#[derive(Debug, Clone)]
+pub struct BodiesRequest {
+    /// The samples.
+    pub frames: SampleTimes,
+    /// How the rotations of free joints and balls are interpolated; its ends and wrap modes are those of all joints.
+    pub rotations: Interpolation,
+    /// How scalars and positions are interpolated.
+    pub vectors: VectorMethod,
+    /// The order of the bodies.
+    pub order: BodyOrder,
+    /// The order of bodies with the same parent.
+    pub siblings: Siblings,
+    /// The point of a body whose velocity is computed.
+    pub velocity_at: VelocityPoint,
+}
+
+/// The point of a body whose linear velocity is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum VelocityPoint {
+    /// The origin of its frame: mjlab.
+    #[default]
+    Origin,
+    /// Its centre of mass: `IsaacLab`, `BeyondMimic`.
+    Mass,
+}
+
+names! {
+    VelocityPoint, "point of a body",
+    Origin => "origin",
+    Mass => "mass",
+}
+
+/// The motion of a robot's joints and bodies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bodies {
+    /// The value of each joint of [`Tree::scalar_joints`] at each sample, `[sample][joint]`: rad, metres.
+    pub joint_values: Vec<f32>,
+    /// The velocities of the same, per second.
+    pub joint_rates: Vec<f32>,
+    /// The indices of the bodies in [`Tree::bodies`], in the requested order.
+    pub order: Vec<usize>,
+    /// Each body at each sample, `[sample][body]`, in the requested order. Linear velocities are those of the requested
+    /// point.
+    pub motions: Vec<BodyMotion>,
+    /// The joints that have no keys, and stay where the file has them.
+    pub resting: Vec<String>,
+    /// The joints that leave their limits, with the largest excess.
+    pub excesses: Vec<LimitExcess>,
+}
+
+/// How far a joint leaves its limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitExcess {
+    /// The joint.
+    pub joint: String,
+    /// The largest distance from the limits, rad or metres.
+    pub excess: f64,
+    /// The first sample outside the limits.
+    pub sample: usize,
+}
+
+/// Why the bodies of a motion cannot be computed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BodiesError {
+    /// The joints cannot be interpolated.
+    #[error(transparent)]
+    Engine(#[from] Error),
+    /// A sample is not a configuration of the tree.
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+    /// The motion has something that is not a joint of the robot.
+    #[error(
+        "`{name}` is not {kind} of the robot; it has {}",
+        if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+    )]
+    NotAJoint {
+        /// What was looked for.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// The names that there are.
+        known: Vec<String>,
+    },
+    /// The velocity of a centre of mass that the file does not say is asked for.
+    #[error(
+        "the file does not say where the centre of mass of body `{body}` is (`inertial`); ask for the velocity at the \
+         origin, or add it"
+    )]
+    NoMassCentre {
+        /// The body.
+        body: String,
+    },
+}
+
+/// Angles without jumps: each differs from the one before by at most half a `period`. A step of exactly half a period
+/// keeps its direction, as in `numpy.unwrap`.
+pub fn unwrap_angles(angles: &mut [f64], period: f64) {
+    let half = period / 2.0;
+    let (mut before, mut shift) = (None::<f64>, 0.0);
+    for angle in angles {
+        if let Some(before) = before {
+            let step = *angle - before;
+            let turns = ((step.abs() - half) / period).ceil().max(0.0);
+            shift -= period * turns * step.signum();
+        }
+        before = Some(*angle);
+        *angle += shift;
+    }
+}
+
+/// Unwraps the angles of a joint if it has no limits and turns: then a file may have wrapped them.
+pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
+    let turns = tree.scalar_joints().any(|known| {
+        known.name == joint && known.kind == JointKind::Hinge && known.limits.is_none()
+    });
+    if turns {
+        unwrap_angles(values, TAU);
+    }
+}
+
+/// The bodies of a robot at each sample of a motion. Scalars of `set` are hinges and slides with the same names. Its
+/// tracks are balls by their names, and free joints by their names or those of their bodies; translations of these
+/// tracks are positions. Joints without keys rest, which the result says.
+///
+/// Rates are derivatives of the curves, not differences of samples. The bodies are computed in f64.
+///
+/// # Errors
+/// A [`BodiesError`].
+pub fn bodies(
+    engine: &Engine,
+    tree: &Tree,
+    set: &TrackSet,
+    request: &BodiesRequest,
+) -> Result<Bodies, BodiesError> {
+    let joints = JointTracks::new(tree, set)?;
+    let channels = Sampled::new(engine, set, request)?;
+    let order = tree.order(request.order, request.siblings);
+    let centres = mass_centres(tree, request.velocity_at)?;
+    let at = |sample| joints.at(tree, &channels, sample);
+    let motions = motions(tree, channels.samples, &order, &centres, at)?;
+    let (mut joint_values, mut joint_rates) = (Vec::new(), Vec::new());
+    let mut excesses = Vec::new();
+    for sample in 0..channels.samples {
+        let (configuration, rates) = at(sample);
+        note_excesses(tree, &configuration.scalars, sample, &mut excesses);
+        joint_values.extend(configuration.scalars.iter().map(|&value| value as f32));
+        joint_rates.extend(rates.scalars.iter().map(|&rate| rate as f32));
+    }
+    Ok(Bodies {
+        joint_values,
+        joint_rates,
+        order,
+        motions,
+        resting: joints.resting(tree),
+        excesses,
+    })
+}
+
+/// The bodies of configurations, in an order of bodies, one configuration after the other; `at` has each. With
+/// `centres` ([`mass_centres`]), linear velocities are those of these points.
+///
+/// # Errors
+/// When a configuration has not one finite value for each joint.
+pub fn motions(
+    tree: &Tree,
+    count: usize,
+    order: &[usize],
+    centres: &[DVec3],
+    at: impl Fn(usize) -> (Configuration, ConfigurationRates) + Sync,
+) -> Result<Vec<BodyMotion>, TreeError> {
+    let one = |sample: usize| {
+        let (configuration, rates) = at(sample);
+        let all = tree.motions(&configuration, &rates)?;
+        let ordered = order.iter().map(|&body| {
+            let mut motion = all[body];
+            if let Some(&centre) = centres.get(body) {
+                motion.velocity.linear = motion.velocity_at(centre);
+            }
+            motion
+        });
+        Ok(ordered.collect::<Vec<_>>())
+    };
+    let all: Result<Vec<_>, TreeError> = (0..count).into_par_iter().map(one).collect();
+    Ok(all?.concat())
+}
+
+/// The points of bodies whose velocities are asked for: centres of mass, in the order of [`Tree::bodies`], or none for
+/// origins.
+///
+/// # Errors
+/// When the file does not say where a body's centre of mass is.
+pub fn mass_centres(tree: &Tree, point: VelocityPoint) -> Result<Vec<DVec3>, BodiesError> {
+    let centre = |body: &TreeBody| {
+        let missing = || BodiesError::NoMassCentre {
+            body: body.name.clone(),
+        };
+        body.mass_centre.ok_or_else(missing)
+    };
+    match point {
+        VelocityPoint::Origin => Ok(Vec::new()),
+        VelocityPoint::Mass => tree.bodies().iter().map(centre).collect(),
+    }
+}
+
+fn note_excesses(tree: &Tree, values: &[f64], sample: usize, excesses: &mut Vec<LimitExcess>) {
+    for (joint, &value) in tree.scalar_joints().zip(values) {
+        let Some([low, high]) = joint.limits else {
+            continue;
+        };
+        let excess = (low - value).max(value - high);
+        // Limits and keys are rounded to f32 in most files.
+        if excess <= 1e-6 * value.abs().max(1.0) {
+            continue;
+        }
+        match excesses.iter_mut().find(|known| known.joint == joint.name) {
+            Some(known) => known.excess = known.excess.max(excess),
+            None => excesses.push(LimitExcess {
+                joint: joint.name.clone(),
+                excess,
+                sample,
+            }),
+        }
+    }
+}
+
+/// Where the keys of each joint are in a set.
+struct JointTracks {
+    scalars: Vec<Option<usize>>,
+    balls: Vec<Option<usize>>,
+    free: Vec<Option<usize>>,
+}
+
+impl JointTracks {
+    fn new(tree: &Tree, set: &TrackSet) -> Result<Self, BodiesError> {
+        let named = |kind: JointKind| {
+            let of_bodies = tree.bodies().iter();
+            of_bodies.flat_map(move |body| {
+                let joints = body.joints.iter().filter(move |joint| joint.kind == kind);
+                joints.map(|joint| [&*joint.name, &*body.name])
+            })
+        };
+        let track_of = |name: &str| (0..set.track_count()).find(|&i| set.track_name(i) == name);
+        let balls: Vec<_> = named(JointKind::Ball)
+            .map(|[joint, _]| track_of(joint))
+            .collect();
+        let of_free = |[joint, body]: [&str; 2]| track_of(joint).or_else(|| track_of(body));
+        let free: Vec<_> = named(JointKind::Free).map(of_free).collect();
+        let taken = |track: usize| {
+            balls
+                .iter()
+                .chain(&free)
+                .flatten()
+                .any(|&used| used == track)
+        };
+        if let Some(other) = (0..set.track_count()).find(|&track| !taken(track)) {
+            let known = named(JointKind::Free).chain(named(JointKind::Ball));
+            return Err(BodiesError::NotAJoint {
+                kind: "a free joint or a ball",
+                name: set.track_name(other),
+                known: known.map(|[joint, _]| joint.to_owned()).collect(),
+            });
+        }
+        let names: Vec<&str> = tree.scalar_joints().map(|joint| &*joint.name).collect();
+        for index in 0..set.scalar_count() {
+            let name = set.scalar(index).map_or("", |scalar| scalar.name);
+            if !names.contains(&name) {
+                return Err(BodiesError::NotAJoint {
+                    kind: "a hinge or a slide with a value",
+                    name: name.to_owned(),
+                    known: names.iter().map(|&name| name.to_owned()).collect(),
+                });
+            }
+        }
+        let scalars = names.iter().map(|name| set.scalar_named(name)).collect();
+        Ok(Self {
+            scalars,
+            balls,
+            free,
+        })
+    }
+
+    /// The joints without keys.
+    fn resting(&self, tree: &Tree) -> Vec<String> {
+        let of = |kind: JointKind| tree.joints().filter(move |joint| joint.kind == kind);
+        let without =
+            |joint: &TreeJoint, track: &Option<usize>| track.is_none().then(|| joint.name.clone());
+        let free = of(JointKind::Free).zip(&self.free);
+        let balls = of(JointKind::Ball).zip(&self.balls);
+        let scalars = tree.scalar_joints().zip(&self.scalars);
+        let all = free.chain(balls).chain(scalars);
+        all.filter_map(|(joint, track)| without(joint, track))
+            .collect()
+    }
+
+    fn at(
+        &self,
+        tree: &Tree,
+        channels: &Sampled,
+        sample: usize,
+    ) -> (Configuration, ConfigurationRates) {
+        let (mut configuration, mut rates) = (tree.rest(), tree.no_rates());
+        for (joint, scalar) in self.scalars.iter().enumerate() {
+            if let &Some(scalar) = scalar {
+                let [value, rate] = channels.scalar(scalar, sample);
+                (configuration.scalars[joint], rates.scalars[joint]) = (value, rate);
+            }
+        }
+        for (ball, track) in self.balls.iter().enumerate() {
+            if let &Some(track) = track {
+                let (pose, rate) = channels.pose(track, sample);
+                configuration.balls[ball] = pose.rotation;
+                // In the axes of the body.
+                rates.balls[ball] = pose.rotation.inverse() * rate.angular;
+            }
+        }
+        for (free, track) in self.free.iter().enumerate() {
+            if let &Some(track) = track {
+                let (mut pose, rate) = channels.pose(track, sample);
+                if channels.positions.is_none() {
+                    pose.position = configuration.free[free].position;
+                }
+                (configuration.free[free], rates.free[free]) = (pose, rate);
+            }
+        }
+        (configuration, rates)
+    }
+}
+
+/// The samples of a set, `[sample][track]` and `[sample][scalar]`.
+struct Sampled {
+    samples: usize,
+    tracks: usize,
+    scalar_count: usize,
+    scalars: Vec<[f32; 2]>,
+    rotations: Vec<[f32; 4]>,
+    /// In the parents' frames.
+    angular: Vec<[f32; 4]>,
+    /// `None` without translations.
+    positions: Option<[Vec<[f32; 4]>; 2]>,
+}
+
+impl Sampled {
+    fn new(engine: &Engine, set: &TrackSet, request: &BodiesRequest) -> Result<Self, BodiesError> {
+        let BodiesRequest {
+            frames,
+            rotations,
+            vectors,
+            ..
+        } = request;
+        let layout = Layout::FrameMajor;
+        let tracks = set.track_count();
+        let scalars =
+            |quantity| engine.scalars(set, quantity, *vectors, *rotations, frames, layout);
+        let [values, rates] = [
+            scalars(ScalarQuantity::Value)?,
+            scalars(ScalarQuantity::Velocity)?,
+        ];
+        let samples = values.sample_count();
+        let pairs = values.as_slice().iter().zip(rates.as_slice());
+        let mut sampled = Self {
+            samples,
+            tracks,
+            scalar_count: set.scalar_count(),
+            scalars: pairs.map(|(&value, &rate)| [value, rate]).collect(),
+            rotations: Vec::new(),
+            angular: Vec::new(),
+            positions: None,
+        };
+        if tracks == 0 {
+            return Ok(sampled);
+        }
+        let poses = engine
+            .request(set, *rotations, frames)
+            .layout(layout)
+            .evaluate()?;
+        sampled.rotations = poses.as_arrays().to_vec();
+        let rate = Interpolation {
+            quantity: Quantity::Velocity(Axes::Parent),
+            ..*rotations
+        };
+        sampled.angular = engine
+            .rates(set, rate, frames, layout)?
+            .as_arrays()
+            .to_vec();
+        if (0..tracks).any(|track| set.vector_keys(Channel::Translation, track).is_some()) {
+            let channel = Channel::Translation;
+            let at = engine.vectors(set, channel, *vectors, *rotations, frames, layout)?;
+            let quantity = ScalarQuantity::Velocity;
+            let rates = engine
+                .vector_rates(set, channel, quantity, *vectors, *rotations, frames, layout)?;
+            sampled.positions = Some([at.as_arrays().to_vec(), rates.as_arrays().to_vec()]);
+        }
+        Ok(sampled)
+    }
+
+    fn scalar(&self, scalar: usize, sample: usize) -> [f64; 2] {
+        self.scalars[sample * self.scalar_count + scalar].map(f64::from)
+    }
+
+    fn pose(&self, track: usize, sample: usize) -> (BodyPose, BodyVelocity) {
+        let index = sample * self.tracks + track;
+        let vector = |[x, y, z, _]: [f32; 4]| DVec3::new(x.into(), y.into(), z.into());
+        let (position, linear) = match &self.positions {
+            Some([at, rates]) => (vector(at[index]), vector(rates[index])),
+            None => (DVec3::ZERO, DVec3::ZERO),
+        };
+        let rotation = DQuat::from_array(self.rotations[index].map(f64::from));
+        let angular = vector(self.angular[index]);
+        (
+            BodyPose { position, rotation },
+            BodyVelocity { linear, angular },
+        )
+    }
+}
