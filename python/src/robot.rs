@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::{DQuat, DVec3, Vec3};
 use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyString, PyType};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::trees::{
     BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind, Tree,
@@ -57,8 +57,9 @@ impl Robot {
     /// >>> robot = tumble.Robot.load(path)
     /// >>> robot
     /// Robot("", 2 bodies, 1 joints)
-    #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    #[classmethod]
+    fn load(class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
+        let py = class.py();
         let path = std::path::absolute(path)?;
         let read = path.clone();
         let robot = interruptible(py, move || {

@@ -1586,8 +1586,8 @@ _VelocityPoint: TypeAlias = Literal["origin", "mass"]
 
 @final
 class Robot:
-    @staticmethod
-    def load(path: _Path) -> Robot: ...
+    @classmethod
+    def load(cls, path: _Path) -> Robot: ...
     @property
     def name(self) -> str: ...
     @property
