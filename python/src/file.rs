@@ -1,10 +1,12 @@
 //! `tumble.load` and `tumble.File`: what a file holds.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use pyo3::exceptions::{PyIndexError, PyKeyError};
+use pyo3::exceptions::{PyException, PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
@@ -16,7 +18,7 @@ use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
 use crate::arrays::{ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
-use crate::errors::{expected, input, of_diagnostic, of_track, warn};
+use crate::errors::{expected, guarded, input, of_diagnostic, of_track, warn};
 use crate::names::{one_of, option_of, unknown_name};
 use crate::options::frame_rate;
 use crate::run::interruptible;
@@ -245,109 +247,148 @@ pub(crate) fn load(
     scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
-    let options = [
-        ("source_fps", source_fps.is_some()),
-        ("override_fps", override_fps.is_some()),
-        ("source_times", source_times.is_some()),
-    ];
-    let mut named = options.iter().filter(|(_, is_named)| *is_named);
-    if let (Some((first, _)), Some((second, _))) = (named.next(), named.next()) {
-        return Err(input(format!(
-            "{first} and {second} both say when the keys are; give one"
-        )));
-    }
-    let is_changed = source_fps.is_some()
-        || override_fps.is_some()
-        || source_times.is_some()
-        || map.is_some()
-        || time_unit.is_some()
-        || source_order.is_some()
-        || duplicates.is_some()
-        || bridge_gaps
-        || keyframes
-        || offsets.is_some()
-        || body_model.is_some();
-    let options = ReadOptions {
-        limits: Limits::default(),
-        pipes: false,
-        raw_times,
-        duplicates: match duplicates {
-            None => Duplicates::Refuse,
-            Some(which) => one_of(
-                which,
-                "duplicates",
-                &[
-                    ("first", Duplicates::First),
-                    ("last", Duplicates::Last),
-                    ("both", Duplicates::Both),
-                ],
-            )?,
-        },
-        source_rate: source_fps.map(frame_rate).transpose()?,
-        override_rate: override_fps.map(frame_rate).transpose()?,
-        frame_times: None,
+    let keywords = LoadKeywords {
+        format: format.map(str::to_owned),
+        source_fps: source_fps.cloned(),
+        override_fps: override_fps.cloned(),
+        source_times,
         map,
-        time_unit: time_unit
-            .map(|unit| option_of(unit, "time_unit"))
-            .transpose()?,
-        source_order: source_order
-            .map(|order| option_of(order, "source_order"))
-            .transpose()?,
+        time_unit: time_unit.cloned(),
+        source_order: source_order.cloned(),
+        duplicates: duplicates.cloned(),
+        raw_times,
         bridge_gaps,
         keyframes,
-        has_body_model: body_model.is_some(),
-    };
-    let format = format.map(format_named).transpose()?;
-    let up: Option<UpAxis> = up.map(|axis| option_of(axis, "up")).transpose()?;
-    let scale = scale.map(Scale::of).transpose()?;
-    if offsets.is_some() && body_model.is_some() {
-        return Err(input(
-            "offsets and body_model both place the joints; give one",
-        ));
-    }
-    let offsets = offsets.map(joint_offsets).transpose()?;
-    let request = FileOptions {
-        format,
-        options,
-        source_times,
-        offsets,
+        offsets: offsets.cloned(),
         body_model,
-        scale,
-        up,
-        is_changed,
+        scale: scale.cloned(),
+        up: up.cloned(),
     };
-    let (file, warnings) = request.read(py, path)?;
+    let (file, warnings) = FileOptions::new(keywords)?.read(py, path)?;
     warn(py, &warnings)?;
     Ok(file)
 }
 
-/// Reads files of any format, as `load` does, and warns once for each code: what `MotionLibrary.load` does.
+/// A file that was left out: its path, the code of the fault, and the message.
+type SkippedFile = (PathBuf, Option<String>, String);
+
+/// Reads files of any format, as `load` does with the same keywords, on all threads, and warns once for each code: what
+/// `MotionLibrary.load` does. `skip`: files that cannot be read are left out and returned. `progress` is called with the
+/// number of files that were read and of all, now and then and at the end.
 #[pyfunction]
-#[pyo3(signature = (paths, source_fps=None, override_fps=None))]
+#[pyo3(signature = (paths, keywords, *, skip=false, progress=None))]
 pub(crate) fn load_all(
     py: Python<'_>,
     paths: ListArgument<PathBuf>,
-    source_fps: Option<&Bound<'_, PyAny>>,
-    override_fps: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Vec<File>> {
-    let request = FileOptions {
-        options: ReadOptions {
-            source_rate: source_fps.map(frame_rate).transpose()?,
-            override_rate: override_fps.map(frame_rate).transpose()?,
-            ..ReadOptions::default()
-        },
-        is_changed: source_fps.is_some() || override_fps.is_some(),
-        ..FileOptions::default()
-    };
-    let mut files = Vec::with_capacity(paths.0.len());
+    keywords: &Bound<'_, PyDict>,
+    skip: bool,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Vec<File>, Vec<SkippedFile>)> {
+    let request = Arc::new(FileOptions::new(LoadKeywords::of_dict(keywords)?)?);
+    let (mut files, mut skipped) = (Vec::with_capacity(paths.0.len()), Vec::new());
     let mut warnings = Vec::new();
-    for path in paths.0 {
-        let (file, of_file) = request.clone().read(py, path)?;
-        files.push(file);
-        warnings.extend(of_file);
+    for (chunk, paths_read) in paths.0.chunks(FILES_AT_ONCE).enumerate() {
+        let (reading, several) = (Arc::clone(&request), paths_read.to_vec());
+        let found = interruptible(py, move || Ok(reading.read_several(&several)))?;
+        for (path, loaded) in paths_read.iter().zip(found) {
+            match loaded.and_then(|loaded| request.file(path.clone(), loaded)) {
+                Ok((file, of_file)) => {
+                    files.push(file);
+                    warnings.extend(of_file);
+                }
+                Err(error) if skip && error.is_instance_of::<PyException>(py) => {
+                    let value = error.value(py);
+                    let code = value.getattr_opt("code")?;
+                    let code = code.map(|code| code.extract()).transpose()?;
+                    let message = value.str()?.to_string();
+                    skipped.push((path.clone(), code.flatten(), message));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if let Some(progress) = progress {
+            progress.call1((chunk * FILES_AT_ONCE + paths_read.len(), paths.0.len()))?;
+        }
     }
     warn(py, &warnings)?;
-    Ok(files)
+    Ok((files, skipped))
+}
+
+/// Files that are read between two calls of `progress`.
+const FILES_AT_ONCE: usize = 64;
+
+/// The keywords of `load`.
+#[derive(Default)]
+struct LoadKeywords<'py> {
+    format: Option<String>,
+    source_fps: Option<Bound<'py, PyAny>>,
+    override_fps: Option<Bound<'py, PyAny>>,
+    source_times: Option<PathBuf>,
+    map: Option<String>,
+    time_unit: Option<Bound<'py, PyAny>>,
+    source_order: Option<Bound<'py, PyAny>>,
+    duplicates: Option<Bound<'py, PyAny>>,
+    raw_times: bool,
+    bridge_gaps: bool,
+    keyframes: bool,
+    offsets: Option<Bound<'py, PyAny>>,
+    body_model: Option<PathBuf>,
+    scale: Option<Bound<'py, PyAny>>,
+    up: Option<Bound<'py, PyAny>>,
+}
+
+/// The names of [`LoadKeywords`].
+const LOAD_KEYWORDS: [&str; 15] = [
+    "format",
+    "source_fps",
+    "override_fps",
+    "source_times",
+    "map",
+    "time_unit",
+    "source_order",
+    "duplicates",
+    "raw_times",
+    "bridge_gaps",
+    "keyframes",
+    "offsets",
+    "body_model",
+    "scale",
+    "up",
+];
+
+impl<'py> LoadKeywords<'py> {
+    fn of_dict(keywords: &Bound<'py, PyDict>) -> PyResult<Self> {
+        let mut all = Self::default();
+        for (name, value) in keywords {
+            let name: String = name.extract()?;
+            if value.is_none() && LOAD_KEYWORDS.contains(&&*name) {
+                continue;
+            }
+            match &*name {
+                "format" => all.format = value.extract()?,
+                "source_fps" => all.source_fps = Some(value),
+                "override_fps" => all.override_fps = Some(value),
+                "source_times" => all.source_times = value.extract()?,
+                "map" => all.map = value.extract()?,
+                "time_unit" => all.time_unit = Some(value),
+                "source_order" => all.source_order = Some(value),
+                "duplicates" => all.duplicates = Some(value),
+                "raw_times" => all.raw_times = value.extract()?,
+                "bridge_gaps" => all.bridge_gaps = value.extract()?,
+                "keyframes" => all.keyframes = value.extract()?,
+                "offsets" => all.offsets = Some(value),
+                "body_model" => all.body_model = value.extract()?,
+                "scale" => all.scale = Some(value),
+                "up" => all.up = Some(value),
+                _ => {
+                    let refusal = format!("there is no keyword `{name}`");
+                    let message = unknown_name(&refusal, &name, &LOAD_KEYWORDS);
+                    return Err(PyTypeError::new_err(message));
+                }
+            }
+        }
+        Ok(all)
+    }
 }
 
 /// How a file is read.
@@ -365,33 +406,163 @@ struct FileOptions {
 }
 
 impl FileOptions {
+    /// As keywords say.
+    fn new(keywords: LoadKeywords<'_>) -> PyResult<Self> {
+        let LoadKeywords {
+            format,
+            source_fps,
+            override_fps,
+            source_times,
+            map,
+            time_unit,
+            source_order,
+            duplicates,
+            raw_times,
+            bridge_gaps,
+            keyframes,
+            offsets,
+            body_model,
+            scale,
+            up,
+        } = keywords;
+        let options = [
+            ("source_fps", source_fps.is_some()),
+            ("override_fps", override_fps.is_some()),
+            ("source_times", source_times.is_some()),
+        ];
+        let mut named = options.iter().filter(|(_, is_named)| *is_named);
+        if let (Some((first, _)), Some((second, _))) = (named.next(), named.next()) {
+            return Err(input(format!(
+                "{first} and {second} both say when the keys are; give one"
+            )));
+        }
+        let is_changed = source_fps.is_some()
+            || override_fps.is_some()
+            || source_times.is_some()
+            || map.is_some()
+            || time_unit.is_some()
+            || source_order.is_some()
+            || duplicates.is_some()
+            || bridge_gaps
+            || keyframes
+            || offsets.is_some()
+            || body_model.is_some();
+        let options = ReadOptions {
+            limits: Limits::default(),
+            pipes: false,
+            raw_times,
+            duplicates: match duplicates {
+                None => Duplicates::Refuse,
+                Some(which) => one_of(
+                    &which,
+                    "duplicates",
+                    &[
+                        ("first", Duplicates::First),
+                        ("last", Duplicates::Last),
+                        ("both", Duplicates::Both),
+                    ],
+                )?,
+            },
+            source_rate: source_fps.as_ref().map(frame_rate).transpose()?,
+            override_rate: override_fps.as_ref().map(frame_rate).transpose()?,
+            frame_times: None,
+            map,
+            time_unit: time_unit
+                .map(|unit| option_of(&unit, "time_unit"))
+                .transpose()?,
+            source_order: source_order
+                .map(|order| option_of(&order, "source_order"))
+                .transpose()?,
+            bridge_gaps,
+            keyframes,
+            has_body_model: body_model.is_some(),
+        };
+        let format = format.as_deref().map(format_named).transpose()?;
+        let up: Option<UpAxis> = up.map(|axis| option_of(&axis, "up")).transpose()?;
+        let scale = scale.as_ref().map(Scale::of).transpose()?;
+        if offsets.is_some() && body_model.is_some() {
+            return Err(input(
+                "offsets and body_model both place the joints; give one",
+            ));
+        }
+        let offsets = offsets.as_ref().map(joint_offsets).transpose()?;
+        Ok(Self {
+            format,
+            options,
+            source_times,
+            offsets,
+            body_model,
+            scale,
+            up,
+            is_changed,
+        })
+    }
+
     /// Reads a file; returns what to warn of, too.
-    fn read(mut self, py: Python<'_>, path: PathBuf) -> PyResult<(File, Vec<Diagnostic>)> {
-        let (file, is_changed) = (path.clone(), self.is_changed);
-        let mut loaded = interruptible(py, move || self.loaded(&file))?;
+    fn read(self, py: Python<'_>, path: PathBuf) -> PyResult<(File, Vec<Diagnostic>)> {
+        let request = Arc::new(self);
+        let (reading, file) = (Arc::clone(&request), path.clone());
+        let loaded = interruptible(py, move || reading.loaded(&file))?;
+        request.file(path, loaded)
+    }
+
+    /// Reads files on all threads.
+    fn read_several(&self, paths: &[PathBuf]) -> Vec<PyResult<Loaded>> {
+        let next = AtomicUsize::new(0);
+        let read = || {
+            let mut read = Vec::new();
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(path) = paths.get(index) else {
+                    return read;
+                };
+                read.push((index, guarded(|| self.loaded(path))));
+            }
+        };
+        let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+        let mut found = std::thread::scope(|scope| {
+            let others: Vec<_> = (1..threads.min(paths.len()))
+                .map(|_| scope.spawn(read))
+                .collect();
+            let mut found = read();
+            found.extend(
+                others
+                    .into_iter()
+                    .filter_map(|other| other.join().ok())
+                    .flatten(),
+            );
+            found
+        });
+        found.sort_by_key(|(index, _)| *index);
+        found.into_iter().map(|(_, loaded)| loaded).collect()
+    }
+
+    /// The file, and what to warn of.
+    fn file(&self, path: PathBuf, mut loaded: Loaded) -> PyResult<(File, Vec<Diagnostic>)> {
         if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
             return Err(of_diagnostic(first));
         }
         let warnings = loaded.warnings.iter().chain(&loaded.refused);
         let warnings = warnings.cloned().collect();
-        Ok((File::new(path, &mut loaded, is_changed), warnings))
+        Ok((File::new(path, &mut loaded, self.is_changed), warnings))
     }
 
-    fn loaded(&mut self, file: &Path) -> PyResult<Loaded> {
+    fn loaded(&self, file: &Path) -> PyResult<Loaded> {
+        let mut options = self.options.clone();
         if let Some(times) = &self.source_times {
             let times = open_frame_times(times, Limits::default());
             let times = times.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
-            self.options.frame_times = Some(Arc::new(times));
+            options.frame_times = Some(Arc::new(times));
         }
         let format = self.format.unwrap_or_else(|| Format::detected(file));
-        if self.options.override_rate.is_some() && !format.takes(FormatOption::OverrideRate) {
+        if options.override_rate.is_some() && !format.takes(FormatOption::OverrideRate) {
             return Err(input(format!(
                 "override_fps has no effect on {}; it is for {}; leave it out",
                 format.name,
                 Format::names_taking(FormatOption::OverrideRate)
             )));
         }
-        let read = format.open(file, &self.options);
+        let read = format.open(file, &options);
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
         let name = file.display().to_string();
         if let Some(offsets) = &self.offsets {

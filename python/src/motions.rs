@@ -12,7 +12,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::crowd::{CrowdError, CrowdLibrary, MotionStates, MotionTables, MotionWords};
-use tumble::{Channel, Error, Skeleton};
+use tumble::{Channel, Error, Method, Skeleton, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
@@ -50,6 +50,9 @@ pub(crate) struct Motions {
     /// The names of the joints; no entries in files that do not store them.
     #[pyo3(get)]
     joint_names: Vec<String>,
+    /// The clips that do not fit and were left out: their indices in the list, and why.
+    #[pyo3(get)]
+    skipped: Vec<(usize, String)>,
 }
 
 /// The skeleton that the caller chose for all clips of a library or a crowd.
@@ -238,6 +241,58 @@ pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
     }
 }
 
+/// The tracks of a clip in the order of a library's joints, and their methods.
+fn fitted<'a>(
+    skeleton: &SharedSkeleton,
+    listed: ListedClip<'a>,
+    method: MethodChoice,
+) -> PyResult<(Cow<'a, tumble::TrackSet>, Method, VectorMethod)> {
+    let motion = &listed.clip.motion;
+    let methods = ChannelMethods {
+        method,
+        ..ChannelMethods::AUTHORED
+    };
+    let (Some(of_rotations), Some(of_vectors)) =
+        (methods.method_of(motion), methods.vector_method_of(motion))
+    else {
+        return Err(input(format!(
+            "{listed}: its tracks have several methods; name one as `method`"
+        )));
+    };
+    Ok((skeleton.tracks(listed)?, of_rotations, of_vectors))
+}
+
+/// Those of the clips that fit a library, and the indices of the others with the reasons.
+fn fitting(
+    skeleton: &SharedSkeleton,
+    clips: Vec<Clip>,
+    method: MethodChoice,
+) -> PyResult<(Vec<Clip>, Vec<(usize, String)>)> {
+    let mut skipped = Vec::new();
+    for listed in ListedClip::all(&clips) {
+        let found = fitted(skeleton, listed, method).and_then(|(tracks, ..)| {
+            check(&tracks).map_err(|error| input(format!("{listed}: {error}")))
+        });
+        if let Err(error) = found {
+            let reason = Python::attach(|py| error.value(py).to_string());
+            skipped.push((listed.index, reason));
+        }
+    }
+    let mut index = 0..;
+    let mut kept = clips;
+    kept.retain(|_| {
+        let index = index.next();
+        !skipped.iter().any(|(skipped, _)| Some(*skipped) == index)
+    });
+    match kept.is_empty() {
+        true => Err(input(format!(
+            "no clip fits the library; the first: {}",
+            skipped.first().map_or("", |(_, reason)| reason)
+        ))),
+        false => Ok((kept, skipped)),
+    }
+}
+
 /// Adds a clip to a library. `check` refuses what the library cannot store.
 pub(crate) fn push(
     library: &mut CrowdLibrary,
@@ -247,19 +302,7 @@ pub(crate) fn push(
     check: impl Fn(&tumble::TrackSet) -> Result<(), &'static str>,
 ) -> PyResult<()> {
     let named = |error: &str| input(format!("{listed}: {error}"));
-    let motion = &listed.clip.motion;
-    let methods = ChannelMethods {
-        method,
-        ..ChannelMethods::AUTHORED
-    };
-    let (Some(of_rotations), Some(of_vectors)) =
-        (methods.method_of(motion), methods.vector_method_of(motion))
-    else {
-        return Err(named(
-            "its tracks have several methods; name one as `method`",
-        ));
-    };
-    let tracks = skeleton.tracks(listed)?;
+    let (tracks, of_rotations, of_vectors) = fitted(skeleton, listed, method)?;
     check(&tracks).map_err(named)?;
     let pushed = library.push(&tracks, of_rotations, of_vectors);
     pushed.map(drop).map_err(|error| match error {
@@ -271,13 +314,15 @@ pub(crate) fn push(
 #[pymethods]
 impl Motions {
     /// Prepares clips by a method. All have the joints of `skeleton`, a clip or the arrays `(parents, offsets)`; `None`:
-    /// those of the first clip.
+    /// those of the first clip. `skip`: clips that do not fit are left out.
     #[staticmethod]
+    #[pyo3(signature = (clips, skeleton, method, skip=false))]
     fn of_clips(
         py: Python<'_>,
         clips: Vec<Clip>,
         skeleton: Option<&Bound<'_, PyAny>>,
         method: &str,
+        skip: bool,
     ) -> PyResult<Self> {
         let method = method_named(method)?;
         let tracks = |clips: &[Clip]| {
@@ -298,6 +343,10 @@ impl Motions {
             return Err(input(
                 "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, or (parents, offsets)",
             ));
+        };
+        let (clips, skipped) = match skip {
+            true => fitting(&shared, clips, method)?,
+            false => (clips, Vec::new()),
         };
         warn_of(py, order_assumption(&clips).as_slice())?;
         let reasons = ListedClip::all(&clips).map(|listed| shared.unplaced(listed));
@@ -335,6 +384,7 @@ impl Motions {
             cells: cells.unbind(),
             unplaced,
             joint_names,
+            skipped,
         })
     }
 
@@ -384,6 +434,7 @@ impl Motions {
             cells: cells.unbind(),
             unplaced: texts("unplaced")?,
             joint_names: texts("joint_names")?,
+            skipped: Vec::new(),
         })
     }
 

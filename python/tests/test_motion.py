@@ -46,6 +46,20 @@ def clips(rng):
     return [clip(40, 30), clip(7, 24), clip(200, 120), clip(2, 10)]
 
 
+def wave(frames, rate):
+    """A clip that swings."""
+    angles = np.sin(np.arange(frames)[None, :, None] / rate + np.arange(JOINTS)[:, None, None])
+    keys = Rotation.from_rotvec((angles * [0.3, 0.5, 0.7]).reshape(-1, 3)).as_quat()
+    return tumble.Clip(
+        np.arange(frames) / rate,
+        keys.reshape(JOINTS, frames, 4),
+        layout="track",
+        names=[f"joint{index}" for index in range(JOINTS)],
+        parents=PARENTS,
+        offsets=OFFSETS,
+    )
+
+
 OFFSETS = np.random.default_rng(3).normal(size=(JOINTS, 3))
 
 
@@ -120,7 +134,7 @@ def test_wrong_arguments_are_refused(clips, rng):
         (([4], [0.0]), "there is no clip 4; there are 4"),
         (([-1], [0.0]), "there is no clip -1"),
         (([0], [np.nan]), r"times\[0\]"),
-        (([0, 1], [0.0]), "shapes"),
+        (([0, 1], [0.0, 0.5, 1.0]), "shapes"),
         (([0.5], [0.0]), "whole numbers"),
     ]:
         with pytest.raises(tumble.InputError, match=words):
@@ -281,3 +295,73 @@ def test_override_fps_is_for_files_without_times(tmp_path):
         tumble.load(tmp_path / "door.glb", override_fps=30)
     with pytest.raises(ValueError, match="source_fps and override_fps both say"):
         tumble.load(tmp_path / "door.glb", source_fps=30, override_fps=30)
+
+
+def test_ids_and_times_of_any_shapes_broadcast():
+    library = tumble.MotionLibrary([wave(40, 30), wave(70, 30)])
+    rng = np.random.default_rng(11)
+    ids, times = rng.integers(0, 2, (5, 1)), rng.uniform(0, 2, (1, 7))
+    found = library.sample(ids, times)
+    flat = library.sample(np.broadcast_to(ids, (5, 7)).ravel(), np.broadcast_to(times, (5, 7)).ravel())
+    for name in ("rotations", "positions", "world_rotations", "velocities", "angular_velocities"):
+        array, expected = getattr(found, name), getattr(flat, name)
+        assert array.shape == (5, 7, *expected.shape[1:])
+        np.testing.assert_array_equal(array.reshape(expected.shape), expected)
+        assert array.ctypes.data % 64 == 0
+    one = library.sample(1, 0.5)
+    np.testing.assert_array_equal(one.rotations, library.sample([1], [0.5]).rotations[0])
+    again = library.sample(ids, times + 1, out=found)
+    assert again is found
+    np.testing.assert_array_equal(found.positions, library.sample(ids, times + 1).positions)
+    swapped = library.sample(ids, times, order="wxyz")
+    np.testing.assert_array_equal(np.roll(swapped.rotations, -1, -1), library.sample(ids, times).rotations)
+    for finite in (False, True):
+        windows = library.sample_windows([0, 1], [0.2, 0.4], 6, 30, finite=finite)
+        each = library.sample([0, 1], [0.2 + 3 / 30, 0.4 + 3 / 30], finite=finite)
+        np.testing.assert_array_equal(windows.velocities[:, 3], each.velocities)
+    with pytest.raises(tumble.InputError, match=r"shapes are \(2,\) and \(3,\)"):
+        library.sample([0, 1], [0.0, 0.1, 0.2])
+    with pytest.raises(tumble.InputError, match="there is no `zyx`"):
+        library.sample(0, 0.0, order="zyx")
+    with pytest.raises(tumble.InputError, match="rate greater than 0"):
+        library.sample_windows([0], [0.0], 3, 0)
+
+
+def test_clips_are_drawn_by_their_lengths():
+    library = tumble.MotionLibrary([wave(31, 30), wave(91, 30)])
+    ids, times = library.draw(4000, np.random.default_rng(3))
+    assert abs((ids == 1).mean() - 0.75) < 0.03
+    assert ((times >= 0) & (times <= library.lengths[ids])).all()
+    np.testing.assert_array_equal(library.draw(4000, np.random.default_rng(3))[1], times)
+    assert (library.draw(9, np.random.default_rng(3), weights=[1, 0])[0] == 0).all()
+    with pytest.raises(tumble.InputError, match="for each of the 2 clips"):
+        library.draw(1, np.random.default_rng(3), weights=[1])
+    assert library.nbytes > 48 * 31
+
+
+def test_what_does_not_fit_is_left_out_and_listed(tmp_path):
+    for index, count in enumerate((40, 50)):
+        tumble.save(tmp_path / f"{index}.npz", wave(count, 30), fps=30, method="slerp")
+    other = tumble.Clip(np.arange(3) / 30, np.tile([0, 0, 0, 1.0], (1, 3, 1)), names=["tail"], parents=[None], offsets=[[0, 0, 0]])
+    tumble.save(tmp_path / "2.npz", other, fps=30, method="slerp")
+    (tmp_path / "3.npz").write_bytes(b"PK nothing")
+    pattern = str(tmp_path / "*.npz")
+    with pytest.raises(tumble.InputError, match="3.npz"):
+        tumble.MotionLibrary.load(pattern)
+    steps = []
+    library = tumble.MotionLibrary.load(pattern, on_error="skip", progress=lambda done, total: steps.append((done, total)))
+    assert steps == [(4, 4)]
+    assert library.names == ["0", "1"]
+    assert len(library.lengths) == len(library.rates) == 2
+    broken, tail = library.skipped
+    assert broken.path.endswith("3.npz") and broken.code.startswith("E") and broken.clip is None
+    assert tail.path.endswith("2.npz") and "has a joint `joint0`" in tail.message
+    np.testing.assert_array_equal(
+        library.sample([1], [0.3]).rotations, tumble.MotionLibrary.load(str(tmp_path / "[01].npz")).sample([1], [0.3]).rotations
+    )
+    with pytest.raises(TypeError, match="there is no keyword `source_fsp`.*did you mean `source_fps`"):
+        tumble.MotionLibrary.load(pattern, source_fsp=30)
+    with pytest.raises(tumble.InputError, match="there are refuse, skip"):
+        tumble.MotionLibrary.load(pattern, on_error="ignore")
+    with pytest.raises(tumble.InputError, match="no file could be read"):
+        tumble.MotionLibrary.load(str(tmp_path / "3.npz"), on_error="skip")

@@ -117,20 +117,20 @@ pub fn unwrap_angles(angles: &mut [f64], period: f64) {
     for angle in angles {
         if let Some(before) = before {
             let step = *angle - before;
-            let turns = ((step.abs() - half) / period).ceil().max(0.0);
-            shift -= period * turns * step.signum();
+            let periods = ((step.abs() - half) / period).ceil().max(0.0);
+            shift -= period * periods * step.signum();
         }
         before = Some(*angle);
         *angle += shift;
     }
 }
 
-/// Unwraps the angles of a joint if it has no limits and turns: then a file may have wrapped them.
+/// Unwraps the angles of a joint if it is a hinge without limits: then a file may have wrapped them.
 pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
-    let turns = tree.scalar_joints().any(|known| {
+    let is_endless = tree.scalar_joints().any(|known| {
         known.name == joint && known.kind == JointKind::Hinge && known.limits.is_none()
     });
-    if turns {
+    if is_endless {
         unwrap_angles(values, TAU);
     }
 }
@@ -262,14 +262,14 @@ impl JointTracks {
             .collect();
         let of_free = |[joint, body]: [&str; 2]| track_of(joint).or_else(|| track_of(body));
         let free: Vec<_> = named(JointKind::Free).map(of_free).collect();
-        let taken = |track: usize| {
+        let is_used = |track: usize| {
             balls
                 .iter()
                 .chain(&free)
                 .flatten()
                 .any(|&used| used == track)
         };
-        if let Some(other) = (0..set.track_count()).find(|&track| !taken(track)) {
+        if let Some(other) = (0..set.track_count()).find(|&track| !is_used(track)) {
             let known = named(JointKind::Free).chain(named(JointKind::Ball));
             return Err(BodiesError::NotAJoint {
                 kind: "a free joint or a ball",

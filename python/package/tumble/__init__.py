@@ -28,7 +28,7 @@ from tumble._errors import (
     MissingFileError,
     OutputError,
 )
-from tumble._motion import MotionLibrary, MotionState
+from tumble._motion import MotionLibrary, MotionState, Skipped
 from tumble._tumble import (
     ArrayDifference,
     ChannelDifference,
@@ -92,6 +92,7 @@ __all__ = [
     "Reduction",
     "Robot",
     "Route",
+    "Skipped",
     "Spread",
     "Surface",
     "Verification",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob as _glob
 import os
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -19,6 +19,7 @@ from tumble._tumble import Clip, Engine, File, Motions, load, load_all
 if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
     _Skeleton: TypeAlias = Clip | _Path | tuple[Sequence[int | None], ArrayLike]
+    _OnError: TypeAlias = Literal["refuse", "skip"]
     _Name: TypeAlias = Literal[
         "rotations", "positions", "world_rotations", "velocities", "angular_velocities"
     ]
@@ -47,11 +48,11 @@ class MotionState(_WithWeakReferences):
 
     float32, x y z w, seconds and radians:
 
-    rotations: (N, joints, 4), in the parent's frame.
-    positions: (N, joints, 3), in the world, along the skeleton.
-    world_rotations: (N, joints, 4).
-    velocities: (N, joints, 3), in the world.
-    angular_velocities: (N, joints, 3), about the world's axes.
+    rotations: (…, joints, 4), in the parent's frame.
+    positions: (…, joints, 3), in the world, along the skeleton.
+    world_rotations: (…, joints, 4).
+    velocities: (…, joints, 3), in the world.
+    angular_velocities: (…, joints, 3), about the world's axes.
 
     >>> import tumble
     >>> tumble.MotionState().rotations is None
@@ -74,6 +75,26 @@ class MotionState(_WithWeakReferences):
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Skipped:
+    """A file or a clip that a `MotionLibrary` left out.
+
+    path: its file; empty for a clip that was not read from one.
+    clip: the name of the clip; None if the whole file could not be read.
+    code: of the fault, such as "E306"; None if the clip does not fit the skeleton.
+    message: why.
+
+    >>> import tumble
+    >>> tumble.Skipped("a.npz", None, "E001", "a.npz: error[E001]: cannot be opened").code
+    'E001'
+    """
+
+    path: str
+    clip: str | None
+    code: str | None
+    message: str
+
+
 class MotionLibrary:
     """Clips of one skeleton, of many lengths and rates, each instance at a time of its own.
 
@@ -83,6 +104,7 @@ class MotionLibrary:
     clip; its offsets are then those of all clips. Without it the skeleton is that of the first clip, and each clip
     keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`).
     `names`: of the clips; else their own, or their files'. `engine`: whose threads work, else one that all calls share.
+    `on_error`: "refuse", or "skip": clips that do not fit the skeleton are left out, and `skipped` lists them.
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
@@ -105,6 +127,7 @@ class MotionLibrary:
     names: list[str]
     lengths: NDArray[np.float64]
     rates: NDArray[np.float64]
+    skipped: list[Skipped]
 
     def __init__(
         self,
@@ -114,16 +137,25 @@ class MotionLibrary:
         skeleton: _Skeleton | None = None,
         names: Sequence[str] | None = None,
         engine: Engine | None = None,
+        on_error: _OnError = "refuse",
     ) -> None:
         clips = list(clips)
+        skip = _skips(on_error)
         if not clips:
             raise InputError("clips: give at least one")
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
-        self.names = list(names) if names is not None else [_name(clip) for clip in clips]
-        self.lengths = np.array([clip.duration for clip in clips])
-        self.rates = np.array([_rate(clip) for clip in clips])
-        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method)
+        all_names = list(names) if names is not None else [_name(clip) for clip in clips]
+        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method, skip)
+        left_out = dict(self._motions.skipped)
+        self.skipped = [
+            Skipped(os.fspath(clips[index].path or ""), all_names[index], None, message)
+            for index, message in left_out.items()
+        ]
+        kept = [index for index in range(len(clips)) if index not in left_out]
+        self.names = [all_names[index] for index in kept]
+        self.lengths = np.array([clips[index].duration for index in kept])
+        self.rates = np.array([_rate(clips[index]) for index in kept])
         self._engine = engine if engine is not None else Engine()
         self._method = method
         self._file: str | None = None
@@ -135,13 +167,18 @@ class MotionLibrary:
         *,
         skeleton: _Skeleton | None = None,
         method: str = "slerp",
-        source_fps: float | str | None = None,
-        override_fps: float | str | None = None,
         engine: Engine | None = None,
+        on_error: _OnError = "refuse",
+        progress: Callable[[int, int], object] | None = None,
+        **options: Any,
     ) -> MotionLibrary:
-        """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them. Every clip of
-        every file belongs to the library, in the order of the names. `source_fps`: of files without a rate.
-        `override_fps`: of all files without times, whatever rate they state.
+        """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
+        of every file belongs to the library, in the order of the names.
+
+        `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets` and
+        `body_model`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such files, and
+        clips that do not fit the skeleton, and lists them in `skipped`. `progress(done, total)` is called now and then
+        while files are read, for example to update a bar.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
@@ -157,8 +194,14 @@ class MotionLibrary:
             if not found:
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
-        clips = [clip for file in load_all(paths, source_fps, override_fps) for clip in file.clips]
-        return cls(clips, method=method, skeleton=skeleton, engine=engine)
+        read, faults = load_all(paths, options, skip=_skips(on_error), progress=progress)
+        skipped = [Skipped(os.fspath(path), None, code, message) for path, code, message in faults]
+        clips = [clip for file in read for clip in file.clips]
+        if not clips and skipped:
+            raise InputError(f"no file could be read; the first: {skipped[0].message}")
+        made = cls(clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error)
+        made.skipped = skipped + made.skipped
+        return made
 
     def sample(
         self,
@@ -167,15 +210,17 @@ class MotionLibrary:
         *,
         arrays: Sequence[_Name] = _NAMES,
         finite: bool = False,
+        order: Literal["xyzw", "wxyz"] = "xyzw",
         out: MotionState | None = None,
     ) -> MotionState:
-        """The states of N instances: `clip_ids` and `times`, (N,), say which clip each plays and how many
-        seconds after the clip's first key it stands. (`Clip` and `Engine` take the times of the keys.)
+        """The states of instances: `clip_ids` and `times` say which clip each plays and how many seconds after the
+        clip's first key it stands. (`Clip` and `Engine` take the times of the keys.) Both have the shape of the result,
+        (N,) for example, or shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
 
         `arrays`: the names of those to compute; rotations alone take a third of the time. `out`: a state
         whose arrays are filled again, those that it has. `finite`: velocities as differences of the two
         frames of the clip's rate around a time, as other motion libraries have them, instead of the exact
-        derivatives.
+        derivatives. `order`: of quaternions.
 
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
@@ -188,16 +233,35 @@ class MotionLibrary:
             raise InputError(f"clip_ids: their type is {ids.dtype}; give whole numbers")
         ids = np.ascontiguousarray(ids, np.int64)
         moments = np.ascontiguousarray(times, np.float64)
-        if ids.ndim != 1 or moments.shape != ids.shape:
-            shapes = f"{ids.shape} and {moments.shape}"
-            raise InputError(f"clip_ids and times: their shapes are {shapes}; give (N,) for both")
+        try:
+            shape = np.broadcast_shapes(np.shape(clip_ids), np.shape(times))
+        except ValueError:
+            shapes = f"{np.shape(clip_ids)} and {np.shape(times)}"
+            raise InputError(f"clip_ids and times: their shapes are {shapes}; give shapes that broadcast") from None
+        ids = np.ascontiguousarray(np.broadcast_to(np.reshape(ids, np.shape(clip_ids)), shape)).reshape(-1)
+        moments = np.ascontiguousarray(np.broadcast_to(np.reshape(moments, np.shape(times)), shape)).reshape(-1)
+        if order not in ("xyzw", "wxyz"):
+            raise InputError(f"order: there is no `{order}`; there are xyzw, wxyz")
         if out is None:
             for name in arrays:
                 if name not in _NAMES:
                     raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
             joints = self._motions.joints
-            made = {name: np.empty((len(ids), joints, _WIDTHS[name]), np.float32) for name in arrays}
+            made = {name: _aligned((*shape, joints, _WIDTHS[name])) for name in arrays}
             out = MotionState(**made)
+        else:
+            _check_out(out, shape, self._motions.joints)
+        self._fill(ids, moments, finite, _flat(out, len(shape)))
+        if order == "wxyz":
+            for array in (out.rotations, out.world_rotations):
+                if array is not None:
+                    array[...] = np.roll(array, 1, axis=-1)
+        return out
+
+    def _fill(
+        self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
+    ) -> None:
+        """Fills the arrays of instances, (N,)."""
         velocities, angular = out.velocities, out.angular_velocities
         is_finite = finite and not (velocities is None and angular is None)
         self._motions.sample(
@@ -212,7 +276,60 @@ class MotionLibrary:
         )
         if is_finite:
             self._differences(ids, moments, out)
-        return out
+
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[_Name] = _NAMES,
+        finite: bool = False,
+        order: Literal["xyzw", "wxyz"] = "xyzw",
+        out: MotionState | None = None,
+    ) -> MotionState:
+        """`count` states of each instance, from the time `starts` on, `fps` a second: arrays (…, count, joints, …) for
+        `clip_ids` and `starts` of the shape (…). Other keywords are those of `sample`.
+
+        >>> import tumble
+        >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+        >>> library = tumble.MotionLibrary([door])
+        >>> library.sample_windows([0, 0, 0], [0.0, 0.5, 1.0], 10, fps=30).rotations.shape
+        (3, 10, 1, 4)
+        """
+        if count < 0 or not fps > 0:
+            raise InputError(f"count and fps: {count} and {fps}; give a number of states, and a rate greater than 0")
+        ids, first = np.asarray(clip_ids)[..., None], np.asarray(starts, np.float64)[..., None]
+        times = first + np.arange(count) / fps
+        return self.sample(ids, times, arrays=arrays, finite=finite, order=order, out=out)
+
+    def draw(
+        self, count: int, rng: np.random.Generator, *, weights: ArrayLike | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Clips and times at random: `clip_ids` and `times`, (count,), for `sample`. Clips are drawn by `weights`, by
+        default their lengths, so that every moment is as likely; times are uniform within each. The same state of
+        `rng` draws the same.
+
+        >>> import numpy as np, tumble
+        >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+        >>> ids, times = tumble.MotionLibrary([door]).draw(4, np.random.default_rng(1))
+        >>> ids
+        array([0, 0, 0, 0])
+        """
+        each = np.asarray(self.lengths if weights is None else weights, np.float64)
+        if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
+            raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
+        total = each.sum()
+        # Clips of one key have no length: then all are as likely.
+        chances = each / total if total > 0 else np.full(len(self), 1 / len(self))
+        ids = rng.choice(len(self), size=count, p=chances).astype(np.int64)
+        return ids, self.sample_times(ids, rng)
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of the prepared clips: 48 a key of a joint with slerp, 192 with smooth methods."""
+        return sum(array.nbytes for array in self._motions.arrays().values())
 
     def _differences(
         self, ids: NDArray[np.int64], times: NDArray[np.float64], out: MotionState
@@ -299,6 +416,7 @@ class MotionLibrary:
         self._motions = Motions.of_arrays(arrays)
         self._engine = engine if engine is not None else Engine()
         self._file = file
+        self.skipped = []
         return self
 
     def _arrays(self) -> dict[str, Any]:
@@ -339,6 +457,42 @@ class MotionLibrary:
     def __repr__(self) -> str:
         seconds = float(self.lengths.sum())
         return f"MotionLibrary({len(self)} clips, {self.joints} joints, {seconds:.6g} s)"
+
+
+def _skips(on_error: str) -> bool:
+    if on_error not in ("refuse", "skip"):
+        raise InputError(f"on_error: there is no `{on_error}`; there are refuse, skip")
+    return on_error == "skip"
+
+
+def _aligned(shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """An array that begins at a cache line, which JAX takes without a copy."""
+    size = int(np.prod(shape)) * 4
+    memory = np.empty(size + _ALIGNED, np.uint8)
+    first = -memory.ctypes.data % _ALIGNED
+    return memory[first : first + size].view(np.float32).reshape(shape)
+
+
+def _check_out(out: MotionState, shape: tuple[int, ...], joints: int) -> None:
+    """Refuses arrays of another shape, type or order in memory than results have."""
+    for name in _NAMES:
+        array = getattr(out, name)
+        expected = (*shape, joints, _WIDTHS[name])
+        if array is None:
+            continue
+        if array.dtype != np.float32 or array.shape != expected:
+            raise InputError(f"out: its {name} are {array.dtype} {array.shape}; the result's are float32 {expected}")
+        if not array.flags.c_contiguous:
+            raise InputError(f"out: the numbers of its {name} do not lie one behind the other (C order)")
+
+
+def _flat(state: MotionState, axes: int) -> MotionState:
+    """The same memory with one axis of instances."""
+    arrays = {name: getattr(state, name) for name in _NAMES}
+    instances = {name: array for name, array in arrays.items() if array is not None}
+    return MotionState(
+        **{name: array.reshape(int(np.prod(array.shape[:axes])), *array.shape[axes:]) for name, array in instances.items()}
+    )
 
 
 def _opened(file: str, engine: Engine) -> MotionLibrary:

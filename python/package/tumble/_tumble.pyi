@@ -1,5 +1,5 @@
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, ClassVar, Literal, Protocol, TypeAlias, final, overload
 
@@ -1150,8 +1150,12 @@ def save(
 ) -> None: ...
 def devices() -> list[str]: ...
 def load_all(
-    paths: Sequence[_Path], source_fps: _Rate | None = None, override_fps: _Rate | None = None
-) -> list[File]: ...
+    paths: Sequence[_Path],
+    keywords: dict[str, Any],
+    *,
+    skip: bool = False,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[list[File], list[tuple[str, str | None, str]]]: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
     path: _Path, clips: Sequence[Clip], refused: Sequence[str]
@@ -1164,6 +1168,7 @@ class Motions:
         clips: Sequence[Clip],
         skeleton: Clip | tuple[Sequence[int | None], ArrayLike] | None,
         method: str,
+        skip: bool = False,
     ) -> Motions: ...
     @staticmethod
     def of_arrays(arrays: dict[str, Any]) -> Motions: ...
@@ -1174,6 +1179,8 @@ class Motions:
     def joint_names(self) -> list[str]: ...
     @property
     def unplaced(self) -> list[str]: ...
+    @property
+    def skipped(self) -> list[tuple[int, str]]: ...
     def sample(
         self,
         engine: Engine,
