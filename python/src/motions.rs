@@ -52,8 +52,11 @@ pub(crate) struct Motions {
     joint_names: Vec<String>,
     /// The clips that do not fit and were left out: their indices in the list, and why.
     #[pyo3(get)]
-    skipped: Vec<(usize, String)>,
+    skipped: Vec<SkippedClip>,
 }
+
+/// The index of a clip in a list, and why it was left out.
+type SkippedClip = (usize, String);
 
 /// The skeleton that the caller chose for all clips of a library or a crowd.
 pub(crate) enum ChosenSkeleton {
@@ -267,7 +270,7 @@ fn fitting(
     skeleton: &SharedSkeleton,
     clips: Vec<Clip>,
     method: MethodChoice,
-) -> PyResult<(Vec<Clip>, Vec<(usize, String)>)> {
+) -> PyResult<(Vec<Clip>, Vec<SkippedClip>)> {
     let mut skipped = Vec::new();
     for listed in ListedClip::all(&clips) {
         let found = fitted(skeleton, listed, method).and_then(|(tracks, ..)| {
