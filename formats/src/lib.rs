@@ -39,6 +39,7 @@ pub mod generate;
 pub mod gltf;
 pub mod guarded;
 pub mod kitti;
+pub mod learning;
 mod limits;
 pub mod map;
 #[cfg(feature = "mcap")]

@@ -23,6 +23,7 @@ mod gltf_times;
 mod gltf_values;
 mod kept;
 mod layers;
+mod learning;
 mod left_out;
 mod maps;
 #[cfg(feature = "mcap")]

@@ -1,7 +1,7 @@
 //! What comes in: arrays of NumPy's, whatever they look like in memory, lists, and objects that
 //! NumPy makes arrays of.
 
-use glam::{DQuat, Quat};
+use glam::{DQuat, DVec3, Quat};
 use numpy::{
     PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
@@ -166,6 +166,21 @@ pub(crate) fn doubles(value: &Bound<'_, PyAny>, label: &str) -> PyResult<ArrayVa
         },
     }
     Ok(ArrayValues { shape, values })
+}
+
+/// Points, the last axis with 3 coordinates, and the shape before it.
+pub(crate) fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<DVec3>)> {
+    let ArrayValues { mut shape, values } = doubles(value, name)?;
+    if shape.pop() != Some(3) {
+        return Err(input(format!(
+            "{name}: the last axis has the 3 coordinates of a point"
+        )));
+    }
+    let points = values.as_chunks::<3>().0.iter();
+    Ok((
+        shape,
+        points.map(|&point| DVec3::from_array(point)).collect(),
+    ))
 }
 
 /// One finite number.

@@ -16,6 +16,7 @@ mod dlpack;
 mod engine;
 mod errors;
 mod evaluate;
+mod features;
 mod file;
 mod follow;
 mod function;
@@ -56,6 +57,11 @@ mod _tumble {
     use crate::device_array::DeviceArray;
     #[pymodule_export]
     use crate::engine::Engine;
+    #[pymodule_export]
+    use crate::features::{
+        contacts, heading, humanml3d, mirror_pairs, mirrored_positions, mirrored_rotations,
+        positions_of_humanml3d, rotations_of_six, six,
+    };
     #[pymodule_export]
     use crate::file::file_of_state;
     #[pymodule_export]

@@ -14,7 +14,7 @@ use tumble_routes::net::{Net, NetBy};
 use tumble_routes::route::By;
 use tumble_routes::walkers::{self, Mover, Walker};
 
-use crate::arrays::{ArrayValues, ListArgument, doubles, parts};
+use crate::arrays::{ArrayValues, ListArgument, doubles, parts, vectors};
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::names::unknown_name;
 use crate::run::interruptible;
@@ -179,20 +179,6 @@ impl Value for Walk {
             ups: ups.map(|ups| points_of(&ups)).transpose()?,
         })
     }
-}
-
-fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<DVec3>)> {
-    let ArrayValues { mut shape, values } = doubles(value, name)?;
-    if shape.pop() != Some(3) {
-        return Err(input(format!(
-            "{name}: the last axis has the 3 coordinates of a point"
-        )));
-    }
-    let points = values.as_chunks::<3>().0.iter();
-    Ok((
-        shape,
-        points.map(|&point| DVec3::from_array(point)).collect(),
-    ))
 }
 
 fn point(value: &Bound<'_, PyAny>, name: &str) -> PyResult<DVec3> {

@@ -59,7 +59,7 @@ def test_everything_public_is_documented_with_an_example():
             assert ">>>" in value.__doc__ or name.split(".")[-1] in small, name
 
 
-@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md"])
+@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md", "docs/features.md"])
 def test_examples_in_documents(document, monkeypatch, tmp_path):
     """Their blocks of Python run one after another, in a folder with a file of each kind."""
     text = (ROOT / document).read_text(encoding="utf-8")

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import sys as _sys
 
-from tumble import _notebook, _tumble
+from tumble import _notebook, _tumble, features
 from tumble._errors import (
     DeviceError,
     Error,
@@ -101,6 +101,7 @@ __all__ = [
     "devices",
     "encodings",
     "evaluate",
+    "features",
     "load",
     "methods",
     "path_errors",

@@ -37,10 +37,13 @@ __all__ = [
     "__version__",
     "clip_of_state",
     "compare",
+    "contacts",
     "devices",
     "encodings",
     "evaluate",
     "file_of_state",
+    "heading",
+    "humanml3d",
     "input_sha256",
     "inputs_of",
     "kernels_sha256",
@@ -52,14 +55,20 @@ __all__ = [
     "manifest_unfinished",
     "merge",
     "methods",
+    "mirror_pairs",
+    "mirrored_positions",
+    "mirrored_rotations",
     "page",
     "panic",
     "path_errors",
+    "positions_of_humanml3d",
     "reduce",
     "referred_files",
+    "rotations_of_six",
     "run",
     "save",
     "set_probe",
+    "six",
     "value_of_state",
     "walk",
 ]
@@ -1193,6 +1202,33 @@ class Motions:
         angular_velocities: _Single | None,
     ) -> None: ...
 
+_Six: TypeAlias = Literal["six-columns", "six-rows", "six-interleaved"]
+_Axis: TypeAlias = Literal["x", "y", "z"]
+_Ground: TypeAlias = Literal["y", "z"]
+
+def six(quaternions: _Array, kind: _Six, *, order: _Order) -> _Double: ...
+def rotations_of_six(numbers: _Array, kind: _Six, *, order: _Order) -> _Double: ...
+def heading(
+    quaternions: _Array, *, order: _Order, up: _Ground, axis: _Axis | None = None
+) -> _Double: ...
+def contacts(
+    positions: _Array,
+    velocities: _Array,
+    *,
+    up: _Ground,
+    height: float,
+    speed: float,
+    window: int | None = None,
+) -> NDArray[np.bool_]: ...
+def mirror_pairs(names: Sequence[str]) -> list[int]: ...
+def mirrored_positions(
+    positions: _Array, *, axis: _Axis, pairs: Sequence[int] | None = None
+) -> _Double: ...
+def mirrored_rotations(
+    quaternions: _Array, *, order: _Order, axis: _Axis, pairs: Sequence[int] | None = None
+) -> _Double: ...
+def humanml3d(positions: _Array, *, threshold: float = 0.002) -> _Double: ...
+def positions_of_humanml3d(features: _Array) -> _Double: ...
 def encodings() -> dict[str, str]: ...
 def methods() -> dict[str, str]: ...
 def load_drivers() -> None: ...

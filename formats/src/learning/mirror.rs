@@ -1,0 +1,70 @@
+//! Mirrored poses: left becomes right.
+
+use glam::{DQuat, DVec3};
+
+/// A point mirrored at the plane through the origin across an axis (0 for x, 1 for y, 2 for z). Velocities are mirrored
+/// like points, angular velocities are not: like rotations.
+#[must_use]
+pub fn mirrored_point(point: DVec3, axis: usize) -> DVec3 {
+    let mut mirrored = point;
+    mirrored[axis] = -mirrored[axis];
+    mirrored
+}
+
+/// A rotation in the world, mirrored at the same plane: its axis is mirrored and its angle changes its sign.
+#[must_use]
+pub fn mirrored_rotation(rotation: DQuat, axis: usize) -> DQuat {
+    let mut vector = -rotation.xyz();
+    vector[axis] = -vector[axis];
+    DQuat::from_xyzw(vector.x, vector.y, vector.z, rotation.w)
+}
+
+/// The words for the sides in names, as they are written.
+const SIDES: [[&str; 2]; 9] = [
+    ["left", "right"],
+    ["Left", "Right"],
+    ["LEFT", "RIGHT"],
+    ["_l", "_r"],
+    ["_L", "_R"],
+    [".L", ".R"],
+    ["L_", "R_"],
+    ["l_", "r_"],
+    [" L ", " R "],
+];
+
+/// The partner of each name on the other side, by indices; a name without a partner is its own. Sides are words in
+/// names: `left_hip`, `RightArm`, `foot_l`, `Arm.L`, `L_Foot`, `Bip01 L Thigh`, `kLeftElbow`.
+#[must_use]
+pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
+    let index_of = |name: &str| names.iter().position(|other| other.as_ref() == name);
+    let partner = |name: &str| {
+        let others = SIDES
+            .iter()
+            .flat_map(|&[left, right]| [(left, right), (right, left)]);
+        let mut renamed = others.filter_map(|(side, other)| swapped(name, side, other));
+        renamed.find_map(|renamed| index_of(&renamed))
+    };
+    let names = names.iter().enumerate();
+    let pairs = names.map(|(index, name)| partner(name.as_ref()).unwrap_or(index));
+    pairs.collect()
+}
+
+/// The name with another side, if it has that word between other words.
+fn swapped(name: &str, side: &str, other: &str) -> Option<String> {
+    let found = name.match_indices(side).map(|(at, _)| at);
+    let at = { found }.find(|&at| {
+        let (before, after) = (&name[..at], &name[at + side.len()..]);
+        let (before, after) = (before.chars().next_back(), after.chars().next());
+        if side.starts_with(char::is_lowercase) && side.len() > 2 {
+            // `left` in `cleft` is no side.
+            return !before.is_some_and(char::is_alphanumeric);
+        }
+        match side {
+            "_l" | "_r" | "_L" | "_R" | ".L" | ".R" => !after.is_some_and(char::is_alphanumeric),
+            "L_" | "R_" | "l_" | "r_" => !before.is_some_and(char::is_alphanumeric),
+            // `Left` in `kLeftElbow`, not in `Leftover`.
+            _ => !after.is_some_and(char::is_lowercase),
+        }
+    })?;
+    Some([&name[..at], other, &name[at + side.len()..]].concat())
+}
