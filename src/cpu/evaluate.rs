@@ -106,8 +106,13 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
 /// Evaluates the sample at a distance from the segment's middle.
 #[inline(always)]
 pub(crate) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
-    let rotation = segment.at(distance * affine.scale + affine.offset);
-    rotation.canonical().to_array()
+    at_parameter(segment, distance * affine.scale + affine.offset)
+}
+
+/// Evaluates the sample at a parameter of the segment.
+#[inline(always)]
+pub(crate) fn at_parameter<S: Evaluate>(segment: &S, parameter: f32) -> [f32; 4] {
+    segment.at(parameter).canonical().to_array()
 }
 
 /// The distances of a run's samples from the segment's middle, a vector at a time.
