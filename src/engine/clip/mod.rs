@@ -186,7 +186,8 @@ impl Clip {
             }
             ClipTracks::Grouped(grouped) => grouped.prepared_tracks()?,
         };
-        Ok(Sampler::new(clips, tracks, self.quantity()))
+        let width = self.engine.machine.width();
+        Ok(Sampler::new(clips, tracks, self.quantity(), width))
     }
 
     /// Evaluates a window of the result in chunks of about `chunk` values, of tracks with the same interpolation.

@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Quat;
@@ -19,12 +20,15 @@ use crate::prepare::arcs::listed_arcs;
 use crate::prepare::clip_data::{ClipData, PartRef};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{ArcSegment, Form};
+use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
+use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::{InSeconds, in_seconds};
 use crate::time::runs::{NONE, Parameter, RunSource};
 use crate::time::spans::{SpanSource, outside};
 use crate::time::times::interval_at;
 use crate::tracks::error::TrackError;
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Evaluates a [`Clip`](crate::Clip) at one time after another, on the calling thread
 /// ([`Clip::sampler`](crate::Clip::sampler)).
@@ -63,7 +67,17 @@ struct SampledClip {
     groups: Vec<SampledGroup>,
     parts: Vec<SampledPart>,
     tracks: Vec<SampledTrack>,
+    /// All tracks, in order.
+    batches: Vec<TrackBatch>,
     quantity: Quantity,
+    width: VectorWidth,
+}
+
+/// Consecutive tracks that are evaluated together in poses: a single one, or several of one group and one cursor, each
+/// with one part.
+struct TrackBatch {
+    tracks: Range<usize>,
+    has_one_part: bool,
 }
 
 /// A group of prepared tracks.
@@ -104,6 +118,18 @@ struct Cursor {
 }
 
 impl Cursor {
+    #[inline(always)]
+    fn contains(&self, time: f64) -> bool {
+        self.start <= time && time < self.end
+    }
+
+    /// The value of a curve that is evaluated in f64.
+    #[cold]
+    fn exact(&self, prepared: &Prepared, index: u32, time: f64) -> [f32; 4] {
+        let (start, length) = (self.start, self.end - self.start);
+        prepared.exact_at_time(index, Parameter { start, length }, time)
+    }
+
     /// In no span.
     fn new() -> Self {
         Self {
@@ -122,6 +148,7 @@ impl Sampler {
         clips: Vec<Arc<ClipData>>,
         tracks: Vec<(usize, usize)>,
         quantity: Quantity,
+        width: VectorWidth,
     ) -> Self {
         let mut groups = Vec::new();
         let mut first_groups = Vec::with_capacity(clips.len());
@@ -139,7 +166,9 @@ impl Sampler {
             groups,
             parts: Vec::new(),
             tracks: Vec::new(),
+            batches: Vec::new(),
             quantity,
+            width,
         };
         // For each hash of times the cursors of such tracks, each with a track that has it.
         let mut known: HashMap<u64, Vec<(usize, usize, usize)>> = HashMap::new();
@@ -166,7 +195,7 @@ impl Sampler {
                     cursors - 1
                 }
             };
-            sampled.tracks.push(SampledTrack {
+            sampled.push(SampledTrack {
                 first_part,
                 index,
                 cursor,
@@ -236,10 +265,7 @@ impl Sampler {
         }
         let (clip, cursors) = (&*self.clip, &mut self.cursors[..]);
         let Some(tracks) = tracks else {
-            for (track, value) in clip.tracks.iter().zip(output) {
-                *value = clip.value(track, cursors, time)?;
-            }
-            return Ok(());
+            return Ok(clip.pose(cursors, time, output)?);
         };
         if let Some(&missing) = tracks.iter().find(|&&track| track >= count) {
             return Err(self.no_such_track(missing));
@@ -266,6 +292,66 @@ impl std::fmt::Debug for Sampler {
 }
 
 impl SampledClip {
+    /// Adds a track, whose parts were added last.
+    fn push(&mut self, track: SampledTrack) {
+        let has_one_part = self.parts.len() == track.first_part + 1;
+        let is_beside = |batch: &&mut TrackBatch| {
+            let other = &self.tracks[batch.tracks.start];
+            let group_of = |track: &SampledTrack| self.parts[track.first_part].group;
+            batch.has_one_part
+                && has_one_part
+                && other.cursor == track.cursor
+                && group_of(other) == group_of(&track)
+        };
+        let index = self.tracks.len();
+        match self.batches.last_mut().filter(is_beside) {
+            Some(batch) => batch.tracks.end = index + 1,
+            None => self.batches.push(TrackBatch {
+                tracks: index..index + 1,
+                has_one_part,
+            }),
+        }
+        self.tracks.push(track);
+    }
+
+    /// The values of all tracks at a time, with their cursors.
+    fn pose(
+        &self,
+        cursors: &mut [Cursor],
+        time: f64,
+        mut output: &mut [[f32; 4]],
+    ) -> Result<(), SampleTimesError> {
+        for batch in &self.batches {
+            let tracks = &self.tracks[batch.tracks.clone()];
+            let (values, rest) = output.split_at_mut(tracks.len());
+            output = rest;
+            let [first, _, ..] = tracks else {
+                values[0] = self.value(&tracks[0], cursors, time)?;
+                continue;
+            };
+            let cursor = &mut cursors[first.cursor];
+            let mut time = time;
+            if !cursor.contains(time) {
+                time = self.folded(first, time)?;
+                if !self.move_to(first, cursor, time) {
+                    for (track, value) in tracks.iter().zip(values) {
+                        *value = self.outside(track, time);
+                    }
+                    continue;
+                }
+            }
+            let parts = &self.parts[first.first_part..][..tracks.len()];
+            let at_cursor = TracksAtCursor {
+                group: &self.groups[parts[0].group as usize],
+                parts,
+                cursor,
+                time,
+            };
+            in_lanes_into(self.width, &at_cursor, &(), values);
+        }
+        Ok(())
+    }
+
     /// The value of a track at a time, with its cursor among `cursors`, which moves if it was elsewhere.
     #[inline(always)]
     fn value(
@@ -275,7 +361,7 @@ impl SampledClip {
         time: f64,
     ) -> Result<[f32; 4], SampleTimesError> {
         let cursor = &mut cursors[track.cursor];
-        if cursor.start <= time && time < cursor.end {
+        if cursor.contains(time) {
             return Ok(self.at_cursor(track, cursor, time));
         }
         self.find(track, cursor, time)
@@ -286,28 +372,18 @@ impl SampledClip {
     fn at_cursor(&self, track: &SampledTrack, cursor: &Cursor, time: f64) -> [f32; 4] {
         let part = &self.parts[track.first_part + cursor.part];
         let group = &self.groups[part.group as usize];
-        let (prepared, span) = (group.prepared(), part.first_span + cursor.span);
-        if time == cursor.start {
-            let key = prepared.spans.keys[span];
-            if key != NONE {
-                return prepared.constants[key as usize];
-            }
-        }
-        match prepared.spans.sources[span] {
+        let prepared = group.prepared();
+        match source_at(prepared, part, cursor, time) {
             SpanSource::Segment(index) => {
                 let parameter = cursor.in_seconds.parameter(time - cursor.start);
                 group.at_parameter(index as usize, parameter)
             }
             SpanSource::Constant(index) => prepared.constants[index as usize],
-            SpanSource::Exact(index) => {
-                let (start, length) = (cursor.start, cursor.end - cursor.start);
-                prepared.exact_at_time(index, Parameter { start, length }, time)
-            }
+            SpanSource::Exact(index) => cursor.exact(prepared, index, time),
         }
     }
 
-    /// The value at a time outside the span of the cursor, which moves to the time's span if the time is between the
-    /// keys.
+    /// The value at a time outside the span of the cursor, which moves to the time's span if there is one.
     #[cold]
     #[inline(never)]
     fn find(
@@ -316,38 +392,73 @@ impl SampledClip {
         cursor: &mut Cursor,
         time: f64,
     ) -> Result<[f32; 4], SampleTimesError> {
+        let time = self.folded(track, time)?;
+        Ok(match self.move_to(track, cursor, time) {
+            true => self.at_cursor(track, cursor, time),
+            false => self.outside(track, time),
+        })
+    }
+
+    /// The clip of a track; `None` if it has no parts.
+    fn clip_of(&self, track: &SampledTrack) -> Option<&ClipData> {
+        let first = self.parts.get(track.first_part)?;
+        Some(&self.groups[first.group as usize].clip)
+    }
+
+    /// The time between the keys whose value a track that repeats has at `time`.
+    fn folded(&self, track: &SampledTrack, time: f64) -> Result<f64, SampleTimesError> {
         if !time.is_finite() {
             return Err(SampleTimesError::TimeNotFinite { index: 0, time });
         }
-        let Some(first) = self.parts.get(track.first_part) else {
-            return Ok([0.0; 4]);
+        let clip = self.clip_of(track);
+        Ok(clip.map_or(time, |clip| clip.folded_time(track.index, time)))
+    }
+
+    /// Moves a cursor to the span of a time; returns whether there is one.
+    fn move_to(&self, track: &SampledTrack, cursor: &mut Cursor, time: f64) -> bool {
+        if cursor.contains(time) {
+            return true;
+        }
+        let Some(clip) = self.clip_of(track) else {
+            return false;
         };
-        let clip = &self.groups[first.group as usize].clip;
-        let time = clip.folded_time(track.index, time);
         let parts = clip.part_indices(track.index);
         let number = parts.partition_point(|&index| clip.part(index).part.end <= time);
-        if let Some(&index) = parts.get(number) {
-            let PartRef { prepared, part } = clip.part(index);
-            let starts = &prepared.spans.starts[part.spans.clone()];
-            if prepared.spans.begin(part) <= time {
-                let span = interval_at(starts, time, cursor.span);
-                let (start, end) = (starts[span], *starts.get(span + 1).unwrap_or(&part.end));
-                *cursor = Cursor {
-                    start,
-                    end,
-                    in_seconds: in_seconds(end - start),
-                    part: number,
-                    span,
-                };
-                return Ok(self.at_cursor(track, cursor, time));
-            }
+        let Some(&index) = parts.get(number) else {
+            return false;
+        };
+        let PartRef { prepared, part } = clip.part(index);
+        let starts = &prepared.spans.starts[part.spans.clone()];
+        if time < prepared.spans.begin(part) {
+            return false;
         }
-        // Before the first key the first part has the value, from the last key on the last part.
-        let number = number.min(parts.len() - 1);
+        let span = interval_at(starts, time, cursor.span);
+        let (start, end) = (starts[span], *starts.get(span + 1).unwrap_or(&part.end));
+        *cursor = Cursor {
+            start,
+            end,
+            in_seconds: in_seconds(end - start),
+            part: number,
+            span,
+        };
+        true
+    }
+
+    /// The value before the first key, which the track's first part has, or from the last key on, which the last has.
+    fn outside(&self, track: &SampledTrack, time: f64) -> [f32; 4] {
+        let Some(clip) = self.clip_of(track) else {
+            return [0.0; 4];
+        };
+        let parts = clip.part_indices(track.index);
+        let is_before = |&index: &(u32, u32)| clip.part(index).part.end > time;
+        let number = match parts.first().is_some_and(is_before) {
+            true => 0,
+            false => parts.len() - 1,
+        };
         let PartRef { prepared, part } = clip.part(parts[number]);
         let group = &self.groups[self.parts[track.first_part + number].group as usize];
         let (_, source) = outside(part, prepared.spans.begin(part), time);
-        Ok(match source {
+        match source {
             Some(RunSource::Constant(index)) => prepared.constants[index as usize],
             Some(RunSource::Segment(index, distance, affine)) => {
                 let distance = distance.at_sample(0, || time);
@@ -358,7 +469,86 @@ impl SampledClip {
                 prepared.exact_at_time(index, parameter, time)
             }
             None => [0.0; 4],
-        })
+        }
+    }
+}
+
+/// The source of a part's value at a time in the span of the cursor: the key at exactly its start, if it has one.
+#[inline(always)]
+fn source_at(prepared: &Prepared, part: &SampledPart, cursor: &Cursor, time: f64) -> SpanSource {
+    let span = part.first_span + cursor.span;
+    if time == cursor.start {
+        let key = prepared.spans.keys[span];
+        if key != NONE {
+            return SpanSource::Constant(key);
+        }
+    }
+    prepared.spans.sources[span]
+}
+
+/// Tracks of one group with one part each, at a time in the span of their cursor.
+struct TracksAtCursor<'a> {
+    group: &'a SampledGroup,
+    /// Of each track.
+    parts: &'a [SampledPart],
+    cursor: &'a Cursor,
+    time: f64,
+}
+
+impl InLanesInto<(), [[f32; 4]]> for TracksAtCursor<'_> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, (): &(), output: &mut [[f32; 4]]) {
+        let form = self.group.prepared().segments.form;
+        if form == Form::Polynomial || self.time == self.cursor.start {
+            self.one_by_one(self.parts, output);
+            return;
+        }
+        let mut parts = self.parts.chunks_exact(L::COUNT);
+        let (whole, rest) = output.split_at_mut(output.len() - parts.remainder().len());
+        for (parts, values) in (&mut parts).zip(whole.chunks_exact_mut(L::COUNT)) {
+            self.arcs::<L>(parts, values);
+        }
+        self.one_by_one(parts.remainder(), rest);
+    }
+}
+
+impl TracksAtCursor<'_> {
+    #[inline(always)]
+    fn one_by_one(&self, parts: &[SampledPart], output: &mut [[f32; 4]]) {
+        let Self { cursor, time, .. } = *self;
+        let prepared = self.group.prepared();
+        let parameter = cursor.in_seconds.parameter(time - cursor.start);
+        for (part, value) in parts.iter().zip(output) {
+            *value = match source_at(prepared, part, cursor, time) {
+                SpanSource::Segment(index) => self.group.at_parameter(index as usize, parameter),
+                SpanSource::Constant(index) => prepared.constants[index as usize],
+                SpanSource::Exact(index) => cursor.exact(prepared, index, time),
+            };
+        }
+    }
+
+    /// A lane for each track, if all are on arcs.
+    #[inline(always)]
+    fn arcs<L: Lanes>(&self, parts: &[SampledPart], output: &mut [[f32; 4]]) {
+        let spans = &self.group.prepared().spans;
+        // A middle and a tangent each.
+        let rotations: &[[f32; 4]] = bytemuck::cast_slice(self.group.arcs());
+        let (mut middles, mut tangents) = ([0; MAX_LANES], [0; MAX_LANES]);
+        for (part, (middle, tangent)) in parts.iter().zip(middles.iter_mut().zip(&mut tangents)) {
+            let SpanSource::Segment(index) = spans.sources[part.first_span + self.cursor.span]
+            else {
+                return self.one_by_one(parts, output);
+            };
+            (*middle, *tangent) = (2 * index, 2 * index + 1);
+        }
+        let middle = L::gather_rotations(rotations, &middles);
+        let tangent = L::gather_rotations(rotations, &tangents);
+        let seconds = self.time - self.cursor.start;
+        let parameter = L::all(self.cursor.in_seconds.parameter(seconds));
+        let found = on_arc(middle, tangent, norm_squared(tangent), parameter);
+        L::store_rotations(canonical(found), output);
     }
 }
 
@@ -374,8 +564,15 @@ impl SampledGroup {
         let segments = &self.prepared().segments;
         match segments.form {
             Form::Polynomial => at_parameter(&segments.polynomials[index], parameter),
-            Form::Arc if self.arcs.is_empty() => at_parameter(&segments.arcs[index], parameter),
-            Form::Arc => at_parameter(&self.arcs[index], parameter),
+            Form::Arc => at_parameter(&self.arcs()[index], parameter),
+        }
+    }
+
+    #[inline(always)]
+    fn arcs(&self) -> &[ArcSegment] {
+        match self.arcs.is_empty() {
+            true => &self.prepared().segments.arcs,
+            false => &self.arcs,
         }
     }
 }
