@@ -37,6 +37,8 @@
 //! * **Results larger than memory**: [`Request::stream`] returns one chunk while the next one is evaluated.
 //!   [`Clip::request`] and [`Engine::request`] evaluate some samples of some tracks, in an encoding, into the
 //!   caller's memory. [`OutputBuffer`] is memory that is fast to fill.
+//! * **One pose at a time**, such as in a game's loop: [`Clip::sampler`] gives a [`Sampler`], which evaluates single
+//!   samples and poses on the calling thread and allocates nothing.
 //! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
 //!   [`Engine::local_to_model`] multiplies them along a [`Skeleton`] to model matrices, for skinning also by inverse
 //!   bind matrices. [`Engine::world`] does this for rotations at fixed offsets. [`Engine::blend`], [`Engine::mix`]
@@ -122,6 +124,7 @@ pub use crate::device::Device;
 pub use crate::engine::Engine;
 pub use crate::engine::clip::Clip;
 pub use crate::engine::clip::request::Request;
+pub use crate::engine::clip::sampler::Sampler;
 pub use crate::error::Error;
 pub use crate::machine::options::{CacheFiles, EngineOptions};
 pub use crate::memory::{OutOfMemoryError, available_memory};

@@ -30,6 +30,8 @@ mod outside;
 mod per_track;
 mod poses;
 mod reduce;
+#[cfg(feature = "vulkan")]
+mod sampler;
 mod scalars;
 mod sparse_samples;
 #[cfg(feature = "vulkan")]

@@ -482,6 +482,13 @@ typedef struct TumbleFile TumbleFile;
 typedef struct TumblePassTarget TumblePassTarget;
 
 /*
+ A sampler: it evaluates a clip at one time after another, on the calling thread, for programs that need a pose now.
+ It is fastest if most times are near the one before. Threads may share a sampler, but wait for each other; give each
+ its own (`tumble_sampler_copy`).
+ */
+typedef struct TumbleSampler TumbleSampler;
+
+/*
  A set: tracks of rotation keys that are evaluated together, each with optional translations and scales. Any number
  of threads may use it at the same time.
  */
@@ -1316,6 +1323,85 @@ TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
  Frees a clip. Targets that were made from it stay valid. Does nothing if `clip` is null.
  */
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
+
+/*
+ Creates a sampler of a clip. Its values have the bits that `tumble_clip_evaluate` gives at listed times.
+
+ The clip may be freed before the sampler. The caller frees the sampler with `tumble_sampler_free`.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_MEMORY` if the clip exceeds its engine's memory limit, so that its segments are not kept.
+
+ # Safety
+ `sampler` must point to memory for a handle.
+ */
+TumbleResult tumble_sampler_new(const struct TumbleClip *clip,
+                                struct TumbleSampler **sampler);
+
+/*
+ Creates a sampler of the same clip, for another thread or another playback. The caller frees it with
+ `tumble_sampler_free`.
+
+ # Safety
+ `copy` must point to memory for a handle.
+ */
+TumbleResult tumble_sampler_copy(const struct TumbleSampler *sampler,
+                                 struct TumbleSampler **copy);
+
+/*
+ Evaluates one track at a time, seconds. `value` receives four floats, according to the quantity of the clip's
+ interpolation. Nothing is allocated.
+
+ # Errors
+ `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+
+ # Safety
+ `value` must have four floats, which nothing else uses during the call.
+ */
+TumbleResult tumble_sampler_sample(const struct TumbleSampler *sampler,
+                                   size_t track,
+                                   double time,
+                                   float *value);
+
+/*
+ Evaluates every track at a time, seconds, into the caller's memory: four floats for each track. `output_count` is the
+ number of floats. Nothing is allocated.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
+ finite.
+
+ # Safety
+ `output` must have `output_count` floats, which nothing else uses during the call.
+ */
+TumbleResult tumble_sampler_pose(const struct TumbleSampler *sampler,
+                                 double time,
+                                 float *output,
+                                 size_t output_count);
+
+/*
+ Evaluates some tracks at a time, seconds, into the caller's memory: four floats for each of the `track_count` indices
+ in `tracks`. `output_count` is the number of floats. Nothing is allocated.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
+ such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+
+ # Safety
+ `tracks` must have `track_count` numbers, and `output` must have `output_count` floats, which nothing else uses
+ during the call.
+ */
+TumbleResult tumble_sampler_pose_of(const struct TumbleSampler *sampler,
+                                    const size_t *tracks,
+                                    size_t track_count,
+                                    double time,
+                                    float *output,
+                                    size_t output_count);
+
+/*
+ Frees a sampler. Does nothing if `sampler` is null.
+ */
+TumbleResult tumble_sampler_free(struct TumbleSampler *sampler);
 
 /*
  Returns the number of encodings.

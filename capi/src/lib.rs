@@ -18,6 +18,7 @@ pub mod interpolation;
 pub mod pass;
 pub mod request;
 pub mod result;
+pub mod sampler;
 pub mod samples;
 pub mod set;
 pub mod set_vectors;

@@ -65,6 +65,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
+            Error::Track(TrackError::NoSuchTrack { .. }) => TumbleResult::OutOfRange,
             Error::Vulkan(error) => vulkan_code(error),
             Error::Threads(_) => TumbleResult::Device,
             Error::OutputLength { .. }

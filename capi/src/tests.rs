@@ -4,6 +4,7 @@ mod crowd;
 mod crowd_files;
 mod crowd_refusals;
 mod crowd_states;
+mod sampler;
 
 use std::ffi::{CStr, c_char};
 use std::ptr::{dangling, dangling_mut, null, null_mut};

@@ -37,6 +37,7 @@ fn the_header_is_what_the_sources_say() {
         "interpolation",
         "samples",
         "clip",
+        "sampler",
         "request",
         "pass",
         "set_vectors",

@@ -261,11 +261,34 @@ fn bench_reads_and_resamples_clips_of_every_format() {
     }
 }
 
+#[test]
+fn bench_measures_single_poses() {
+    let folder = sample_folder();
+    let line = [
+        "bench", "--json", "--rounds", "1", "--shrink", "30", "poses",
+    ];
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(folder.path(), &line).out).unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    let labels: Vec<&str> = (sections.iter().map(|it| it["method"].as_str().unwrap())).collect();
+    let expected = ["slerp", "bessel-overhauser"]
+        .map(|method| [1, 2, 33].map(|tracks| format!("{method}, {tracks} tracks a call")));
+    assert_eq!(labels, expected.concat());
+    for section in sections {
+        let rows = section["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), 4, "{section}");
+        assert!(
+            rows[3]["ratio_to_naive"].as_f64().unwrap() > 0.0,
+            "{section}"
+        );
+    }
+}
+
 /// Everything is measured and reported; speed is not tested.
 #[test]
 fn bench_measures_every_workload_in_one_run() {
     let folder = sample_folder();
-    let workloads = ["sparse", "dense", "small", "crowd", "long"];
+    let workloads = ["sparse", "motion", "dense", "small", "crowd", "long"];
     let mut line = vec!["bench", "--json", "--rounds", "2", "--shrink", "2000"];
     line.extend(workloads);
     let report: serde_json::Value =

@@ -8,7 +8,7 @@ use crate::shader::ArcSegment;
 use crate::simd::cache_line::CacheLine;
 use crate::simd::lanes::{Lanes, MAX_LANES, Number as _};
 use crate::time::runs::Affine;
-use crate::twin::{Evaluate, Parameters};
+use crate::twin::{Evaluate, Parameters, WHOLE_DEGREE};
 
 /// The maximum number of samples that are evaluated one by one, because most lanes of a vector would be unused.
 pub(crate) const SAMPLES_ONE_BY_ONE: usize = 3;
@@ -106,8 +106,13 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
 /// Evaluates the sample at a distance from the segment's middle.
 #[inline(always)]
 pub(crate) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
-    let rotation = segment.at(distance * affine.scale + affine.offset);
-    rotation.canonical().to_array()
+    at_parameter(segment, distance * affine.scale + affine.offset)
+}
+
+/// Evaluates the sample at a parameter of the segment.
+#[inline(always)]
+pub(crate) fn at_parameter<S: Evaluate>(segment: &S, parameter: f32) -> [f32; 4] {
+    segment.at(parameter).canonical().to_array()
 }
 
 /// The distances of a run's samples from the segment's middle, a vector at a time.
@@ -184,17 +189,31 @@ fn run<L: Lanes, S: Evaluate, O: Sink>(
     let iterations = count.div_ceil(S::samples::<L>());
     let prefetches = matches!(S::PIPELINE_FROM, Some(from) if iterations >= from);
     if !segment.is_canonical() {
-        vectors::<L, S, O, true, false>(segment, affine, count, distances, output);
+        vectors::<L, S, O, true, false, WHOLE_DEGREE>(segment, affine, count, distances, output);
     } else if prefetches {
-        vectors::<L, S, O, false, true>(segment, affine, count, distances, output);
+        vectors::<L, S, O, false, true, WHOLE_DEGREE>(segment, affine, count, distances, output);
     } else {
-        vectors::<L, S, O, false, false>(segment, affine, count, distances, output);
+        // Nearly all curves of motion have small angles.
+        match segment.degree() {
+            6 => vectors::<L, S, O, false, false, 6>(segment, affine, count, distances, output),
+            8 => vectors::<L, S, O, false, false, 8>(segment, affine, count, distances, output),
+            _ => vectors::<L, S, O, false, false, WHOLE_DEGREE>(
+                segment, affine, count, distances, output,
+            ),
+        }
     }
 }
 
-/// Evaluates a run; [`VectorLoop`] explains `FILTER` and `PREFETCH`.
+/// Evaluates a run of a segment of this degree; [`VectorLoop`] explains `FILTER` and `PREFETCH`.
 #[inline(always)]
-fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const PREFETCH: bool>(
+fn vectors<
+    L: Lanes,
+    S: Evaluate,
+    O: Sink,
+    const FILTER: bool,
+    const PREFETCH: bool,
+    const DEGREE: usize,
+>(
     segment: &S,
     affine: Affine,
     count: usize,
@@ -220,7 +239,7 @@ fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const PREFETCH: b
         }
         false => segment,
     };
-    let vector_loop = VectorLoop::<_, _, _, FILTER, PREFETCH> {
+    let vector_loop = VectorLoop::<_, _, _, FILTER, PREFETCH, DEGREE> {
         segment,
         constant,
         begun,
@@ -234,8 +253,15 @@ const MAX_SAMPLES: usize = MAX_LANES;
 
 /// Evaluates a run, [`Evaluate::samples`] samples in each iteration. With `FILTER`, components below 2^-64 in
 /// magnitude become 0; with `PREFETCH`, the computation of samples starts several iterations ahead.
-pub(crate) struct VectorLoop<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const PREFETCH: bool>
-{
+pub(crate) struct VectorLoop<
+    'a,
+    L: Lanes,
+    S: Evaluate,
+    P,
+    const FILTER: bool,
+    const PREFETCH: bool,
+    const DEGREE: usize,
+> {
     pub(crate) segment: &'a S,
     pub(crate) constant: L,
     pub(crate) begun: S::Begun<L>,
@@ -247,14 +273,23 @@ pub(crate) trait NextVectors<L: Lanes, S: Evaluate> {
     fn next(&mut self) -> S::Vectors<L>;
 }
 
-impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const PREFETCH: bool>
-    NextVectors<L, S> for VectorLoop<'_, L, S, P, FILTER, PREFETCH>
+impl<
+    L: Lanes,
+    S: Evaluate,
+    P: Parameters<L>,
+    const FILTER: bool,
+    const PREFETCH: bool,
+    const DEGREE: usize,
+> NextVectors<L, S> for VectorLoop<'_, L, S, P, FILTER, PREFETCH, DEGREE>
 {
     #[inline(always)]
     fn next(&mut self) -> S::Vectors<L> {
         let (begun, parameters) = (self.begun, &mut self.parameters);
-        let (begun, vectors) =
-            (self.segment).evaluate::<L, FILTER, PREFETCH>(self.constant, begun, parameters);
+        let (begun, vectors) = (self.segment).evaluate::<L, FILTER, PREFETCH, DEGREE>(
+            self.constant,
+            begun,
+            parameters,
+        );
         self.begun = begun;
         vectors
     }

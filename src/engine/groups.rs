@@ -24,6 +24,7 @@ use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
+use crate::prepare::clip_data::ClipData;
 use crate::prepare::preparation::SetRequest;
 use crate::stream::{Chunk, run};
 use crate::time::frames::Timeline;
@@ -186,6 +187,9 @@ pub(crate) struct GroupedTracks {
     pub(super) quantity: Quantity,
 }
 
+/// Groups of tracks, and for each track the index of its group and its index there.
+type GroupsAndTracks = (Vec<Arc<ClipData>>, Vec<(usize, usize)>);
+
 /// The tracks that have equal interpolations.
 struct Group {
     /// Their indices among all tracks, increasing.
@@ -235,6 +239,20 @@ impl GroupedTracks {
     pub(super) fn methods(&self) -> impl Iterator<Item = &'static str> {
         let groups = self.groups.iter();
         groups.map(|group| group.uploaded.data().interpolation.method.name)
+    }
+
+    /// The data of every group, and for each track the index of its group and its index there; an error if the segments
+    /// of a group exceed the engine's memory limit.
+    pub(super) fn prepared_tracks(&self) -> Result<GroupsAndTracks, EvaluateError> {
+        let mut groups = Vec::with_capacity(self.groups.len());
+        let mut tracks = vec![(0, 0); self.track_count];
+        for (index, group) in self.groups.iter().enumerate() {
+            groups.push(Arc::clone(group.uploaded.prepared()?.data()));
+            for (in_group, &track) in group.tracks.iter().enumerate() {
+                tracks[track] = (index, in_group);
+            }
+        }
+        Ok((groups, tracks))
     }
 
     /// The sample times of each group's tracks.

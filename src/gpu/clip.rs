@@ -1,7 +1,6 @@
 //! Clips on a device, and their recording into an application's commands.
 
 use std::any::Any;
-use std::mem::take;
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
@@ -27,7 +26,7 @@ use crate::work::recording::Resource;
 /// Prepared tracks, and their segments on a device.
 pub(crate) struct VulkanClip {
     opened: Arc<Opened>,
-    data: ClipData,
+    data: Arc<ClipData>,
     /// The segments on the device, which are uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
     uploading: Exclusive<()>,
@@ -41,7 +40,7 @@ impl VulkanClip {
         let buffers = opened.upload(&data, None)?;
         Ok(Self {
             opened,
-            data,
+            data: Arc::new(data),
             buffers: Mutex::new(Some(Arc::new(buffers))),
             uploading: Exclusive::default(),
             lists: ListCache::default(),
@@ -106,7 +105,7 @@ impl VulkanClip {
 }
 
 impl MachineClip for VulkanClip {
-    fn data(&self) -> &ClipData {
+    fn data(&self) -> &Arc<ClipData> {
         &self.data
     }
 
@@ -133,13 +132,13 @@ impl MachineClip for VulkanClip {
     }
 
     fn take_segments(&mut self) -> Vec<Prepared> {
-        take(&mut self.data.groups)
+        ClipData::take_groups(&mut self.data)
     }
 
     fn replace(&mut self, data: ClipData) -> Result<(), EvaluateError> {
         // They are of the other tracks.
         self.lists.forget();
-        self.data = data;
+        self.data = Arc::new(data);
         let old = lock(&self.buffers).take();
         let made = (self.opened).upload(&self.data, old.and_then(Arc::into_inner))?;
         *lock(&self.buffers) = Some(Arc::new(made));

@@ -127,7 +127,7 @@ pub(crate) trait Machine: Any + Send + Sync {
 
 /// Prepared tracks on a machine.
 pub(crate) trait MachineClip: Any + Send + Sync {
-    fn data(&self) -> &ClipData;
+    fn data(&self) -> &Arc<ClipData>;
 
     /// Evaluates all tracks; the result stays in memory of the device where that saves a copy. Explicit times must have
     /// been folded into the time range of the keys by the wrap mode ([`ClipData::folded`]).

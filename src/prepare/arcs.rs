@@ -10,7 +10,7 @@ use crate::curve::options::KeySigns;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
 use crate::prepare::prepared::Prepared;
-use crate::shader::{ArcSegment, END_NEGATED, START_NEGATED};
+use crate::shader::{ArcSegment, END_NEGATED, KEY_OF_INTERVAL, START_NEGATED};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::runs::NONE;
@@ -162,6 +162,21 @@ fn listed(signs: Signs<'_>, intervals: Range<usize>, first_key: u32) -> impl Ite
         };
         constant | flag(key, START_NEGATED) | flag(key + 1, END_NEGATED)
     })
+}
+
+/// The arcs that a group lists for a device to compute; empty if it has computed them.
+pub(crate) fn listed_arcs(prepared: &Prepared) -> Vec<ArcSegment> {
+    let arc = |&interval: &u32| {
+        let key = (interval & KEY_OF_INTERVAL) as usize;
+        let signed = |key: usize, flag| match interval & flag {
+            0 => prepared.constants[key],
+            _ => prepared.constants[key].map(|component| -component),
+        };
+        let [from, to] = [signed(key, START_NEGATED), signed(key + 1, END_NEGATED)];
+        let (middle, tangent) = arc_between(from, to);
+        ArcSegment { middle, tangent }
+    };
+    prepared.segments.intervals.iter().map(arc).collect()
 }
 
 /// The middle of an arc between two keys if the arc exceeds 180°; then it becomes two arcs.

@@ -1,8 +1,9 @@
 //! A prepared set: its tracks in groups, and the indices of each track's parts.
 
 use std::borrow::Cow;
+use std::mem::take;
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -145,7 +146,7 @@ impl ClipData {
         set: &TrackSet,
         interpolation: Interpolation,
     ) -> Result<Self, InterpolationError> {
-        let no_samples = Timeline::at(std::sync::Arc::default());
+        let no_samples = Timeline::at(Arc::default());
         SetRequest::whole(set, &interpolation, &no_samples).check()?;
         Ok(Self {
             interpolation,
@@ -288,6 +289,11 @@ impl ClipData {
         }
     }
 
+    /// Takes the groups out, unless a sampler still uses them.
+    pub(crate) fn take_groups(data: &mut Arc<Self>) -> Vec<Prepared> {
+        Arc::get_mut(data).map_or_else(Vec::new, |data| take(&mut data.groups))
+    }
+
     /// The mean number of a timeline's samples for each span.
     pub(crate) fn samples_of_a_run(&self, timeline: &Timeline) -> usize {
         let spans = self.groups.iter().map(|group| group.spans.starts.len());
@@ -298,9 +304,9 @@ impl ClipData {
         self.tracks.len() - 1
     }
 
-    /// The indices of a track's parts, in order of time.
+    /// The parts of a track as (group, index in the group), in order of time.
     #[inline(always)]
-    fn part_indices(&self, track: usize) -> &[(u32, u32)] {
+    pub(crate) fn part_indices(&self, track: usize) -> &[(u32, u32)] {
         &self.parts[self.tracks[track]..self.tracks[track + 1]]
     }
 
@@ -381,14 +387,20 @@ impl ClipData {
         if !wrap.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
             return Ok(Cow::Borrowed(timeline));
         }
-        let folded = |track: usize, time: f64| {
-            self.track_span(track)
-                .map_or(time, |span| wrap.folded(span, time))
-        };
+        let folded = |track, time| self.folded_time(track, time);
         Ok(Cow::Owned(timeline.map_times(self.track_count(), folded)?))
     }
 
-    fn part(&self, (group, part): (u32, u32)) -> PartRef<'_> {
+    /// The time between the keys of a track whose value is repeated at `time`; `time` itself if it is in no other copy
+    /// of the track.
+    pub(crate) fn folded_time(&self, track: usize, time: f64) -> f64 {
+        match self.track_span(track) {
+            Some(span) => self.interpolation.wrap().folded(span, time),
+            None => time,
+        }
+    }
+
+    pub(crate) fn part(&self, (group, part): (u32, u32)) -> PartRef<'_> {
         let prepared = &self.groups[group as usize];
         PartRef {
             prepared,

@@ -167,9 +167,17 @@ impl Prepared {
     ) -> [f32; 4] {
         let at = match &timeline.ticks {
             Ticks::Frames { .. } => sample as f64,
-            // At times beyond those allowed for keys, a curve's powers would overflow.
-            Ticks::Times { .. } => timeline.time_at(track, sample).clamp(-LATEST, LATEST),
+            Ticks::Times { .. } => {
+                return self.exact_at_time(index, parameter, timeline.time_at(track, sample));
+            }
         };
+        round_quat(self.exact[index as usize].value(parameter.at(at)))
+    }
+
+    /// The value at an explicit time by the `index`th curve of `exact`, evaluated in f64.
+    pub(crate) fn exact_at_time(&self, index: u32, parameter: Parameter, time: f64) -> [f32; 4] {
+        // At times beyond those allowed for keys, a curve's powers would overflow.
+        let at = time.clamp(-LATEST, LATEST);
         round_quat(self.exact[index as usize].value(parameter.at(at)))
     }
 

@@ -233,7 +233,7 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
         let signature = model.eax;
         let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
         match name.as_flattened() {
-            b"GenuineIntel" => Some(VectorWidth::Avx2),
+            b"GenuineIntel" => Some(VectorWidth::Baseline),
             b"AuthenticAMD" if family >= ZEN_5 => Some(VectorWidth::Avx512),
             _ => None,
         }

@@ -229,6 +229,9 @@ impl Lanes for Vec4 {
     type Narrow = Self;
     type Rotations = [[f32; 4]; 4];
     type Doubles = Four;
+    #[cfg(target_arch = "x86_64")]
+    type Block = std::arch::x86_64::__m128;
+    #[cfg(not(target_arch = "x86_64"))]
     type Block = [f32; 4];
 
     #[inline(always)]
@@ -278,7 +281,7 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn behind(self, block: &[f32; 4], count: usize) -> Self {
+    fn behind(self, block: &Self::Block, count: usize) -> Self {
         if count > 0 {
             Self::of_block(block)
         } else {
@@ -287,8 +290,17 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn store_past_caches(self, block: &mut [f32; 4]) {
-        *block = self.to_array();
+    fn store_past_caches(self, block: &mut Self::Block) {
+        // Miri executes no non-temporal stores.
+        #[cfg(all(target_arch = "x86_64", not(miri)))]
+        // SAFETY: SSE is part of x86-64, and the block is aligned as this instruction demands.
+        unsafe {
+            std::arch::x86_64::_mm_stream_ps(std::ptr::from_mut(block).cast(), self.into());
+        }
+        #[cfg(any(not(target_arch = "x86_64"), miri))]
+        {
+            *block = bytemuck::cast(self);
+        }
     }
 
     #[inline(always)]

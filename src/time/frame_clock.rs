@@ -43,6 +43,14 @@ pub(crate) struct InSeconds {
     pub(crate) scale: f32,
 }
 
+impl InSeconds {
+    /// The parameter of a time, from its seconds after the span's start.
+    #[inline(always)]
+    pub(crate) fn parameter(self, seconds: f64) -> f32 {
+        round_f32(seconds * self.unit - self.half) * self.scale + 0.0
+    }
+}
+
 /// The constants of a span of this length.
 #[inline(always)]
 pub(crate) fn in_seconds(seconds: f64) -> InSeconds {

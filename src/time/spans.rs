@@ -483,7 +483,7 @@ fn run_among(
 /// The source of a sample outside a part's keys (`None` if another part has it), and the times with the same source.
 /// Not inlined, so that the usual path stays small.
 #[inline(never)]
-fn outside(part: &TrackPart, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
+pub(crate) fn outside(part: &TrackPart, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
     let [at_end, from_before, from_after] = part.at_ends();
     if time < begin {
         let source = RunSource::outside(part.before, from_before, begin, 1.0);

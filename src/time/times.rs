@@ -1,9 +1,8 @@
 //! Search for the interval between keys, or the span of a prepared track, that contains an explicit time. Explicit
 //! times may be in any order.
 
-use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
-use crate::time::frame_clock::{InSeconds, in_seconds};
+use crate::time::frame_clock::in_seconds;
 
 /// The key before a time and the time's parameter after it; the search starts at the key `near`.
 #[inline(always)]
@@ -19,8 +18,7 @@ pub(crate) fn key_sample(times: &[f64], time: f64, near: usize) -> KeySample {
 /// The parameter of a time in the interval from `start` to `end`.
 #[inline(always)]
 fn parameter(start: f64, end: f64, time: f64) -> f32 {
-    let InSeconds { unit, half, scale } = in_seconds(end - start);
-    round_f32((time - start) * unit - half) * scale + 0.0
+    in_seconds(end - start).parameter(time - start)
 }
 
 /// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is set if the rotation

@@ -53,7 +53,7 @@ impl Evaluate for ArcSegment {
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool, const DEGREE: usize>(
         &self,
         square: L,
         begun: Begun<L>,

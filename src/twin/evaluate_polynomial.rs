@@ -4,10 +4,10 @@
 use glam::Vec4;
 
 use crate::shader::PolynomialSegment;
-use crate::simd::lanes::Lanes;
+use crate::simd::lanes::{Lanes, Number};
 pub(crate) use crate::twin::functions::polynomial;
 use crate::twin::functions::{PolynomialBegun, polynomial_begin, polynomial_end};
-use crate::twin::{Evaluate, Parameters};
+use crate::twin::{Evaluate, Parameters, WHOLE_DEGREE};
 
 impl Evaluate for PolynomialSegment {
     /// A quarter of the lanes: with all four components of a rotation side by side, the
@@ -34,7 +34,26 @@ impl Evaluate for PolynomialSegment {
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
+    fn degree(&self) -> usize {
+        // As integers, so that no register of a vector is taken: coefficients are canonical, and none is -0.
+        let [.., seventh, eighth, ninth, tenth] = &self.coefficients;
+        let bits = |c: &[f32; 4]| -> u64 {
+            let [low, high]: [u64; 2] = bytemuck::cast(*c);
+            low | high
+        };
+        let ninth_on = bits(ninth) | bits(tenth);
+        let seventh_on = bits(seventh) | bits(eighth) | ninth_on;
+        if seventh_on == 0 {
+            6
+        } else if ninth_on == 0 {
+            8
+        } else {
+            WHOLE_DEGREE
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool, const DEGREE: usize>(
         &self,
         _: L,
         begun: PolynomialBegun<L>,
@@ -47,7 +66,11 @@ impl Evaluate for PolynomialSegment {
                 [$(L::repeated(self.coefficients[$power])),+]
             };
         }
-        let mut q = polynomial_end(coefficients!(0 1 2 3 4 5 6 7 8 9 10), begun);
+        let mut q = match DEGREE {
+            6 => end_of_degree_6(coefficients!(0 1 2 3 4 5 6), begun),
+            8 => end_of_degree_8(coefficients!(0 1 2 3 4 5 6 7 8), begun),
+            _ => polynomial_end(coefficients!(0 1 2 3 4 5 6 7 8 9 10), begun),
+        };
         if FILTER {
             q = q.canonical();
         }
@@ -57,5 +80,70 @@ impl Evaluate for PolynomialSegment {
     #[inline(always)]
     fn at(&self, s: f32) -> Vec4 {
         polynomial(self.coefficients.map(Vec4::from_array), Vec4::splat(s))
+    }
+}
+
+/// [`polynomial_end`] where the coefficients beyond s⁶ are +0. Its terms with them are zeros, and no other term of its
+/// sums is -0: each ends with a coefficient, which is not, or with such a sum.
+#[inline(always)]
+fn end_of_degree_6<N: Number>(c: [N; 7], begun: PolynomialBegun<N>) -> N {
+    let PolynomialBegun { s, z, zz } = begun;
+    let third = c[3] * s + c[2];
+    let fifth = c[5] * s + c[4];
+    let high = c[6] * z + fifth;
+    c[0] + (high * zz + (third * z + c[1] * s))
+}
+
+/// The same for s⁸.
+#[inline(always)]
+fn end_of_degree_8<N: Number>(c: [N; 9], begun: PolynomialBegun<N>) -> N {
+    let PolynomialBegun { s, z, zz } = begun;
+    let third = c[3] * s + c[2];
+    let fifth = c[5] * s + c[4];
+    let seventh = c[7] * s + c[6];
+    let high = c[8] * zz + (seventh * z + fifth);
+    c[0] + (high * zz + (third * z + c[1] * s))
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use super::*;
+    use crate::math::canonical::canonical;
+
+    /// Coefficients of all magnitudes, zeros among them, and parameters at which powers underflow.
+    #[test]
+    fn short_polynomials_have_the_bits_of_the_whole() {
+        let random = &mut Rng::with_seed(3);
+        let mut degrees = [0; 3];
+        for round in 0..200_000 {
+            let mut number = || match random.u32(0..6) {
+                0 => 0.0,
+                _ => canonical((random.f32() - 0.5) * 2.0f32.powi(random.i32(-64..4))),
+            };
+            let mut coefficients = [0.0; 11].map(|_| number());
+            let s = number() * 0.5f32.powi(round % 70);
+            let degree = [6, 8, 10][round as usize % 3];
+            coefficients[degree + 1..].fill(0.0);
+            let segment = PolynomialSegment {
+                coefficients: coefficients.map(|c| [c, 0.0, c, 0.0]),
+            };
+            let whole = polynomial(coefficients, s);
+            let begun = polynomial_begin(s);
+            let found = match segment.degree() {
+                6 => end_of_degree_6(std::array::from_fn(|i| coefficients[i]), begun),
+                8 => end_of_degree_8(std::array::from_fn(|i| coefficients[i]), begun),
+                _ => whole,
+            };
+            assert_eq!(
+                found.to_bits(),
+                whole.to_bits(),
+                "{coefficients:?} at {s:e}"
+            );
+            assert!(segment.degree() <= degree);
+            degrees[(segment.degree() - 6) / 2] += 1;
+        }
+        assert!(degrees.iter().all(|&count| count > 10_000), "{degrees:?}");
     }
 }

@@ -93,10 +93,18 @@ pub(crate) trait Evaluate: NoUninit {
         parameters: &mut impl Parameters<L>,
     ) -> Self::Begun<L>;
 
-    /// Finishes the samples of an iteration. Returns the intermediate results for the iterations after it,
-    /// and the rotations. With `FILTER` all components are made
+    /// The degree with which the segment is evaluated: 6 for curves of small angles, 8 for curves of not much larger
+    /// ones, else [`WHOLE_DEGREE`]. Terms of higher powers are +0, which changes no bit of a sum: the samples have the
+    /// bits that the whole degree gives.
+    #[inline(always)]
+    fn degree(&self) -> usize {
+        WHOLE_DEGREE
+    }
+
+    /// Finishes the samples of an iteration, of a segment of this degree. Returns the intermediate results for the
+    /// iterations after it, and the rotations. With `FILTER` all components are made
     /// [`canonical`](crate::math::canonical::canonical).
-    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool, const DEGREE: usize>(
         &self,
         constant: L,
         begun: Self::Begun<L>,
@@ -117,6 +125,9 @@ pub(crate) trait Evaluate: NoUninit {
         middle.cmpge(Vec4::splat(COARSE)).all() || are_coarse_or_zero(constants)
     }
 }
+
+/// The degree with which every segment can be evaluated.
+pub(crate) const WHOLE_DEGREE: usize = 10;
 
 /// The smallest magnitude of a middle's component for which [`Evaluate::is_canonical`] is true.
 pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;

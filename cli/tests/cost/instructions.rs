@@ -117,6 +117,30 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
     }
 }
 
+/// Catches curves of small angles, which nearly all of motion are, that are evaluated with the whole degree.
+#[test]
+fn rotations_of_small_angles_cost_less() {
+    let folder = tempfile::tempdir().unwrap();
+    let motion = generate(folder.path(), 600, &[]);
+    let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
+    for (width, bound) in [("baseline", 39.0), ("avx2", 16.8)] {
+        if width == "avx2" && !has_avx2 {
+            eprintln!("no AVX2 here: not counted");
+            continue;
+        }
+        let count = |fps| instructions(&motion, "bessel-overhauser", fps, width);
+        let (Some(coarse), Some(fine)) = (count(300), count(600)) else {
+            return;
+        };
+        let each = (fine - coarse) as f64 / (TRACKS * 20 * 300) as f64;
+        println!("{width}: {each:.1} instructions a rotation of small angles");
+        assert!(
+            each < bound,
+            "{width}: {each:.1} a rotation of small angles"
+        );
+    }
+}
+
 /// Where keys are denser than samples and near each other, nothing is prepared: to prepare
 /// and fit a cubic would take thousands of instructions for each sample.
 #[test]

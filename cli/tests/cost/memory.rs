@@ -17,6 +17,45 @@ use crate::{one_at_a_time, peak_of};
 
 const MIB: usize = 1 << 20;
 
+/// Catches a sampler that allocates for a sample, even if it frees the memory at once: between, at and outside the
+/// keys, and on curves that are computed in f64.
+#[test]
+fn a_sampler_allocates_nothing_after_it_was_made() {
+    let _one = one_at_a_time();
+    let mut set = TrackSet::new();
+    for track in 0..60 {
+        let key = |i: i32| Quat::from_rotation_y(0.1 * (i * track) as f32);
+        let keys: Vec<Quat> = (0..20).map(key).collect();
+        let times: Vec<f64> = (0..20).map(f64::from).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for after in [WrapMode::Loop, WrapMode::Extrapolate] {
+        for method in [method::SLERP, method::SQUAD, method::C2] {
+            let interpolation = Interpolation {
+                after,
+                ..method.into()
+            };
+            let clip = engine.upload(&set, interpolation).unwrap();
+            let mut sampler = clip.sampler().unwrap();
+            let mut pose = vec![Quat::IDENTITY; 60];
+            let sample_all = || {
+                for frame in 0..200 {
+                    let time = f64::from(frame) * 0.25 - 3.0;
+                    sampler.pose(time, &mut pose).unwrap();
+                    sampler.sample(7, -time).unwrap();
+                }
+            };
+            // Another thread's message may come between.
+            let peaks = std::iter::repeat_with({
+                let mut sample_all = sample_all;
+                move || peak_of(&mut sample_all).1
+            });
+            assert!(peaks.take(5).any(|peak| peak == 0), "{method}, {after}");
+        }
+    }
+}
+
 /// What reading cost at most, beside what was there before; for one test at a time.
 fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
     let reader = BufReader::with_capacity(1 << 18, input);

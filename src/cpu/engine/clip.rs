@@ -2,6 +2,7 @@
 //! of each of many tracks, such as the poses of a crowd, each lane evaluates one sample, and no runs are listed.
 
 use bytemuck::Zeroable;
+use glam::Vec4;
 use rayon::prelude::*;
 
 use crate::cpu::engine::{CpuEngine, TASK};
@@ -122,7 +123,12 @@ impl CpuEngine {
                 output,
                 others: Vec::new(),
             };
-            in_lanes_of(self.width, &mut sparse);
+            if sparse.output.len() <= SAMPLES_ONE_BY_ONE {
+                // To clear a block would take longer than the samples.
+                sparse.fill::<Vec4>(None);
+            } else {
+                in_lanes_of(self.width, &mut sparse);
+            }
             return sparse.others.into_iter().try_for_each(|row_index| {
                 let row = &mut output[row_index * samples..][..samples];
                 let track = window.tracks.start + row_index;
@@ -287,8 +293,15 @@ struct ArcLanes {
 impl InLanes for SparseTimes<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
+        self.fill::<L>(Some(&mut ArcLanes::zeroed()));
+    }
+}
+
+impl SparseTimes<'_> {
+    /// Evaluates the window; arcs are gathered in a block, or evaluated one by one without it.
+    #[inline(always)]
+    fn fill<L: Lanes>(&mut self, mut block: Option<&mut ArcLanes>) {
         let samples = self.window.samples.clone();
-        let mut block = ArcLanes::zeroed();
         for (i, track) in self.window.tracks.clone().enumerate() {
             let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
                 self.others.push(i);
@@ -311,35 +324,50 @@ impl InLanes for SparseTimes<'_> {
                     }
                 };
                 let segments = &prepared.segments;
-                match segments.form {
-                    Form::Arc => {
+                match (segments.form, &mut block) {
+                    (Form::Arc, Some(block)) => {
                         let parameter = distance * affine.scale + affine.offset;
-                        block.push(&segments.arcs[index], parameter, output_index);
-                        if block.count == LANES {
-                            block.flush::<L>(self.output);
-                        }
+                        let arc = &segments.arcs[index];
+                        block.push::<L>(arc, parameter, output_index, self.output);
                     }
-                    Form::Polynomial => {
+                    (Form::Arc, None) => {
+                        let segment = &segments.arcs[index];
+                        self.output[output_index] = one(segment, affine, distance);
+                    }
+                    (Form::Polynomial, _) => {
                         let segment = &segments.polynomials[index];
                         self.output[output_index] = one(segment, affine, distance);
                     }
                 }
             }
         }
-        block.flush::<L>(self.output);
+        if let Some(block) = block {
+            block.flush::<L>(self.output);
+        }
     }
 }
 
 impl ArcLanes {
+    /// Adds a sample, and evaluates all into `output` if there is no room for another.
     #[inline(always)]
-    fn push(&mut self, segment: &ArcSegment, parameter: f32, output: usize) {
+    fn push<L: Lanes>(
+        &mut self,
+        segment: &ArcSegment,
+        parameter: f32,
+        output_index: usize,
+        output: &mut [[f32; 4]],
+    ) {
         self.middles[self.count] = segment.middle;
         self.tangents[self.count] = segment.tangent;
         self.parameters[self.count] = parameter;
-        self.outputs[self.count] = output;
+        self.outputs[self.count] = output_index;
         self.count += 1;
+        if self.count == LANES {
+            self.flush::<L>(output);
+        }
     }
 
+    /// Evaluates the samples that wait.
     #[inline(always)]
     fn flush<L: Lanes>(&mut self, output: &mut [[f32; 4]]) {
         let mut rotations = [[0.0; 4]; LANES];

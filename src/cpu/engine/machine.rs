@@ -1,6 +1,5 @@
 //! The CPU as a machine.
 
-use std::mem::take;
 use std::sync::Arc;
 
 use crate::cpu::engine::CpuEngine;
@@ -53,7 +52,10 @@ impl Machine for CpuEngine {
     }
 
     fn clip(self: Arc<Self>, data: ClipData) -> Result<Box<dyn MachineClip>, EvaluateError> {
-        Ok(Box::new(CpuClip { engine: self, data }))
+        Ok(Box::new(CpuClip {
+            engine: self,
+            data: Arc::new(data),
+        }))
     }
 
     fn passes(
@@ -67,11 +69,11 @@ impl Machine for CpuEngine {
 /// Prepared tracks, which the CPU evaluates where they are.
 struct CpuClip {
     engine: Arc<CpuEngine>,
-    data: ClipData,
+    data: Arc<ClipData>,
 }
 
 impl MachineClip for CpuClip {
-    fn data(&self) -> &ClipData {
+    fn data(&self) -> &Arc<ClipData> {
         &self.data
     }
 
@@ -101,11 +103,11 @@ impl MachineClip for CpuClip {
     }
 
     fn take_segments(&mut self) -> Vec<Prepared> {
-        take(&mut self.data.groups)
+        ClipData::take_groups(&mut self.data)
     }
 
     fn replace(&mut self, data: ClipData) -> Result<(), EvaluateError> {
-        self.data = data;
+        self.data = Arc::new(data);
         Ok(())
     }
 }

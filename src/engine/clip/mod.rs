@@ -1,6 +1,7 @@
 //! A clip: a set prepared for its interpolation, or one for each track, stored on a device, for evaluation at any times.
 
 pub(crate) mod request;
+pub(crate) mod sampler;
 
 use std::sync::Arc;
 
@@ -10,6 +11,7 @@ use crate::checks::{check_encoding, check_window};
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::engine::clip::request::Request;
+use crate::engine::clip::sampler::Sampler;
 use crate::engine::groups::GroupedTracks;
 use crate::error::Error;
 use crate::evaluate::uploaded::Uploaded;
@@ -167,6 +169,25 @@ impl Clip {
     /// f32 a value.
     pub fn request<'a>(&'a self, frames: &'a SampleTimes) -> Request<'a> {
         Request::of_clip(self, frames)
+    }
+
+    /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of
+    /// [`Clip::evaluate`] at listed times. The clip of a Vulkan device is evaluated from the segments that the host
+    /// has, too.
+    ///
+    /// # Errors
+    /// When the segments of the clip exceed the engine's memory limit, so that they are not kept.
+    pub fn sampler(&self) -> Result<Sampler, Error> {
+        let (clips, tracks) = match &self.tracks {
+            ClipTracks::Alike(uploaded) => {
+                let data = Arc::clone(uploaded.prepared()?.data());
+                let tracks = (0..data.track_count()).map(|track| (0, track)).collect();
+                (vec![data], tracks)
+            }
+            ClipTracks::Grouped(grouped) => grouped.prepared_tracks()?,
+        };
+        let width = self.engine.machine.width();
+        Ok(Sampler::new(clips, tracks, self.quantity(), width))
     }
 
     /// Evaluates a window of the result in chunks of about `chunk` values, of tracks with the same interpolation.

@@ -6,6 +6,7 @@ pub(crate) mod device;
 pub(crate) mod files;
 pub(crate) mod follow;
 pub(crate) mod naive;
+pub(crate) mod poses;
 pub(crate) mod race;
 pub(crate) mod report;
 pub(crate) mod smooth;
@@ -77,6 +78,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let shrink = arguments.shrink as usize;
             sections.extend(match kind {
                 WorkloadKind::Smooth => smooth::measure(shrink, repetitions)?,
+                WorkloadKind::Poses => poses::measure(shrink, repetitions)
+                    .map_err(|error| crate::arguments::device::refused(&error))?,
                 _ => files::measure(shrink, repetitions)?,
             });
             continue;

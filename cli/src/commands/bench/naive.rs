@@ -31,14 +31,55 @@ pub(crate) fn cubic(workload: &Workload, output: &mut [Quat]) {
             if vectors.0 != i {
                 vectors = (i, control_vectors(track, i));
             }
-            let [first, second, third] = vectors.1;
-            let u = 1.0 - t;
-            *rotation = track.keys[i]
-                * Quat::from_scaled_axis(first * (1.0 - u * u * u))
-                * Quat::from_scaled_axis(second * (t * t * (3.0 - 2.0 * t)))
-                * Quat::from_scaled_axis(third * (t * t * t));
+            *rotation = product(track.keys[i], vectors.1, t);
         }
     });
+}
+
+/// The product of scaled axes at a parameter.
+fn product(key: Quat, [first, second, third]: [Vec3; 3], t: f32) -> Quat {
+    let u = 1.0 - t;
+    key * Quat::from_scaled_axis(first * (1.0 - u * u * u))
+        * Quat::from_scaled_axis(second * (t * t * (3.0 - 2.0 * t)))
+        * Quat::from_scaled_axis(third * (t * t * t))
+}
+
+/// Every track at one time by [`Quat::slerp`], each after a search.
+pub(crate) fn slerp_pose(set: &TrackSet, time: f64, output: &mut [Quat]) {
+    for (track, rotation) in set.tracks().zip(output) {
+        let (i, t) = search(track, time);
+        *rotation = track.keys[i].slerp(track.keys[i + 1], t);
+    }
+}
+
+/// Every track at one time as in [`cubic`], each after a search. `known` has the vectors of the interval where each
+/// track was last.
+pub(crate) fn cubic_pose(
+    set: &TrackSet,
+    time: f64,
+    known: &mut [(usize, [Vec3; 3])],
+    output: &mut [Quat],
+) {
+    for ((track, rotation), vectors) in set.tracks().zip(output).zip(known) {
+        let (i, t) = search(track, time);
+        if vectors.0 != i {
+            *vectors = (i, control_vectors(track, i));
+        }
+        *rotation = product(track.keys[i], vectors.1, t);
+    }
+}
+
+/// The interval of a time, and where in it that is, from 0 to 1.
+fn search(track: Track<'_>, time: f64) -> (usize, f32) {
+    let after = track.times.partition_point(|&key| key <= time);
+    let i = after.saturating_sub(1).min(track.times.len() - 2);
+    (i, parameter(track, i, time))
+}
+
+/// Where in an interval a time is, from 0 to 1.
+fn parameter(track: Track<'_>, i: usize, time: f64) -> f32 {
+    let (start, end) = (track.times[i], track.times[i + 1]);
+    ((time - start) / (end - start)) as f32
 }
 
 fn each_track(
@@ -64,25 +105,22 @@ fn each_track(
 
 /// The interval of a time that only grows.
 struct Cursor<'a> {
-    times: &'a [f64],
+    track: Track<'a>,
     interval: usize,
 }
 
 impl<'a> Cursor<'a> {
     fn new(track: Track<'a>) -> Self {
-        Self {
-            times: track.times,
-            interval: 0,
-        }
+        Self { track, interval: 0 }
     }
 
     /// Moves to the interval of `time`; where in it that is, from 0 to 1.
     fn advance(&mut self, time: f64) -> f32 {
-        while self.interval + 2 < self.times.len() && self.times[self.interval + 1] <= time {
+        let times = self.track.times;
+        while self.interval + 2 < times.len() && times[self.interval + 1] <= time {
             self.interval += 1;
         }
-        let (start, end) = (self.times[self.interval], self.times[self.interval + 1]);
-        ((time - start) / (end - start)) as f32
+        parameter(self.track, self.interval, time)
     }
 }
 

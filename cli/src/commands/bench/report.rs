@@ -48,6 +48,7 @@ const WRITING: [Ratio; 2] = [
     ("share_of_write_rate", "writing"),
     ("ratio_to_naive", "naive"),
 ];
+const LOOPS: [Ratio; 1] = [("ratio_to_naive", "naive")];
 const COPYING: [Ratio; 1] = [("share_of_copying_rate", "copying")];
 const READING: [Ratio; 2] = [
     ("share_of_bytes_rate", "bytes"),
@@ -134,6 +135,17 @@ impl Section {
             peak_memory_bytes: peak_memory(),
             ..Self::with(WorkloadKind::Files, format, rotations, rows, &READING)
         }
+    }
+
+    /// `rows`: the naive peer first.
+    pub(crate) fn of_poses(
+        method: Method,
+        tracks: usize,
+        rotations: usize,
+        rows: Vec<BenchRow>,
+    ) -> Self {
+        let label = format!("{method}, {tracks} tracks a call");
+        Self::with(WorkloadKind::Poses, label, rotations, rows, &LOOPS)
     }
 
     /// `rows`: copying first.

@@ -21,6 +21,10 @@ pub(crate) struct Workload {
 pub(crate) enum WorkloadKind {
     /// 4096 tracks of 26 uneven keys, 1200 frames
     Sparse,
+    /// 4096 tracks of 300 keys at 30 Hz that turn little, as those of motion capture, 598 frames
+    Motion,
+    /// One time a call, of 1, 60 and 1000 tracks of such keys: requests and a sampler
+    Poses,
     /// 4096 tracks of 2400 keys at 120 Hz, 1200 frames between them
     Dense,
     /// 4 tracks of 26 keys, 500 frames: the time of one call
@@ -44,11 +48,15 @@ pub(crate) const RATE: f64 = 60.0;
 
 impl WorkloadKind {
     /// Makes the workload with one `shrink`th of its tracks, or of its keys where
-    /// there is one track; none for files and for smoothing.
+    /// there is one track; none for files, for smoothing and for single poses.
     pub(crate) fn workload(self, shrink: usize) -> Option<Workload> {
         let scaled = |count: usize| (count / shrink).max(1);
         Some(match self {
             Self::Sparse => frames(uneven(scaled(4096), 26, 1200.0 / RATE), 0.0, 1200),
+            Self::Motion => {
+                let count = 2 * MOTION_KEYS - 2;
+                frames(motion(scaled(4096), MOTION_KEYS), 0.0, count)
+            }
             Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
             // Half way between keys: on them there would be nothing to evaluate.
             Self::Dense => frames(even(scaled(4096), 2400), 1.0 / 240.0, 1199),
@@ -62,7 +70,7 @@ impl WorkloadKind {
             }
             Self::Crowd => crowd(scaled(1_000_000)),
             Self::Follow => paths(scaled(100_000)),
-            Self::Files | Self::Smooth => return None,
+            Self::Files | Self::Smooth | Self::Poses => return None,
         })
     }
 }
@@ -95,11 +103,24 @@ fn uneven(tracks: usize, keys: usize, seconds: f64) -> TrackSet {
 
 /// Keys at 120 Hz, as motion capture gives them: up to 3 degrees a step.
 fn even(tracks: usize, keys: usize) -> TrackSet {
-    let mut random = Rng::with_seed(2);
+    walks(2, tracks, keys, 120.0, 0.05)
+}
+
+/// Keys of a track of motion: ten seconds.
+pub(crate) const MOTION_KEYS: usize = 300;
+
+/// Keys at 30 Hz, as motion capture is stored: up to 4 degrees a step.
+pub(crate) fn motion(tracks: usize, keys: usize) -> TrackSet {
+    walks(6, tracks, keys, 30.0, 0.07)
+}
+
+/// Keys at a rate, each up to `step` radians from the one before.
+fn walks(seed: u64, tracks: usize, keys: usize, rate: f64, step: f64) -> TrackSet {
+    let mut random = Rng::with_seed(seed);
     let mut set = TrackSet::new();
-    let times: Vec<f64> = (0..keys).map(|k| k as f64 / 120.0).collect();
+    let times: Vec<f64> = (0..keys).map(|k| k as f64 / rate).collect();
     for _ in 0..tracks {
-        push(&mut set, &times, walk(&mut random, keys, 0.05));
+        push(&mut set, &times, walk(&mut random, keys, step));
     }
     set
 }

@@ -1,0 +1,77 @@
+//! One time a call, as a game or a controller asks: requests and a sampler, on one thread, beside a loop over glam.
+
+use fastrand::Rng;
+use glam::{Quat, Vec3};
+use tumble::{Device, Engine, Layout, Method, SampleTimes, method};
+
+use crate::commands::bench::naive;
+use crate::commands::bench::race::{Contestant, Repetitions, race};
+use crate::commands::bench::report::Section;
+use crate::commands::bench::workload::{MOTION_KEYS, RATE, motion};
+
+/// Calls of a measurement, each at a time of its own.
+const CALLS: usize = 600;
+
+/// A section for each method and number of tracks.
+pub(crate) fn measure(
+    shrink: usize,
+    repetitions: Repetitions,
+) -> Result<Vec<Section>, tumble::Error> {
+    let mut sections = Vec::new();
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        for tracks in [1, 60, 1000] {
+            let tracks = (tracks / shrink).max(1);
+            sections.push(of_tracks(method, tracks, repetitions)?);
+        }
+    }
+    Ok(sections)
+}
+
+fn of_tracks(
+    method: Method,
+    tracks: usize,
+    repetitions: Repetitions,
+) -> Result<Section, tumble::Error> {
+    let set = &motion(tracks, MOTION_KEYS);
+    let clip = &Engine::new(Device::Cpu)?.upload(set, method)?;
+    // Between the frames of the keys: on them there would be nothing to evaluate.
+    let played: &Vec<f64> = &(0..CALLS).map(|call| (call as f64 + 0.3) / RATE).collect();
+    let mut shuffled = played.clone();
+    Rng::with_seed(5).shuffle(&mut shuffled);
+    let (mut sampler, mut jumping) = (clip.sampler()?, clip.sampler()?);
+    let mut known = vec![(usize::MAX, [Vec3::ZERO; 3]); tracks];
+    let contestants: Vec<Contestant<'_, tumble::Error>> = vec![
+        Contestant::new("naive (glam), next times", |output: &mut [Quat]| {
+            for &time in played {
+                if method == method::SLERP {
+                    naive::slerp_pose(set, time, output);
+                } else {
+                    naive::cubic_pose(set, time, &mut known, output);
+                }
+            }
+            Ok(Vec::new())
+        }),
+        Contestant::new("evaluate_into, next times", |output: &mut [Quat]| {
+            for &time in played {
+                let frames = SampleTimes::at(vec![time]);
+                clip.evaluate_into(&frames, Layout::TrackMajor, output)?;
+            }
+            Ok(Vec::new())
+        }),
+        Contestant::new("sampler, next times", move |output: &mut [Quat]| {
+            for &time in played {
+                sampler.pose(time, output)?;
+            }
+            Ok(Vec::new())
+        }),
+        Contestant::new("sampler, any times", move |output: &mut [Quat]| {
+            for &time in &shuffled {
+                jumping.pose(time, output)?;
+            }
+            Ok(Vec::new())
+        }),
+    ];
+    let mut output = vec![Quat::IDENTITY; tracks];
+    let rows = race(contestants, &mut output, repetitions)?;
+    Ok(Section::of_poses(method, tracks, tracks * CALLS, rows))
+}

@@ -1,0 +1,265 @@
+//! `Clip::sampler`: single samples and poses, with the bits of `evaluate` at the same times.
+
+use glam::{DQuat, Quat, Vec4};
+use tumble::vulkan::tuning::PrepareArcs;
+use tumble::{
+    Axes, Clip, Device, Engine, EngineOptions, Error, Interpolation, KeySigns, METHODS, Quantity,
+    SampleTimes, Speed, TrackSet, WrapMode, method,
+};
+
+use crate::support::{Random, first_difference, hostile_set, vulkan_engines};
+
+fn cpu() -> Engine {
+    Engine::new(Device::Cpu).unwrap()
+}
+
+/// Times that jump, on keys and beside them, then stand, run forwards and run backwards.
+fn times(set: &TrackSet, random: &mut Random) -> Vec<f64> {
+    let mut times: Vec<f64> = (0..60).map(|_| random.between(-30.0, 70.0)).collect();
+    for &key in set.tracks().flat_map(|track| track.times).step_by(7) {
+        times.extend([key.next_down(), key, key.next_up()]);
+    }
+    times.extend([1e300, -1e300, 0.0, -0.0, 5e-324, 1e9]);
+    let mut sorted = times.clone();
+    sorted.sort_by(f64::total_cmp);
+    let slowly = (0..200).map(|i| 1.0 + 0.013 * f64::from(i));
+    times.extend(sorted.iter().chain(sorted.iter().rev()));
+    times.extend(slowly);
+    times.extend([3.3; 5]);
+    times
+}
+
+/// A sampler, asked for poses and for single samples, gives what `evaluate` gives.
+#[track_caller]
+fn assert_sampled(clip: &Clip, times: &[f64], label: &str) {
+    let tracks = clip.track_count();
+    let expected = clip.evaluate(&SampleTimes::at(times.to_vec())).unwrap();
+    let mut sampler = clip.sampler().unwrap();
+    let mut one_by_one = sampler.clone();
+    let mut found = vec![Quat::IDENTITY; expected.as_quats().len()];
+    let mut pose = vec![Quat::IDENTITY; tracks];
+    for (index, &time) in times.iter().enumerate() {
+        sampler.pose(time, &mut pose).unwrap();
+        for (track, &value) in pose.iter().enumerate() {
+            found[track * times.len() + index] = value;
+        }
+    }
+    let check = |found: &[Quat], how: &str| {
+        if let Some(index) = first_difference(expected.as_quats(), found) {
+            let (track, sample) = (index / times.len(), index % times.len());
+            panic!(
+                "{label}, {how}: track {track} at {:e} s: {} instead of {}",
+                times[sample],
+                found[index],
+                expected.as_quats()[index]
+            );
+        }
+    };
+    check(&found, "poses");
+    for (index, value) in found.iter_mut().enumerate() {
+        let (track, sample) = (index / times.len(), index % times.len());
+        *value = one_by_one.sample(track, times[sample]).unwrap();
+    }
+    check(&found, "one by one");
+}
+
+#[test]
+fn samples_have_the_bits_of_evaluate() {
+    let set = hostile_set(3, 20);
+    let mut random = Random(2);
+    let times = times(&set, &mut random);
+    for (index, method) in METHODS.into_iter().enumerate() {
+        for (before, after) in WrapMode::ALL.into_iter().enumerate() {
+            let interpolation = Interpolation {
+                before: WrapMode::ALL[(index + before) % 4],
+                after,
+                ..method.into()
+            };
+            let clip = cpu().upload(&set, interpolation).unwrap();
+            assert_sampled(&clip, &times, &format!("{method}, {before}, {after}"));
+        }
+    }
+    let constant = Interpolation {
+        speed: Speed::Constant,
+        ..method::C2.into()
+    };
+    let clip = cpu().upload(&set, constant).unwrap();
+    assert_sampled(&clip, &times, "constant speed");
+}
+
+/// Arcs of more than half a turn, which are divided: tracks with the same key times have different spans.
+#[test]
+fn arcs_of_any_length_have_the_bits_of_evaluate() {
+    let mut random = Random(7);
+    let mut set = TrackSet::new();
+    for _ in 0..6 {
+        let keys: Vec<Quat> = (0..9).map(|_| random.rotation().as_quat()).collect();
+        let times: Vec<f64> = (0..9).map(f64::from).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let authored = Interpolation {
+        signs: KeySigns::AsAuthored,
+        ..method::SLERP.into()
+    };
+    let clip = cpu().upload(&set, authored).unwrap();
+    assert_sampled(&clip, &times(&set, &mut random), "as authored");
+}
+
+/// Tracks of several parts, which share their times, at times of a clock that counts from 1970.
+#[test]
+fn long_tracks_have_the_bits_of_evaluate() {
+    let mut random = Random(4);
+    let start = 1.7e9;
+    let times: Vec<f64> = (0..9000).map(|key| start + f64::from(key) * 0.01).collect();
+    let mut set = TrackSet::new();
+    for _ in 0..2 {
+        let mut rotation = random.rotation();
+        let keys: Vec<Quat> = (0..times.len())
+            .map(|_| {
+                let step = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.4));
+                rotation = (rotation * step).normalize();
+                rotation.as_quat()
+            })
+            .collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    set.push("shorter", &times[..9], &[Quat::IDENTITY; 9])
+        .unwrap();
+    let mut sampled: Vec<f64> = (0..300)
+        .map(|_| start + random.between(-10.0, 110.0))
+        .collect();
+    sampled.extend((0..300).map(|frame| start + 40.9 + f64::from(frame) / 300.0));
+    sampled.extend(times.iter().skip(4090).take(12));
+    for (method, after) in [
+        (method::SLERP, WrapMode::Hold),
+        (method::BESSEL_OVERHAUSER, WrapMode::Mirror),
+        (method::STEP, WrapMode::Loop),
+    ] {
+        let interpolation = Interpolation {
+            after,
+            ..method.into()
+        };
+        let clip = cpu().upload(&set, interpolation).unwrap();
+        assert_sampled(&clip, &sampled, &format!("{method}, {after}"));
+    }
+}
+
+#[test]
+fn an_interpolation_for_each_track_is_sampled() {
+    let set = hostile_set(5, 12);
+    let looped = Interpolation {
+        after: WrapMode::Loop,
+        ..method::SQUAD.into()
+    };
+    let each = [looped, method::SLERP.into(), method::C2.into()];
+    let each: Vec<Interpolation> = each.into_iter().cycle().take(12).collect();
+    let clip = cpu().upload(&set, each).unwrap();
+    assert_sampled(&clip, &times(&set, &mut Random(6)), "of each track");
+}
+
+/// Also those whose arcs the device computes itself.
+#[test]
+fn clips_of_devices_are_sampled_on_the_host() {
+    let set = hostile_set(9, 12);
+    let times = times(&set, &mut Random(8));
+    for prepare_arcs in [PrepareArcs::OnDevice, PrepareArcs::OnHost] {
+        for engine in vulkan_engines(|options| options.prepare_arcs = prepare_arcs) {
+            for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+                let expected = cpu().upload(&set, method).unwrap();
+                let expected = expected.evaluate(&SampleTimes::at(times.clone())).unwrap();
+                let clip = engine.upload(&set, method).unwrap();
+                let mut sampler = clip.sampler().unwrap();
+                drop(clip);
+                for (sample, &time) in times.iter().enumerate() {
+                    for track in 0..12 {
+                        let found = sampler.sample(track, time).unwrap();
+                        let expected = expected.get(track, sample).unwrap();
+                        let label = format!("{engine:?}, {method}, {track} at {time}");
+                        assert_eq!(first_difference(&[expected], &[found]), None, "{label}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn velocities_are_sampled_as_vectors() {
+    let set = hostile_set(11, 9);
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::Body),
+        ..method::BESSEL_OVERHAUSER.into()
+    };
+    let clip = cpu().upload(&set, velocity).unwrap();
+    let times = times(&set, &mut Random(10));
+    let frames = SampleTimes::at(times.clone());
+    let expected = clip.rates(&frames, tumble::Layout::FrameMajor).unwrap();
+    let mut sampler = clip.sampler().unwrap();
+    let tracks = [8, 0, 3];
+    let mut found = [Vec4::ZERO; 3];
+    for (sample, &time) in times.iter().enumerate() {
+        sampler.pose_of(&tracks, time, &mut found).unwrap();
+        for (&track, found) in tracks.iter().zip(found) {
+            let expected = expected.get(track, sample).unwrap();
+            let bits = found.truncate().to_array().map(f32::to_bits);
+            assert_eq!(bits, expected.to_array().map(f32::to_bits), "{time}");
+        }
+    }
+    assert!(matches!(sampler.sample(0, 0.0), Err(Error::NotRotations)));
+}
+
+/// Clones move independently, on two threads, after the clip is gone.
+#[test]
+fn two_threads_sample_one_clip() {
+    let set = hostile_set(13, 9);
+    let clip = cpu().upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+    let times: Vec<f64> = (0..2000)
+        .map(|frame| f64::from(frame) * 0.02 - 3.0)
+        .collect();
+    let expected = clip.evaluate(&SampleTimes::at(times.clone())).unwrap();
+    let sampler = clip.sampler().unwrap();
+    drop(clip);
+    std::thread::scope(|scope| {
+        for is_backwards in [false, true] {
+            let mut sampler = sampler.clone();
+            let (times, expected) = (&times, &expected);
+            scope.spawn(move || {
+                for i in 0..times.len() {
+                    let sample = if is_backwards { times.len() - 1 - i } else { i };
+                    let mut pose = [Quat::IDENTITY; 9];
+                    sampler.pose(times[sample], &mut pose).unwrap();
+                    let expected: Vec<Quat> = (0..9)
+                        .map(|track| expected.get(track, sample).unwrap())
+                        .collect();
+                    assert_eq!(first_difference(&expected, &pose), None, "{sample}");
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn what_cannot_be_sampled_is_refused() {
+    let set = hostile_set(15, 3);
+    let clip = cpu().upload(&set, method::SLERP).unwrap();
+    let mut sampler = clip.sampler().unwrap();
+    let mut pose = [Quat::from_array([9.0; 4]); 3];
+    for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let refused = sampler.pose(time, &mut pose).unwrap_err();
+        assert!(refused.to_string().contains("finite"), "{refused}");
+    }
+    let refused = sampler.sample(3, 0.0).unwrap_err();
+    assert_eq!(refused.to_string(), "there is no track 3; the set has 3");
+    assert!(sampler.pose_of(&[0, 1, 3], 0.0, &mut pose).is_err());
+    assert!(sampler.pose(0.0, &mut pose[..2]).is_err());
+    assert!(sampler.pose(0.0, &mut [Vec4::ZERO; 3]).is_err());
+    assert_eq!(pose, [Quat::from_array([9.0; 4]); 3]);
+
+    let mut options = EngineOptions::default();
+    options.memory = Some(1);
+    let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+    let clip = engine.upload(&set, method::SLERP).unwrap();
+    assert!(matches!(clip.sampler(), Err(Error::OutOfMemory(_))));
+    let none = cpu().upload(&TrackSet::new(), method::SLERP).unwrap();
+    none.sampler().unwrap().pose::<Quat>(0.0, &mut []).unwrap();
+}
