@@ -67,7 +67,10 @@ fn compile() -> Files {
     let (mut parsed, mut of_texels) = (Vec::new(), Vec::new());
     for kernel in table::kernels() {
         let (storage, texels) = modules(&kernel);
-        declared.collect(&storage.name, &storage.parsed);
+        declared.collect(
+            &storage.name,
+            storage.layouts.as_ref().unwrap_or(&storage.parsed),
+        );
         let mut emit = |module: &Module| {
             let words = module.spirv();
             code.extend(words.iter().flat_map(|word| word.to_le_bytes()));
@@ -158,6 +161,8 @@ struct Module {
     source: String,
     parsed: naga::Module,
     info: ModuleInfo,
+    /// The same with the structs that its buffers hold, if it loads them by vectors.
+    layouts: Option<naga::Module>,
 }
 
 /// A kernel, and its variant that reads texel buffers if it has one.
@@ -167,13 +172,20 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         files,
         reads,
         has_texels,
+        loads_vectors,
     } = kernel;
     let joined: String = files.iter().map(|file| read_shader(file)).collect();
     let source = match reads.is_empty() {
-        true => joined,
+        true => joined.clone(),
         false => readers::storage(reads) + &joined,
     };
-    let storage = Module::parse(name.clone(), source);
+    let mut storage = Module::parse(name.clone(), source);
+    if *loads_vectors {
+        let source = readers::vectors(reads, &storage.parsed) + &joined;
+        let by_vectors = Module::parse(name.clone(), source);
+        let layouts = Some(std::mem::replace(&mut storage, by_vectors).parsed);
+        storage.layouts = layouts;
+    }
     let texels = has_texels.then(|| {
         let wide = files.iter().flat_map(|&file| match file {
             "stores/f32" => WIDE_STORE.to_vec(),
@@ -209,6 +221,7 @@ impl Module {
             source,
             parsed,
             info,
+            layouts: None,
         }
     }
 
