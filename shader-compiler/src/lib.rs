@@ -161,6 +161,8 @@ struct Module {
     source: String,
     parsed: naga::Module,
     info: ModuleInfo,
+    /// Whether its results go past the caches.
+    streams_results: bool,
     /// The same with the structs that its buffers hold, if it loads them by vectors.
     layouts: Option<naga::Module>,
 }
@@ -173,6 +175,7 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         reads,
         has_texels,
         loads_vectors,
+        streams_results,
     } = kernel;
     let joined: String = files.iter().map(|file| read_shader(file)).collect();
     let source = match reads.is_empty() {
@@ -186,6 +189,7 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         let layouts = Some(std::mem::replace(&mut storage, by_vectors).parsed);
         storage.layouts = layouts;
     }
+    storage.streams_results = *streams_results;
     let texels = has_texels.then(|| {
         let wide = files.iter().flat_map(|&file| match file {
             "stores/f32" => WIDE_STORE.to_vec(),
@@ -221,6 +225,7 @@ impl Module {
             source,
             parsed,
             info,
+            streams_results: false,
             layouts: None,
         }
     }
@@ -244,7 +249,11 @@ impl Module {
     /// Its SPIR-V, which rounds as it is written.
     fn spirv(&self) -> Vec<u32> {
         let Self {
-            name, parsed, info, ..
+            name,
+            parsed,
+            info,
+            streams_results,
+            ..
         } = self;
         let options = spv::Options {
             lang_version: (1, 3), // what Vulkan 1.1 takes
@@ -263,6 +272,12 @@ impl Module {
             exactness::workgroup_layouts(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
             exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
+        let words =
+            exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        match streams_results {
+            true => exactness::nontemporal_stores(&words)
+                .unwrap_or_else(|error| panic!("{name}: {error}")),
+            false => words,
+        }
     }
 }

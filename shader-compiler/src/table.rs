@@ -37,6 +37,8 @@ pub(crate) struct Kernel {
     pub(crate) has_texels: bool,
     /// Whether it loads elements from storage buffers by vectors of 16 bytes.
     pub(crate) loads_vectors: bool,
+    /// Whether its results go past the caches, so that what it reads stays there.
+    pub(crate) streams_results: bool,
 }
 
 /// The forms of segments, each with what its formula needs.
@@ -398,6 +400,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         reads: Vec::new(),
         has_texels: false,
         loads_vectors: false,
+        streams_results: false,
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
@@ -419,6 +422,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
                     reads: CLIP.iter().chain(listed).collect(),
                     has_texels: folder.is_none(),
                     loads_vectors: folder == Some(SPREAD),
+                    streams_results: folder.is_some(),
                 });
             }
         }
@@ -434,6 +438,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: KEYS[..reads].iter().collect(),
             has_texels: true,
             loads_vectors: false,
+            streams_results: false,
         });
     }
     for file in POSES {
@@ -450,6 +455,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: Vec::new(),
             has_texels: false,
             loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, shared, parts) in CROWD_JOINTS {
@@ -459,6 +465,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: CROWD_READS.iter().collect(),
             has_texels: true,
             loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, parts) in CROWD {
@@ -468,6 +475,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: Vec::new(),
             has_texels: false,
             loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, parts) in CROWD_WHOLE {
@@ -477,6 +485,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             reads: Vec::new(),
             has_texels: false,
             loads_vectors: false,
+            streams_results: false,
         });
     }
     kernels.push(Kernel {
@@ -485,6 +494,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         reads: INTERVALS.iter().collect(),
         has_texels: false,
         loads_vectors: false,
+        streams_results: false,
     });
     kernels
 }
