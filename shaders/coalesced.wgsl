@@ -1,5 +1,5 @@
-// Entry point for cards: neighbours store neighbours, so that a wave's stores are whole lines of
-// memory. An invocation takes a few samples in turn, and looks for an item, and loads its constants, only
+// Entry point for cards, frame by frame: neighbours store neighbouring tracks, so that a wave's stores are
+// whole lines of memory. An invocation takes a few samples in turn, and looks for an item, and loads its constants, only
 // where the one before has ended; neighbours of one item read its constants from one address.
 // It is joined with a form (`Segment`, `evaluate`), with the functions that read buffers
 // (`segment_at`, `constant_at`, `item_at`, `block_at`), a `distance_from_middle`, and a `finish`, which

@@ -243,6 +243,7 @@ pub mod vulkan {
         gpu::external::ExportedResult,
         gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue},
         gpu::passes::PassTarget,
+        gpu::recorded::{CommandScopes, CommandUsers},
         pose::pass::{PassRequest, PosePass},
     };
 

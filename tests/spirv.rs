@@ -12,7 +12,9 @@ use proptest::prelude::*;
 pub(crate) mod exactness;
 
 use exactness::spirv::{FloatControls, SpirvError, float_controls, without_decorations};
-use exactness::{PassError, no_contraction, splat_products, texel_buffers, workgroup_layouts};
+use exactness::{
+    PassError, no_contraction, nontemporal_stores, splat_products, texel_buffers, workgroup_layouts,
+};
 
 const ALL_CONTROLS: FloatControls = FloatControls {
     preserve_signed_zero_inf_nan: true,
@@ -325,11 +327,60 @@ fn types_in_workgroup_memory_lose_their_layout() {
     assert!(with_workgroup_memory > 0);
 }
 
+/// Stores of a kernel into buffers, and into other memory: how many, and how many have a mark.
+fn stores(module: &[u32]) -> [[usize; 2]; 2] {
+    const NONTEMPORAL: u32 = 4;
+    let all = instructions(module);
+    let buffers = all.iter().filter(|one| one.0 == 32 && one.1[1] == 12);
+    let buffers: Vec<u32> = buffers.map(|(_, operands)| operands[0]).collect();
+    let chains = (all.iter()).filter(|one| one.0 == 65 && buffers.contains(&one.1[0]));
+    let chains: Vec<u32> = chains.map(|(_, operands)| operands[1]).collect();
+    let mut counts = [[0; 2]; 2];
+    for (_, operands) in all.iter().filter(|one| one.0 == 62) {
+        let count = &mut counts[usize::from(!chains.contains(&operands[0]))];
+        count[0] += 1;
+        count[1] += usize::from(operands.get(2) == Some(&NONTEMPORAL));
+    }
+    counts
+}
+
+/// Results of kernels for cards go past the caches, and nothing else does.
+#[test]
+fn stores_into_buffers_are_marked_in_kernels_for_cards() {
+    let module = compile(
+        "@group(0) @binding(0) var<storage, read_write> values: array<vec4f>;
+         var<workgroup> tile: array<vec4f, 4>;
+         @compute @workgroup_size(4) fn main(@builtin(local_invocation_index) i: u32) {
+             tile[i] = values[i];
+             workgroupBarrier();
+             values[i + 4u] = tile[3u - i];
+             values[i + 8u].x = 1.0;
+         }",
+    );
+    let [buffers, others] = stores(&module);
+    assert_eq!(buffers, [2, 0]);
+    let marked = nontemporal_stores(&module).unwrap();
+    validate("stores", "vulkan1.1", &marked);
+    assert_eq!(stores(&marked), [[2, 2], others]);
+    assert_eq!(nontemporal_stores(&marked).unwrap(), marked);
+    let mut for_cards = 0;
+    for (name, code) in tumble::vulkan::kernels() {
+        let is_for_cards = name.contains("_spread_") || name.contains("_coalesced_");
+        let [buffers, others] = stores(&words(code));
+        let marked = if is_for_cards { buffers[0] } else { 0 };
+        assert!(buffers[0] > 0, "{name}");
+        assert_eq!([buffers[1], others[1]], [marked, 0], "{name}");
+        for_cards += usize::from(is_for_cards);
+    }
+    assert_eq!(for_cards, 64);
+}
+
 #[test]
 fn what_is_no_module_is_refused() {
     assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv.into()));
     assert_eq!(texel_buffers(&[]), Err(SpirvError::NotSpirv));
     assert_eq!(splat_products(&[]), Err(SpirvError::NotSpirv));
+    assert_eq!(nontemporal_stores(&[]), Err(SpirvError::NotSpirv));
     assert_eq!(workgroup_layouts(&[]), Err(SpirvError::NotSpirv.into()));
     assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv.into()));
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
@@ -371,6 +422,7 @@ proptest! {
         let _ = texel_buffers(&module);
         let _ = texel_buffers(&module);
         let _ = splat_products(&module);
+        let _ = nontemporal_stores(&module);
     }
 
     /// A damaged shader is refused or stays a list of whole instructions.

@@ -221,9 +221,12 @@ fn every_shader_function_has_its_twin() {
                 "link_buffers",
                 "half_buffers",
                 "grid",
+                "spread",
                 "item",
                 "frame_distance",
                 "time_distance",
+                "near_frame",
+                "near_time",
                 // Stores that move bits alone.
                 "f32",
                 "f32_wide",

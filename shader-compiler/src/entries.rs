@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, Handle,
-    Literal, LocalVariable, MathFunction, Module, ScalarKind, Statement, Type, TypeInner,
+    Literal, LocalVariable, MathFunction, Module, ScalarKind, Span, Statement, Type, TypeInner,
     UnaryOperator,
 };
 
@@ -599,10 +599,19 @@ impl<'a> Writer<'a> {
                 Statement::Loop {
                     body,
                     continuing,
-                    break_if: None,
+                    break_if,
                 } => {
                     let mut both = body.clone();
                     both.extend_block(continuing.clone());
+                    if let Some(condition) = *break_if {
+                        let (accept, reject) = (vec![Statement::Break].into(), Block::new());
+                        let last = Statement::If {
+                            condition,
+                            accept,
+                            reject,
+                        };
+                        both.push(last, Span::UNDEFINED);
+                    }
                     let text = format!("loop {{\n{}}}", self.block(&both, false)?);
                     self.line(&text);
                 }

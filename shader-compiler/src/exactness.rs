@@ -31,10 +31,14 @@ const TYPE_RUNTIME_ARRAY: u16 = 29;
 const TYPE_STRUCT: u16 = 30;
 const TYPE_POINTER: u16 = 32;
 const LOAD: u16 = 61;
+const STORE: u16 = 62;
+const ACCESS_CHAIN: u16 = 65;
 const MEMBER_DECORATE: u16 = 72;
 const COMPOSITE_CONSTRUCT: u16 = 80;
 const IMAGE_FETCH: u16 = 95;
 const EXECUTION_MODE_ID: u16 = 331;
+/// The storage class of storage buffers.
+const STORAGE_BUFFER: u32 = 12;
 /// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
 const EXACT: [u16; 4] = [127, 129, 131, MULTIPLY]; // FNegate FAdd FSub FMul
 const MULTIPLY: u16 = 133;
@@ -216,7 +220,6 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     const UNIFORM: u32 = 2;
     const WORKGROUP: u32 = 4;
     const PUSH_CONSTANT: u32 = 9;
-    const STORAGE_BUFFER: u32 = 12;
     // RowMajor, ColMajor, ArrayStride, MatrixStride, Offset
     const LAYOUT: [u32; 5] = [4, 5, 6, 7, 35];
     let code = instructions(module)?;
@@ -261,6 +264,35 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
             Some(_) => {}
             None => words.extend_from_slice(instruction.words),
         }
+    }
+    Ok(words)
+}
+
+/// Marks the stores into buffers as not temporal: what is stored is not soon read again, and need not take the place of
+/// what is in the caches.
+///
+/// # Errors
+/// A [`SpirvError`] for words that are no module.
+pub fn nontemporal_stores(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    const NONTEMPORAL: u32 = 4; // a memory operand
+    let mut words = module.get(..HEADER_WORDS).unwrap_or_default().to_vec();
+    // The types of pointers into buffers, and pointers of these types.
+    let mut pointers = BTreeSet::new();
+    for instruction in instructions(module)? {
+        match (instruction.opcode, instruction.words) {
+            (TYPE_POINTER, &[_, id, STORAGE_BUFFER, _]) => {
+                pointers.insert(id);
+            }
+            (ACCESS_CHAIN, &[_, kind, id, ..]) if pointers.contains(&kind) => {
+                pointers.insert(id);
+            }
+            (STORE, &[_, pointer, value]) if pointers.contains(&pointer) => {
+                words.extend([instruction_word(STORE, 4), pointer, value, NONTEMPORAL]);
+                continue;
+            }
+            _ => {}
+        }
+        words.extend_from_slice(instruction.words);
     }
     Ok(words)
 }

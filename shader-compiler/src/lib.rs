@@ -67,7 +67,10 @@ fn compile() -> Files {
     let (mut parsed, mut of_texels) = (Vec::new(), Vec::new());
     for kernel in table::kernels() {
         let (storage, texels) = modules(&kernel);
-        declared.collect(&storage.name, &storage.parsed);
+        declared.collect(
+            &storage.name,
+            storage.layouts.as_ref().unwrap_or(&storage.parsed),
+        );
         let mut emit = |module: &Module| {
             let words = module.spirv();
             code.extend(words.iter().flat_map(|word| word.to_le_bytes()));
@@ -158,6 +161,10 @@ struct Module {
     source: String,
     parsed: naga::Module,
     info: ModuleInfo,
+    /// Whether its results go past the caches.
+    streams_results: bool,
+    /// The same with the structs that its buffers hold, if it loads them by vectors.
+    layouts: Option<naga::Module>,
 }
 
 /// A kernel, and its variant that reads texel buffers if it has one.
@@ -167,13 +174,22 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         files,
         reads,
         has_texels,
+        loads_vectors,
+        streams_results,
     } = kernel;
     let joined: String = files.iter().map(|file| read_shader(file)).collect();
     let source = match reads.is_empty() {
-        true => joined,
+        true => joined.clone(),
         false => readers::storage(reads) + &joined,
     };
-    let storage = Module::parse(name.clone(), source);
+    let mut storage = Module::parse(name.clone(), source);
+    if *loads_vectors {
+        let source = readers::vectors(reads, &storage.parsed) + &joined;
+        let by_vectors = Module::parse(name.clone(), source);
+        let layouts = Some(std::mem::replace(&mut storage, by_vectors).parsed);
+        storage.layouts = layouts;
+    }
+    storage.streams_results = *streams_results;
     let texels = has_texels.then(|| {
         let wide = files.iter().flat_map(|&file| match file {
             "stores/f32" => WIDE_STORE.to_vec(),
@@ -209,6 +225,8 @@ impl Module {
             source,
             parsed,
             info,
+            streams_results: false,
+            layouts: None,
         }
     }
 
@@ -231,7 +249,11 @@ impl Module {
     /// Its SPIR-V, which rounds as it is written.
     fn spirv(&self) -> Vec<u32> {
         let Self {
-            name, parsed, info, ..
+            name,
+            parsed,
+            info,
+            streams_results,
+            ..
         } = self;
         let options = spv::Options {
             lang_version: (1, 3), // what Vulkan 1.1 takes
@@ -250,6 +272,12 @@ impl Module {
             exactness::workgroup_layouts(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
             exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
+        let words =
+            exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        match streams_results {
+            true => exactness::nontemporal_stores(&words)
+                .unwrap_or_else(|error| panic!("{name}: {error}")),
+            false => words,
+        }
     }
 }

@@ -36,10 +36,38 @@ pub(crate) fn texels(reads: &[&Read], module: &Module) -> String {
             element,
             function,
         } = read;
-        let body = reader(read, module);
+        let body = reader(read, module, |texel| {
+            format!("textureLoad({buffer}, {texel}, 0)")
+        });
         writeln!(
             text,
             "@group(0) @binding({binding}) var {buffer}: texture_1d<u32>;
+             fn {function}(index: u32) -> {element} {{\n{body}}}"
+        )
+        .unwrap();
+    }
+    text + &output(reads.len())
+}
+
+/// The same with storage buffers of vectors: drivers do not always find that numbers side by side can be loaded as one.
+pub(crate) fn vectors(reads: &[&Read], module: &Module) -> String {
+    let mut text = String::new();
+    for (binding, read) in reads.iter().enumerate() {
+        let Read {
+            buffer,
+            element,
+            function,
+        } = read;
+        let (stored, body) = match fields(read, module).1.is_multiple_of(16) {
+            true => (
+                "vec4u",
+                reader(read, module, |vector| format!("{buffer}[{vector}]")),
+            ),
+            false => (*element, format!("return {buffer}[index];\n")),
+        };
+        writeln!(
+            text,
+            "@group(0) @binding({binding}) var<storage, read> {buffer}: array<{stored}>;
              fn {function}(index: u32) -> {element} {{\n{body}}}"
         )
         .unwrap();
@@ -61,9 +89,8 @@ enum Field {
 }
 
 /// The function that puts an element together from the texels that it lies in.
-fn reader(read: &Read, module: &Module) -> String {
+fn reader(read: &Read, module: &Module, load: impl Fn(&str) -> String) -> String {
     let (fields, size) = fields(read, module);
-    let load = |texel: &str| format!("textureLoad({}, {texel}, 0)", read.buffer);
     let value = |kind: ScalarKind, words: String| match kind {
         ScalarKind::Uint => words,
         ScalarKind::Sint => format!("bitcast<i32>({words})"),
@@ -128,6 +155,16 @@ fn reader(read: &Read, module: &Module) -> String {
             Field::Vector(kind) => format!("return {};\n", vector(kind, load("index"))),
             _ => panic!("{buffer}: no reader for one field of 16 bytes"),
         },
+        32 if fields.len() == 8 => {
+            let (first, second) = (load("2u * index"), load("2u * index + 1u"));
+            let names =
+                ["head", "tail"].map(|name| ["x", "y", "z", "w"].map(|at| format!("{name}.{at}")));
+            let names = names.concat();
+            format!(
+                "let head = {first};\nlet tail = {second};\nreturn {};\n",
+                scalars(&Vec::from_iter(names.iter().map(String::as_str)))
+            )
+        }
         _ if size.is_multiple_of(16) => {
             let texels = size / 16;
             let mut next = 0;

@@ -35,6 +35,10 @@ pub(crate) struct Kernel {
     pub(crate) reads: Vec<&'static Read>,
     /// Whether it is compiled for texel buffers too; else it reads storage buffers only.
     pub(crate) has_texels: bool,
+    /// Whether it loads elements from storage buffers by vectors of 16 bytes.
+    pub(crate) loads_vectors: bool,
+    /// Whether its results go past the caches, so that what it reads stays there.
+    pub(crate) streams_results: bool,
 }
 
 /// The forms of segments, each with what its formula needs.
@@ -48,7 +52,7 @@ pub(crate) const FORMS: [(&str, &[&str]); 2] = [
 
 /// How the work over segments is listed: the entry point with the files that it needs, and what
 /// it reads beside segments and constants.
-pub(crate) const LISTS: [(&str, &[&str], &[Read]); 5] = [
+pub(crate) const LISTS: [(&str, &[&str], &[Read]); 7] = [
     (
         "frames",
         &[
@@ -104,11 +108,34 @@ pub(crate) const LISTS: [(&str, &[&str], &[Read]); 5] = [
             read("distances", "f32", "distance_at"),
         ],
     ),
+    (
+        "frames_spread",
+        &["lists/spread", "lists/frame_distance", "lists/near_frame"],
+        &[read("items", "SpreadRun", "item_at")],
+    ),
+    (
+        "times_spread",
+        &["lists/spread", "lists/time_distance", "lists/near_time"],
+        &[
+            read("items", "SpreadRun", "item_at"),
+            read("distances", "f32", "distance_at"),
+        ],
+    ),
 ];
 
-/// Kernels for cards, which read storage buffers.
-fn is_for_cards(list: &str) -> bool {
-    list.ends_with("_coalesced")
+/// The folder of kernels over spread runs, and the file that they need beside a form's.
+const SPREAD: &str = "spread";
+fn beside_form(form: &str, folder: Option<&str>) -> Option<&'static str> {
+    (form == "polynomial" && folder == Some(SPREAD)).then_some("spread/polynomial")
+}
+
+/// Kernels for cards, which read storage buffers: the folder with the two files that lead samples through a store,
+/// of values of one part and of several.
+fn folder_for_cards(list: &str) -> Option<&'static str> {
+    let folders = ["coalesced", SPREAD];
+    folders
+        .into_iter()
+        .find(|folder| list.ends_with(&format!("_{folder}")))
 }
 
 /// What a rotation is stored as.
@@ -372,6 +399,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         files: SELF_TEST.to_vec(),
         reads: Vec::new(),
         has_texels: false,
+        loads_vectors: false,
+        streams_results: false,
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
@@ -381,17 +410,19 @@ pub(crate) fn kernels() -> Vec<Kernel> {
                 files.extend([formula, entry].concat());
                 files.extend(needed);
                 files.push(format!("stores/{}", store.name).leak());
-                if is_for_cards(list) {
-                    files.push(match store.has_parts {
-                        true => "coalesced/together",
-                        false => "coalesced/alone",
-                    });
+                let folder = folder_for_cards(list);
+                files.extend(beside_form(form, folder));
+                if let Some(folder) = folder {
+                    let file = if store.has_parts { "together" } else { "alone" };
+                    files.push(format!("{folder}/{file}").leak());
                 }
                 kernels.push(Kernel {
                     name: format!("{form}_{list}_{}", store.name),
                     files,
                     reads: CLIP.iter().chain(listed).collect(),
-                    has_texels: !is_for_cards(list),
+                    has_texels: folder.is_none(),
+                    loads_vectors: folder == Some(SPREAD),
+                    streams_results: folder.is_some(),
                 });
             }
         }
@@ -406,6 +437,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             files,
             reads: KEYS[..reads].iter().collect(),
             has_texels: true,
+            loads_vectors: false,
+            streams_results: false,
         });
     }
     for file in POSES {
@@ -421,6 +454,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             files: shared.into_iter().chain([file]).collect(),
             reads: Vec::new(),
             has_texels: false,
+            loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, shared, parts) in CROWD_JOINTS {
@@ -429,6 +464,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             files: [&CROWD_ARGUMENTS, shared, parts, &["stores/f32", "crowd"]].concat(),
             reads: CROWD_READS.iter().collect(),
             has_texels: true,
+            loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, parts) in CROWD {
@@ -437,6 +474,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             files: [&CROWD_ARGUMENTS, parts].concat(),
             reads: Vec::new(),
             has_texels: false,
+            loads_vectors: false,
+            streams_results: false,
         });
     }
     for (name, parts) in CROWD_WHOLE {
@@ -445,6 +484,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             files: [&WHOLE, &*parts.concat()].concat(),
             reads: Vec::new(),
             has_texels: false,
+            loads_vectors: false,
+            streams_results: false,
         });
     }
     kernels.push(Kernel {
@@ -452,6 +493,8 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         files: PREPARE_ARCS.to_vec(),
         reads: INTERVALS.iter().collect(),
         has_texels: false,
+        loads_vectors: false,
+        streams_results: false,
     });
     kernels
 }

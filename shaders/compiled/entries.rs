@@ -239,32 +239,32 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 161] = [
+pub(crate) static ENTRIES: [Entry; 193] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(106)),
-    entry(1, Some(Global::Dispatch), 64, Some(107)),
-    entry(1, Some(Global::Dispatch), 64, Some(108)),
-    entry(1, Some(Global::Dispatch), 64, Some(109)),
-    entry(1, Some(Global::Dispatch), 64, Some(110)),
-    entry(1, Some(Global::Dispatch), 64, Some(111)),
-    entry(1, Some(Global::Dispatch), 64, Some(112)),
-    entry(1, Some(Global::Dispatch), 64, Some(113)),
-    entry(2, Some(Global::Dispatch), 64, Some(114)),
-    entry(2, Some(Global::Dispatch), 64, Some(115)),
-    entry(2, Some(Global::Dispatch), 64, Some(116)),
-    entry(2, Some(Global::Dispatch), 64, Some(117)),
-    entry(2, Some(Global::Dispatch), 64, Some(118)),
-    entry(2, Some(Global::Dispatch), 64, Some(119)),
-    entry(2, Some(Global::Dispatch), 64, Some(120)),
-    entry(2, Some(Global::Dispatch), 64, Some(121)),
-    entry(3, Some(Global::Dispatch), 64, Some(122)),
-    entry(3, Some(Global::Dispatch), 64, Some(123)),
-    entry(3, Some(Global::Dispatch), 64, Some(124)),
-    entry(3, Some(Global::Dispatch), 64, Some(125)),
-    entry(3, Some(Global::Dispatch), 64, Some(126)),
-    entry(3, Some(Global::Dispatch), 64, Some(127)),
-    entry(3, Some(Global::Dispatch), 64, Some(128)),
-    entry(3, Some(Global::Dispatch), 64, Some(129)),
+    entry(1, Some(Global::Dispatch), 64, Some(138)),
+    entry(1, Some(Global::Dispatch), 64, Some(139)),
+    entry(1, Some(Global::Dispatch), 64, Some(140)),
+    entry(1, Some(Global::Dispatch), 64, Some(141)),
+    entry(1, Some(Global::Dispatch), 64, Some(142)),
+    entry(1, Some(Global::Dispatch), 64, Some(143)),
+    entry(1, Some(Global::Dispatch), 64, Some(144)),
+    entry(1, Some(Global::Dispatch), 64, Some(145)),
+    entry(2, Some(Global::Dispatch), 64, Some(146)),
+    entry(2, Some(Global::Dispatch), 64, Some(147)),
+    entry(2, Some(Global::Dispatch), 64, Some(148)),
+    entry(2, Some(Global::Dispatch), 64, Some(149)),
+    entry(2, Some(Global::Dispatch), 64, Some(150)),
+    entry(2, Some(Global::Dispatch), 64, Some(151)),
+    entry(2, Some(Global::Dispatch), 64, Some(152)),
+    entry(2, Some(Global::Dispatch), 64, Some(153)),
+    entry(3, Some(Global::Dispatch), 64, Some(154)),
+    entry(3, Some(Global::Dispatch), 64, Some(155)),
+    entry(3, Some(Global::Dispatch), 64, Some(156)),
+    entry(3, Some(Global::Dispatch), 64, Some(157)),
+    entry(3, Some(Global::Dispatch), 64, Some(158)),
+    entry(3, Some(Global::Dispatch), 64, Some(159)),
+    entry(3, Some(Global::Dispatch), 64, Some(160)),
+    entry(3, Some(Global::Dispatch), 64, Some(161)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -281,30 +281,46 @@ pub(crate) static ENTRIES: [Entry; 161] = [
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(130)),
-    entry(1, Some(Global::Dispatch), 64, Some(131)),
-    entry(1, Some(Global::Dispatch), 64, Some(132)),
-    entry(1, Some(Global::Dispatch), 64, Some(133)),
-    entry(1, Some(Global::Dispatch), 64, Some(134)),
-    entry(1, Some(Global::Dispatch), 64, Some(135)),
-    entry(1, Some(Global::Dispatch), 64, Some(136)),
-    entry(1, Some(Global::Dispatch), 64, Some(137)),
-    entry(2, Some(Global::Dispatch), 64, Some(138)),
-    entry(2, Some(Global::Dispatch), 64, Some(139)),
-    entry(2, Some(Global::Dispatch), 64, Some(140)),
-    entry(2, Some(Global::Dispatch), 64, Some(141)),
-    entry(2, Some(Global::Dispatch), 64, Some(142)),
-    entry(2, Some(Global::Dispatch), 64, Some(143)),
-    entry(2, Some(Global::Dispatch), 64, Some(144)),
-    entry(2, Some(Global::Dispatch), 64, Some(145)),
-    entry(3, Some(Global::Dispatch), 64, Some(146)),
-    entry(3, Some(Global::Dispatch), 64, Some(147)),
-    entry(3, Some(Global::Dispatch), 64, Some(148)),
-    entry(3, Some(Global::Dispatch), 64, Some(149)),
-    entry(3, Some(Global::Dispatch), 64, Some(150)),
-    entry(3, Some(Global::Dispatch), 64, Some(151)),
-    entry(3, Some(Global::Dispatch), 64, Some(152)),
-    entry(3, Some(Global::Dispatch), 64, Some(153)),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 64, Some(162)),
+    entry(1, Some(Global::Dispatch), 64, Some(163)),
+    entry(1, Some(Global::Dispatch), 64, Some(164)),
+    entry(1, Some(Global::Dispatch), 64, Some(165)),
+    entry(1, Some(Global::Dispatch), 64, Some(166)),
+    entry(1, Some(Global::Dispatch), 64, Some(167)),
+    entry(1, Some(Global::Dispatch), 64, Some(168)),
+    entry(1, Some(Global::Dispatch), 64, Some(169)),
+    entry(2, Some(Global::Dispatch), 64, Some(170)),
+    entry(2, Some(Global::Dispatch), 64, Some(171)),
+    entry(2, Some(Global::Dispatch), 64, Some(172)),
+    entry(2, Some(Global::Dispatch), 64, Some(173)),
+    entry(2, Some(Global::Dispatch), 64, Some(174)),
+    entry(2, Some(Global::Dispatch), 64, Some(175)),
+    entry(2, Some(Global::Dispatch), 64, Some(176)),
+    entry(2, Some(Global::Dispatch), 64, Some(177)),
+    entry(3, Some(Global::Dispatch), 64, Some(178)),
+    entry(3, Some(Global::Dispatch), 64, Some(179)),
+    entry(3, Some(Global::Dispatch), 64, Some(180)),
+    entry(3, Some(Global::Dispatch), 64, Some(181)),
+    entry(3, Some(Global::Dispatch), 64, Some(182)),
+    entry(3, Some(Global::Dispatch), 64, Some(183)),
+    entry(3, Some(Global::Dispatch), 64, Some(184)),
+    entry(3, Some(Global::Dispatch), 64, Some(185)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -321,19 +337,35 @@ pub(crate) static ENTRIES: [Entry; 161] = [
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
-    entry(6, Some(Global::Rows), 64, Some(154)),
-    entry(6, Some(Global::Rows), 64, Some(155)),
-    entry(7, Some(Global::Rows), 64, Some(156)),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(6, Some(Global::Rows), 64, Some(186)),
+    entry(6, Some(Global::Rows), 64, Some(187)),
+    entry(7, Some(Global::Rows), 64, Some(188)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(157)),
-    entry(14, Some(Global::Dispatch), 64, Some(158)),
-    entry(14, Some(Global::Dispatch), 64, Some(159)),
-    entry(14, Some(Global::Dispatch), 64, Some(160)),
+    entry(14, Some(Global::Dispatch), 64, Some(189)),
+    entry(14, Some(Global::Dispatch), 64, Some(190)),
+    entry(14, Some(Global::Dispatch), 64, Some(191)),
+    entry(14, Some(Global::Dispatch), 64, Some(192)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -634,6 +666,32 @@ pub(crate) struct SmallAngleCubic<F> {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Spread {
+    pub(crate) detail: u32,
+    pub(crate) first_item: u32,
+    pub(crate) item_count: u32,
+    pub(crate) first_output: u32,
+    pub(crate) lanes_log2: u32,
+    pub(crate) line_mask: u32,
+}
+
+stored!(Spread, (), 6, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, line_mask 5);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SpreadRun<F> {
+    pub(crate) source: u32,
+    pub(crate) output: u32,
+    pub(crate) count: u32,
+    pub(crate) first: i32,
+    pub(crate) scale: F,
+    pub(crate) offset: F,
+    pub(crate) key: u32,
+    pub(crate) iterations: u32,
+}
+
+stored!(SpreadRun, (<F>), 8, source 0, output 1, count 2, first 3, scale 4, offset 5, key 6, iterations 7);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TangentWeights<F> {
     pub(crate) before: F,
     pub(crate) after: F,
@@ -845,13 +903,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -873,40 +932,20 @@ pub(crate) fn cell_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> [M::F
 
 /// The sample that an invocation takes in its `iteration`. Eight neighbours always store at eight
 /// neighbouring cells, the first of which is a multiple of eight. An invocation's own samples are
-/// near each other: track by track 8 apart, frame by frame one.
+/// those of consecutive frames.
 pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -> Cell {
-    let _block = machine.block(line!(), 17);
-    let loaded = machine.load::<u32>(Global::Dispatch, 1);
-    if loaded == 1u32 {
-        let _block = machine.block(line!(), 11);
-        let index = corner.first.wrapping_add(iteration.wrapping_mul(LINE));
-        let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-        let position = loaded_2.wrapping_add(index);
-        let loaded_3 = machine.load::<u32>(Global::Dispatch, 6);
-        let output = position.wrapping_add(loaded_3);
-        let block = corner
-            .block
-            .wrapping_add(quotient(iteration.wrapping_mul(LINE), BLOCK_SAMPLES));
-        let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
-        return Cell {
-            output,
-            row: 0u32,
-            position,
-            block,
-            is_inside: index < loaded_4,
-        };
-    }
+    let _block = machine.block(line!(), 14);
     let sample = corner.first.wrapping_add(iteration);
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 1);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 4);
-    let row = sample.wrapping_mul(loaded_5).wrapping_add(loaded_6);
-    let output_2 = (row & 0xfffffff8u32).wrapping_add(corner.column);
-    let track = output_2.wrapping_sub(row);
-    let loaded_7 = machine.load::<u32>(Global::Dispatch, 2);
-    let loaded_8 = machine.load::<u32>(Global::Dispatch, 3);
-    let is_inside = (sample < loaded_7) & (track < loaded_8);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let row = sample.wrapping_mul(loaded).wrapping_add(loaded_2);
+    let output = (row & 0xfffffff8u32).wrapping_add(corner.column);
+    let track = output.wrapping_sub(row);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let is_inside = (sample < loaded_3) & (track < loaded_4);
     Cell {
-        output: output_2,
+        output,
         row: track,
         position: sample,
         block: corner.block.wrapping_add(track),
@@ -915,13 +954,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -974,13 +1014,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -998,6 +1039,22 @@ pub(crate) fn constant_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> [
     let _block = machine.block(line!(), 2);
     let loaded = machine.load::<[u32; 4]>(Global::Constants, 4 * (index as usize));
     loaded.map(|x| M::F::of_bits(x))
+}
+
+/// A number that is the same for all samples of a segment.
+pub(crate) fn constant_of_arc_segment<M: Machine>(machine: &M, segment: ArcSegment<M::F>) -> M::F {
+    let _block = machine.block(line!(), 1);
+    let result = norm_squared(machine, segment.tangent);
+    result
+}
+
+/// The form of polynomials, as kernels over spread runs call it: no number is the same for all samples.
+/// Twin: src/twin/evaluate_polynomial.rs.
+pub(crate) fn constant_of_polynomial_segment<M: Machine>(
+    machine: &M,
+    segment: PolynomialSegment<M::F>,
+) -> M::F {
+    M::F::of(0.0)
 }
 
 /// The coefficients of 1, s, s², … s¹⁰.
@@ -1061,34 +1118,19 @@ pub(crate) fn corner_of<M: Machine>(
     groups: [u32; 3],
     lane: u32,
 ) -> Corner {
-    let _block = machine.block(line!(), 17);
+    let _block = machine.block(line!(), 14);
     let tile = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
     let line = quotient(lane, LINE);
     let within = lane & 7u32;
-    let loaded = machine.load::<u32>(Global::Dispatch, 1);
-    if loaded == 1u32 {
-        let _block = machine.block(line!(), 8);
-        let first = tile
-            .wrapping_mul(WORKGROUP)
-            .wrapping_add(line.wrapping_mul(LINE))
-            .wrapping_mul(SAMPLES_EACH)
-            .wrapping_add(within);
-        let loaded_2 = machine.load::<u32>(Global::Dispatch, 5);
-        return Corner {
-            first,
-            column: 0u32,
-            block: loaded_2.wrapping_add(quotient(first, BLOCK_SAMPLES)),
-        };
-    }
-    let first_2 = group[2]
+    let first = group[2]
         .wrapping_mul(8u32)
         .wrapping_add(line)
         .wrapping_mul(SAMPLES_EACH);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
-    let block = loaded_3.wrapping_add(quotient(first_2, BLOCK_SAMPLES).wrapping_mul(loaded_4));
+    let loaded = machine.load::<u32>(Global::Dispatch, 5);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 3);
+    let block = loaded.wrapping_add(quotient(first, BLOCK_SAMPLES).wrapping_mul(loaded_2));
     Corner {
-        first: first_2,
+        first,
         column: tile.wrapping_mul(LINE).wrapping_add(within),
         block,
     }
@@ -1104,13 +1146,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1384,13 +1427,14 @@ pub(crate) fn cubic_value<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1416,13 +1460,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1465,13 +1510,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -1597,9 +1643,59 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
     segment: ArcSegment<M::F>,
     parameter: M::F,
 ) -> [M::F; 4] {
-    let _block = machine.block(line!(), 8);
-    let result = norm_squared(machine, segment.tangent);
-    let z = (parameter * parameter) * result;
+    let _block = machine.block(line!(), 2);
+    let result = constant_of_arc_segment(machine, segment);
+    let result_2 = evaluate_with_arc_segment(machine, segment, result, parameter);
+    result_2
+}
+
+pub(crate) fn evaluate_near_arc_segment<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    segment: ArcSegment<M::F>,
+    constant: M::F,
+    j: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let result = near_distance(machine, item.first, j);
+    let parameter = result * item.scale + item.offset;
+    let result_2 = evaluate_with_arc_segment(machine, segment, constant, parameter);
+    result_2
+}
+
+pub(crate) fn evaluate_near_polynomial_segment<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    segment: PolynomialSegment<M::F>,
+    constant: M::F,
+    j: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let result = near_distance(machine, item.first, j);
+    let parameter = result * item.scale + item.offset;
+    let result_2 = evaluate_with_polynomial_segment(machine, segment, constant, parameter);
+    result_2
+}
+
+/// `s` runs from -1/2 to 1/2 over the segment.
+pub(crate) fn evaluate_polynomial_segment<M: Machine>(
+    machine: &M,
+    segment: PolynomialSegment<M::F>,
+    s: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let result = polynomial(machine, segment.coefficients, s);
+    result
+}
+
+pub(crate) fn evaluate_with_arc_segment<M: Machine>(
+    machine: &M,
+    segment: ArcSegment<M::F>,
+    square: M::F,
+    parameter: M::F,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 7);
+    let z = (parameter * parameter) * square;
     let sines = sine_cosm1_quarter(machine, parameter, z);
     both(
         segment.middle,
@@ -1612,14 +1708,14 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
     )
 }
 
-/// `s` runs from -1/2 to 1/2 over the segment.
-pub(crate) fn evaluate_polynomial_segment<M: Machine>(
+pub(crate) fn evaluate_with_polynomial_segment<M: Machine>(
     machine: &M,
     segment: PolynomialSegment<M::F>,
-    s: M::F,
+    constant: M::F,
+    parameter: M::F,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 1);
-    let result = polynomial(machine, segment.coefficients, s);
+    let result = evaluate_polynomial_segment(machine, segment, parameter);
     result
 }
 
@@ -1713,13 +1809,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
+        1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2022,28 +2119,29 @@ pub(crate) fn invocation_index<M: Machine>(
         .wrapping_add(invocation[0])
 }
 
-pub(crate) fn item_at<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => item_at_of_readers(machine, index),
-        _ => item_at_of_readers_2(machine, index),
+        0 => item_at_item_of_readers(machine, index),
+        _ => item_at_item_of_readers_2(machine, index),
     }
 }
 
-pub(crate) fn item_at_of_readers<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+pub(crate) fn item_at_item_of_readers<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
     let _block = machine.block(line!(), 1);
     let loaded = machine.load::<Item<M::F>>(Global::Items, 6 * (index as usize));
     loaded
 }
 
-pub(crate) fn item_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
+pub(crate) fn item_at_item_of_readers_2<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
     let _block = machine.block(line!(), 16);
     let texel = quotient(3u32.wrapping_mul(index), 2u32);
     let first = machine.load::<[u32; 4]>(Global::Items, 4 * (texel as usize));
@@ -2071,6 +2169,25 @@ pub(crate) fn item_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Item<
         first: head[3] as i32,
         scale: M::F::of_bits(tail[0]),
         offset: M::F::of_bits(tail[1]),
+    }
+}
+
+pub(crate) fn item_at_spread_run<M: Machine>(machine: &M, index: u32) -> SpreadRun<M::F> {
+    let _block = machine.block(line!(), 8);
+    let head = machine.load::<[u32; 4]>(Global::Items, 4 * (2u32.wrapping_mul(index) as usize));
+    let tail = machine.load::<[u32; 4]>(
+        Global::Items,
+        4 * (2u32.wrapping_mul(index).wrapping_add(1u32) as usize),
+    );
+    SpreadRun {
+        source: head[0],
+        output: head[1],
+        count: head[2],
+        first: head[3] as i32,
+        scale: M::F::of_bits(tail[0]),
+        offset: M::F::of_bits(tail[1]),
+        key: tail[2],
+        iterations: tail[3],
     }
 }
 
@@ -2194,13 +2311,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2320,30 +2438,40 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
-        3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5, 5,
-        5, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 7, 8, 9, 10, 10, 10, 10, 10,
-        10, 11, 11, 11, 11, 11, 11, 11, 11, 12, 11, 11, 13, 13, 14, 14, 15, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4,
-        4, 4, 5, 5, 5, 5, 5, 5, 5, 5, 7, 8, 9, 11, 11, 11, 11,
+        3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
+        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
+        10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
+        11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
+        21, 22, 22, 23, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 8,
+        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 15, 16, 17, 19, 19,
+        19, 19,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
         1 => main_of_runs(machine).await,
         2 => main_of_samples(machine).await,
         3 => main_of_coalesced(machine).await,
-        4 => main_of_runs_2(machine).await,
-        5 => main_of_samples_2(machine).await,
-        6 => main_of_coalesced_2(machine).await,
-        7 => main_of_from_keys(machine).await,
-        8 => main_of_from_keys_2(machine).await,
-        9 => main_of_from_keys_3(machine).await,
-        10 => main_of_poses(machine).await,
-        11 => main_of_crowd(machine).await,
-        12 => main_of_walk_all(machine).await,
-        13 => main_of_whole_rotations(machine).await,
-        14 => main_of_whole_matrices(machine).await,
+        4 => main_of_alone(machine).await,
+        5 => main_of_together(machine).await,
+        6 => main_of_together_2(machine).await,
+        7 => main_of_together_3(machine).await,
+        8 => main_of_runs_2(machine).await,
+        9 => main_of_samples_2(machine).await,
+        10 => main_of_coalesced_2(machine).await,
+        11 => main_of_alone_2(machine).await,
+        12 => main_of_together_4(machine).await,
+        13 => main_of_together_5(machine).await,
+        14 => main_of_together_6(machine).await,
+        15 => main_of_from_keys(machine).await,
+        16 => main_of_from_keys_2(machine).await,
+        17 => main_of_from_keys_3(machine).await,
+        18 => main_of_poses(machine).await,
+        19 => main_of_crowd(machine).await,
+        20 => main_of_walk_all(machine).await,
+        21 => main_of_whole_rotations(machine).await,
+        22 => main_of_whole_matrices(machine).await,
         _ => main_of_prepare_arcs(machine).await,
     }
 }
@@ -2391,7 +2519,7 @@ pub(crate) async fn main_of_runs<M: Machine>(machine: &M) {
         return;
     }
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
-    let item = item_at(machine, loaded_2.wrapping_add(index));
+    let item = item_at_item(machine, loaded_2.wrapping_add(index));
     let stride = machine.load::<u32>(Global::Dispatch, 2);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
     output = item.output.wrapping_add(loaded_3);
@@ -2486,7 +2614,7 @@ pub(crate) async fn main_of_coalesced<M: Machine>(machine: &M) {
         if cell.is_inside & !((cell.row == loaded_3) & result) {
             let _block = machine.block(line!(), 7);
             let result_2 = item_of(machine, cell);
-            let result_3 = item_at(machine, result_2);
+            let result_3 = item_at_item(machine, result_2);
             item = result_3;
             let loaded_5 = item;
             let result_4 = segment_of_arc_segment(machine, loaded_5);
@@ -2533,6 +2661,499 @@ pub(crate) async fn main_of_coalesced<M: Machine>(machine: &M) {
     }
 }
 
+pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut j: u32 = Default::default();
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut pair_end: u32 = Default::default();
+    let _block = machine.block(line!(), 42);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = workgroup
+        .wrapping_mul(SPREAD_WORKGROUP)
+        .wrapping_add(invocation)
+        >> loaded_2;
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
+    let count = sample_count(machine, item);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = item.output.wrapping_add(loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_6;
+    j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    if item.count != count {
+        let _block = machine.block(line!(), 2);
+        let loaded_7 = j;
+        store_with_care(machine, item, first, count, loaded_7, lanes);
+        return;
+    }
+    let segment = segment_at_arc_segment(machine, item.source);
+    let constant = constant_of_arc_segment(machine, segment);
+    let loaded_8 = j;
+    if loaded_8 < count {
+        let _block = machine.block(line!(), 12);
+        let loaded_9 = j;
+        let result = evaluate_near_arc_segment(machine, item, segment, constant, loaded_9);
+        rotation = result;
+        let loaded_10 = j;
+        if (loaded_10 == 0u32) & (item.key != NO_KEY) {
+            let _block = machine.block(line!(), 2);
+            let result_2 = constant_at(machine, item.key);
+            rotation = result_2;
+        }
+        let loaded_11 = j;
+        let loaded_12 = rotation;
+        store(machine, first.wrapping_add(loaded_11), loaded_12);
+    }
+    let loaded_13 = j;
+    j = loaded_13.wrapping_add(lanes);
+    let end = count.wrapping_add(idle);
+    pair_end = 3u32.wrapping_mul(lanes);
+    let loaded_14 = pair_end;
+    if loaded_14 <= end {
+        loop {
+            let _block = machine.block(line!(), 23);
+            let loaded_15 = j;
+            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_15);
+            let loaded_16 = j;
+            let next = evaluate_near_arc_segment(
+                machine,
+                item,
+                segment,
+                constant,
+                loaded_16.wrapping_add(lanes),
+            );
+            let loaded_17 = j;
+            store(machine, first.wrapping_add(loaded_17), rotation_2);
+            let loaded_18 = j;
+            store(
+                machine,
+                first.wrapping_add(loaded_18).wrapping_add(lanes),
+                next,
+            );
+            let loaded_19 = j;
+            j = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_20 = pair_end;
+            pair_end = loaded_20.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_21 = pair_end;
+            if loaded_21 > end {
+                break;
+            }
+        }
+    }
+    let loaded_22 = j;
+    if loaded_22 < count {
+        loop {
+            let _block = machine.block(line!(), 11);
+            let loaded_23 = j;
+            let loaded_24 = j;
+            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_24);
+            store(machine, first.wrapping_add(loaded_23), result_3);
+            let loaded_25 = j;
+            j = loaded_25.wrapping_add(lanes);
+            let loaded_26 = j;
+            if loaded_26 >= count {
+                break;
+            }
+        }
+        return;
+    } else {
+        return;
+    }
+}
+
+pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [M::F; 3] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_arc_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(3u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_1(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 3u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(3u32))
+                        .wrapping_add(loaded_19) as usize,
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize,
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [M::F; 9] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_arc_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(9u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_2(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 9u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(9u32))
+                        .wrapping_add(loaded_19) as usize,
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(9u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(9u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(9u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_mul(9u32).wrapping_add(loaded_28) as usize,
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_arc_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(3u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_3(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 3u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<[M::F; 4]>(
+                    Global::Tile,
+                    4 * (values
+                        .wrapping_add(lane.wrapping_mul(3u32))
+                        .wrapping_add(loaded_19) as usize),
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_29) as usize));
+            machine.store::<[M::F; 4]>(
+                Global::Rotations,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize),
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
+    }
+}
+
 pub(crate) async fn main_of_runs_2<M: Machine>(machine: &M) {
     let invocation = machine.ids().global_invocation_id;
     let groups = machine.ids().num_workgroups;
@@ -2546,7 +3167,7 @@ pub(crate) async fn main_of_runs_2<M: Machine>(machine: &M) {
         return;
     }
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
-    let item = item_at(machine, loaded_2.wrapping_add(index));
+    let item = item_at_item(machine, loaded_2.wrapping_add(index));
     let stride = machine.load::<u32>(Global::Dispatch, 2);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
     output = item.output.wrapping_add(loaded_3);
@@ -2641,7 +3262,7 @@ pub(crate) async fn main_of_coalesced_2<M: Machine>(machine: &M) {
         if cell.is_inside & !((cell.row == loaded_3) & result) {
             let _block = machine.block(line!(), 7);
             let result_2 = item_of(machine, cell);
-            let result_3 = item_at(machine, result_2);
+            let result_3 = item_at_item(machine, result_2);
             item = result_3;
             let loaded_5 = item;
             let result_4 = segment_of_polynomial_segment(machine, loaded_5);
@@ -2688,6 +3309,501 @@ pub(crate) async fn main_of_coalesced_2<M: Machine>(machine: &M) {
         finish_2(machine, lane, cell.output, loaded_16, is_stored).await;
         let loaded_17 = iteration;
         iteration = loaded_17.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut j: u32 = Default::default();
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut pair_end: u32 = Default::default();
+    let _block = machine.block(line!(), 42);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = workgroup
+        .wrapping_mul(SPREAD_WORKGROUP)
+        .wrapping_add(invocation)
+        >> loaded_2;
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
+    let count = sample_count(machine, item);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = item.output.wrapping_add(loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_6;
+    j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    if item.count != count {
+        let _block = machine.block(line!(), 2);
+        let loaded_7 = j;
+        store_with_care(machine, item, first, count, loaded_7, lanes);
+        return;
+    }
+    let segment = segment_at_polynomial_segment(machine, item.source);
+    let constant = constant_of_polynomial_segment(machine, segment);
+    let loaded_8 = j;
+    if loaded_8 < count {
+        let _block = machine.block(line!(), 12);
+        let loaded_9 = j;
+        let result = evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_9);
+        rotation = result;
+        let loaded_10 = j;
+        if (loaded_10 == 0u32) & (item.key != NO_KEY) {
+            let _block = machine.block(line!(), 2);
+            let result_2 = constant_at(machine, item.key);
+            rotation = result_2;
+        }
+        let loaded_11 = j;
+        let loaded_12 = rotation;
+        store(machine, first.wrapping_add(loaded_11), loaded_12);
+    }
+    let loaded_13 = j;
+    j = loaded_13.wrapping_add(lanes);
+    let end = count.wrapping_add(idle);
+    pair_end = 3u32.wrapping_mul(lanes);
+    let loaded_14 = pair_end;
+    if loaded_14 <= end {
+        loop {
+            let _block = machine.block(line!(), 23);
+            let loaded_15 = j;
+            let rotation_2 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_15);
+            let loaded_16 = j;
+            let next = evaluate_near_polynomial_segment(
+                machine,
+                item,
+                segment,
+                constant,
+                loaded_16.wrapping_add(lanes),
+            );
+            let loaded_17 = j;
+            store(machine, first.wrapping_add(loaded_17), rotation_2);
+            let loaded_18 = j;
+            store(
+                machine,
+                first.wrapping_add(loaded_18).wrapping_add(lanes),
+                next,
+            );
+            let loaded_19 = j;
+            j = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_20 = pair_end;
+            pair_end = loaded_20.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_21 = pair_end;
+            if loaded_21 > end {
+                break;
+            }
+        }
+    }
+    let loaded_22 = j;
+    if loaded_22 < count {
+        loop {
+            let _block = machine.block(line!(), 11);
+            let loaded_23 = j;
+            let loaded_24 = j;
+            let result_3 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_24);
+            store(machine, first.wrapping_add(loaded_23), result_3);
+            let loaded_25 = j;
+            j = loaded_25.wrapping_add(lanes);
+            let loaded_26 = j;
+            if loaded_26 >= count {
+                break;
+            }
+        }
+        return;
+    } else {
+        return;
+    }
+}
+
+pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [M::F; 3] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_polynomial_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(3u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_1(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 3u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(3u32))
+                        .wrapping_add(loaded_19) as usize,
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize,
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [M::F; 9] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_polynomial_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(9u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_2(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 9u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(9u32))
+                        .wrapping_add(loaded_19) as usize,
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(9u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(9u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(9u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_mul(9u32).wrapping_add(loaded_28) as usize,
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
+    }
+}
+
+pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut begin: u32 = 0u32;
+    let mut end: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let _block = machine.block(line!(), 36);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << loaded;
+    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
+    if first_index >= loaded_3 {
+        return;
+    }
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
+    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
+    let index = first_index.wrapping_add(invocation >> loaded_5);
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
+    if index < loaded_6 {
+        let _block = machine.block(line!(), 4);
+        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
+        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+        item = result_2;
+    }
+    let loaded_8 = item.source;
+    let loaded_9 = item.count;
+    let segment = segment_at_polynomial_segment(
+        machine,
+        if loaded_9 & IS_CONSTANT != 0u32 {
+            0u32
+        } else {
+            loaded_8
+        },
+    );
+    let loaded_10 = item;
+    let count = sample_count(machine, loaded_10);
+    let loaded_11 = item.output;
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = loaded_11.wrapping_add(loaded_12);
+    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_13;
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    end = lanes.wrapping_sub(idle);
+    loop {
+        let _block = machine.block(line!(), 35);
+        let loaded_14 = iteration;
+        if !(loaded_14 < iterations) {
+            break;
+        }
+        let loaded_15 = iteration;
+        let values = (loaded_15 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_add(invocation)
+            .wrapping_sub(lane)
+            .wrapping_mul(3u32);
+        let loaded_16 = end;
+        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        if j < count {
+            let _block = machine.block(line!(), 5);
+            let loaded_17 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let result_4 = parts_3(machine, result_3);
+            all = result_4;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_18 = part;
+                if !(loaded_18 < 3u32) {
+                    break;
+                }
+                let loaded_19 = part;
+                let loaded_20 = part;
+                let loaded_21 = all[loaded_20 as usize];
+                machine.store::<[M::F; 4]>(
+                    Global::Tile,
+                    4 * (values
+                        .wrapping_add(lane.wrapping_mul(3u32))
+                        .wrapping_add(loaded_19) as usize),
+                    loaded_21,
+                );
+                let loaded_22 = part;
+                part = loaded_22.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_23 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
+        let loaded_24 = end;
+        let loaded_25 = end;
+        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
+        let loaded_26 = begin;
+        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_27 = part_2;
+            if !(loaded_27 < parts_end) {
+                break;
+            }
+            let loaded_28 = part_2;
+            let loaded_29 = part_2;
+            let loaded_30 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_29) as usize));
+            machine.store::<[M::F; 4]>(
+                Global::Rotations,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize),
+                loaded_30,
+            );
+            let loaded_31 = part_2;
+            part_2 = loaded_31.wrapping_add(lanes);
+        }
+        let loaded_32 = end;
+        begin = loaded_32;
+        let loaded_33 = end;
+        end = loaded_33.wrapping_add(lanes);
+        let loaded_34 = iteration;
+        iteration = loaded_34.wrapping_add(1u32);
     }
 }
 
@@ -3266,6 +4382,35 @@ pub(crate) fn matrix_rows<M: Machine>(
     loaded
 }
 
+pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+    const OF_KERNELS: [u8; 193] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => near_distance_of_near_frame(machine, first, j),
+        _ => near_distance_of_near_time(machine, first, j),
+    }
+}
+
+/// A whole number of frames below 2^24, which is exact in f32.
+pub(crate) fn near_distance_of_near_frame<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+    let _block = machine.block(line!(), 3);
+    M::F::of(first.wrapping_add(j as i32) as f32)
+}
+
+/// How far a sample lies from its segment's middle, when samples are explicit times: all are listed.
+pub(crate) fn near_distance_of_near_time<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+    let _block = machine.block(line!(), 1);
+    let result = distance_from_middle(machine, first, j);
+    result
+}
+
 pub(crate) fn norm_squared<M: Machine>(machine: &M, q: [M::F; 4]) -> M::F {
     let _block = machine.block(line!(), 7);
     ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]
@@ -3291,13 +4436,14 @@ pub(crate) fn over<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F)
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
-        0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
-        0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
+        2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0,
+        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -3327,13 +4473,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
-        0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -3394,13 +4541,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -3549,13 +4697,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
+        4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -3777,13 +4926,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -4108,13 +5258,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -4149,13 +5300,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -4187,6 +5339,72 @@ pub(crate) fn sample_at_listed_sample_of_readers_2<M: Machine>(
         source: pair[0],
         parameter: M::F::of_bits(pair[1]),
     }
+}
+
+pub(crate) fn sample_count<M: Machine>(machine: &M, item: SpreadRun<M::F>) -> u32 {
+    let _block = machine.block(line!(), 1);
+    item.count & 0x3fffffffu32
+}
+
+/// What any run has at its `j`th sample.
+pub(crate) fn sample_of_arc_segment<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    segment: ArcSegment<M::F>,
+    j: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 14);
+    if (item.count & IS_CONSTANT != 0u32) | ((j == 0u32) & (item.key != NO_KEY)) {
+        let _block = machine.block(line!(), 4);
+        let result = constant_at(
+            machine,
+            if item.count & IS_CONSTANT != 0u32 {
+                item.source
+            } else {
+                item.key
+            },
+        );
+        return result;
+    }
+    let distance = distance_from_middle(machine, item.first, j);
+    let rotation = evaluate_arc_segment(machine, segment, distance * item.scale + item.offset);
+    if item.count & NEEDS_CARE != 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result_2 = canonical(machine, rotation);
+        return result_2;
+    }
+    rotation
+}
+
+/// What any run has at its `j`th sample.
+pub(crate) fn sample_of_polynomial_segment<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    segment: PolynomialSegment<M::F>,
+    j: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 14);
+    if (item.count & IS_CONSTANT != 0u32) | ((j == 0u32) & (item.key != NO_KEY)) {
+        let _block = machine.block(line!(), 4);
+        let result = constant_at(
+            machine,
+            if item.count & IS_CONSTANT != 0u32 {
+                item.source
+            } else {
+                item.key
+            },
+        );
+        return result;
+    }
+    let distance = distance_from_middle(machine, item.first, j);
+    let rotation =
+        evaluate_polynomial_segment(machine, segment, distance * item.scale + item.offset);
+    if item.count & NEEDS_CARE != 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result_2 = canonical(machine, rotation);
+        return result_2;
+    }
+    rotation
 }
 
 /// A channel where its time base stands.
@@ -4271,13 +5489,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -4313,13 +5532,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -4863,13 +6083,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
-        3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0, 0, 0,
-        3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5,
-        6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
-        4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
+        1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
+        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1,
+        2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -4997,6 +6218,153 @@ pub(crate) fn store_of_f32_2<M: Machine>(machine: &M, index: u32, rotation: [M::
     let _block = machine.block(line!(), 2);
     let result = wide(machine, rotation);
     machine.store::<[u64; 2]>(Global::Rotations, 4 * (index as usize), result);
+}
+
+pub(crate) fn store_with_care<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    first: u32,
+    count: u32,
+    first_j: u32,
+    lanes: u32,
+) {
+    const OF_KERNELS: [u8; 193] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => store_with_care_of_alone(machine, item, first, count, first_j, lanes),
+        _ => store_with_care_of_alone_2(machine, item, first, count, first_j, lanes),
+    }
+}
+
+/// A constant, or a run whose samples are not all simple, which is rare.
+pub(crate) fn store_with_care_of_alone<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    first: u32,
+    count: u32,
+    first_j: u32,
+    lanes: u32,
+) {
+    let mut j: u32 = Default::default();
+    let _block = machine.block(line!(), 11);
+    j = first_j;
+    if item.count & IS_CONSTANT != 0u32 {
+        let _block = machine.block(line!(), 7);
+        let constant = constant_at(machine, item.source);
+        let loaded = j;
+        if loaded < count {
+            let _block = machine.block(line!(), 3);
+            let loaded_2 = j;
+            store(machine, first.wrapping_add(loaded_2), constant);
+        }
+        let loaded_3 = j;
+        j = loaded_3.wrapping_add(lanes);
+        loop {
+            let _block = machine.block(line!(), 9);
+            let loaded_4 = j;
+            if !(loaded_4 < count) {
+                break;
+            }
+            let loaded_5 = j;
+            store(machine, first.wrapping_add(loaded_5), constant);
+            let loaded_6 = j;
+            j = loaded_6.wrapping_add(lanes);
+        }
+        return;
+    }
+    let segment = segment_at_arc_segment(machine, item.source);
+    let loaded_7 = j;
+    if loaded_7 < count {
+        let _block = machine.block(line!(), 5);
+        let loaded_8 = j;
+        let loaded_9 = j;
+        let result = sample_of_arc_segment(machine, item, segment, loaded_9);
+        store(machine, first.wrapping_add(loaded_8), result);
+    }
+    let loaded_10 = j;
+    j = loaded_10.wrapping_add(lanes);
+    loop {
+        let _block = machine.block(line!(), 11);
+        let loaded_11 = j;
+        if !(loaded_11 < count) {
+            break;
+        }
+        let loaded_12 = j;
+        let loaded_13 = j;
+        let result_2 = sample_of_arc_segment(machine, item, segment, loaded_13);
+        store(machine, first.wrapping_add(loaded_12), result_2);
+        let loaded_14 = j;
+        j = loaded_14.wrapping_add(lanes);
+    }
+}
+
+/// A constant, or a run whose samples are not all simple, which is rare.
+pub(crate) fn store_with_care_of_alone_2<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    first: u32,
+    count: u32,
+    first_j: u32,
+    lanes: u32,
+) {
+    let mut j: u32 = Default::default();
+    let _block = machine.block(line!(), 11);
+    j = first_j;
+    if item.count & IS_CONSTANT != 0u32 {
+        let _block = machine.block(line!(), 7);
+        let constant = constant_at(machine, item.source);
+        let loaded = j;
+        if loaded < count {
+            let _block = machine.block(line!(), 3);
+            let loaded_2 = j;
+            store(machine, first.wrapping_add(loaded_2), constant);
+        }
+        let loaded_3 = j;
+        j = loaded_3.wrapping_add(lanes);
+        loop {
+            let _block = machine.block(line!(), 9);
+            let loaded_4 = j;
+            if !(loaded_4 < count) {
+                break;
+            }
+            let loaded_5 = j;
+            store(machine, first.wrapping_add(loaded_5), constant);
+            let loaded_6 = j;
+            j = loaded_6.wrapping_add(lanes);
+        }
+        return;
+    }
+    let segment = segment_at_polynomial_segment(machine, item.source);
+    let loaded_7 = j;
+    if loaded_7 < count {
+        let _block = machine.block(line!(), 5);
+        let loaded_8 = j;
+        let loaded_9 = j;
+        let result = sample_of_polynomial_segment(machine, item, segment, loaded_9);
+        store(machine, first.wrapping_add(loaded_8), result);
+    }
+    let loaded_10 = j;
+    j = loaded_10.wrapping_add(lanes);
+    loop {
+        let _block = machine.block(line!(), 11);
+        let loaded_11 = j;
+        if !(loaded_11 < count) {
+            break;
+        }
+        let loaded_12 = j;
+        let loaded_13 = j;
+        let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_13);
+        store(machine, first.wrapping_add(loaded_12), result_2);
+        let loaded_14 = j;
+        j = loaded_14.wrapping_add(lanes);
+    }
 }
 
 /// The tick of the clip at which a layer stands, from 0 to `period`.
@@ -5242,13 +6610,14 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 161] = [
+    const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

@@ -93,7 +93,9 @@ pub(crate) const MAX_WALKED: u32 = 128;
 pub(crate) const MAX_WHOLE_JOINTS: u32 = 128;
 pub(crate) const MAX_WHOLE_POSITIONS: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
+pub(crate) const NEEDS_CARE: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
+pub(crate) const NO_KEY: u32 = 4294967295;
 pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PI: f32 = 3.1415927;
 pub(crate) const PI_LOW: f32 = -8.742278e-8;
@@ -142,6 +144,7 @@ pub(crate) const SINE_9: f32 = 2.5989254e-6;
 pub(crate) const SMALL_SQUARED_EXTENT: f32 = 0.001;
 pub(crate) const SNORM_SHIFT: f32 = 12582912.0;
 pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
+pub(crate) const SPREAD_WORKGROUP: u32 = 128;
 pub(crate) const START_BIAS: u32 = 131072;
 pub(crate) const START_NEGATED: u32 = 1073741824;
 pub(crate) const SYMMETRIC: u32 = 64;
@@ -452,30 +455,27 @@ pub(crate) struct Grid {
     pub(crate) samples: u32,
 /// How many rows.
     pub(crate) rows: u32,
-/// Frame by frame, where the first position of the first row is stored; track by track the first
-/// position, a multiple of `BLOCK_SAMPLES`.
+/// Where the first position of the first row is stored.
     pub(crate) first_output: u32,
 /// The block of the first positions of the first row.
     pub(crate) first_block: u32,
-/// Track by track, how far behind its position a sample is stored.
-    pub(crate) shift: u32,
 }
 const _: () = {
-    assert!(size_of::<Grid>() == 28);
+    assert!(size_of::<Grid>() == 24);
     assert!(std::mem::offset_of!(Grid, detail) == 0);
     assert!(std::mem::offset_of!(Grid, stride) == 4);
     assert!(std::mem::offset_of!(Grid, samples) == 8);
     assert!(std::mem::offset_of!(Grid, rows) == 12);
     assert!(std::mem::offset_of!(Grid, first_output) == 16);
     assert!(std::mem::offset_of!(Grid, first_block) == 20);
-    assert!(std::mem::offset_of!(Grid, shift) == 24);
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Item {
 /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
     pub(crate) source: u32,
-/// Where the first sample is stored, counted from where the dispatch's first is. In the blocks of a grid, the first sample's position.
+/// Where the first sample is stored, counted from where the dispatch's first is; in a grid, the
+/// first sample's position.
     pub(crate) output: u32,
 /// Number of samples, with the bit `IS_CONSTANT` if they are a constant. Where an invocation
 /// evaluates an item they are at most `ITEM_SAMPLES`; in a grid there are as many as there are,
@@ -634,6 +634,65 @@ const _: () = {
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
+pub(crate) struct Spread {
+/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    pub(crate) detail: u32,
+/// The first run of this dispatch.
+    pub(crate) first_item: u32,
+/// How many runs it evaluates.
+    pub(crate) item_count: u32,
+/// What is added to their `output`.
+    pub(crate) first_output: u32,
+/// The invocations of a run, as a power of two.
+    pub(crate) lanes_log2: u32,
+/// The invocations that store one line of memory, less one.
+    pub(crate) line_mask: u32,
+}
+const _: () = {
+    assert!(size_of::<Spread>() == 24);
+    assert!(std::mem::offset_of!(Spread, detail) == 0);
+    assert!(std::mem::offset_of!(Spread, first_item) == 4);
+    assert!(std::mem::offset_of!(Spread, item_count) == 8);
+    assert!(std::mem::offset_of!(Spread, first_output) == 12);
+    assert!(std::mem::offset_of!(Spread, lanes_log2) == 16);
+    assert!(std::mem::offset_of!(Spread, line_mask) == 20);
+};
+/// Consecutive samples of one track that lie in one segment, or hold one constant. Its invocations take
+/// neighbouring samples in turn.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct SpreadRun {
+/// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
+    pub(crate) source: u32,
+/// Where the first sample is stored, counted from where the dispatch's first is.
+    pub(crate) output: u32,
+/// Number of samples, with the bit `IS_CONSTANT` if they are a constant, and the bit `NEEDS_CARE` if a
+/// component may pass near 0 or a distance is not exact in f32.
+    pub(crate) count: u32,
+/// For frames, the first sample's distance from the segment's middle; for explicit times, the
+/// index of its distance in the list of distances.
+    pub(crate) first: i32,
+/// parameter = distance * scale + offset
+    pub(crate) scale: f32,
+/// The constant that is stored instead of the first sample; `NO_KEY` if there is none.
+    pub(crate) offset: f32,
+/// The most iterations that a run of the same workgroup takes.
+    pub(crate) key: u32,
+    pub(crate) iterations: u32,
+}
+const _: () = {
+    assert!(size_of::<SpreadRun>() == 32);
+    assert!(std::mem::offset_of!(SpreadRun, source) == 0);
+    assert!(std::mem::offset_of!(SpreadRun, output) == 4);
+    assert!(std::mem::offset_of!(SpreadRun, count) == 8);
+    assert!(std::mem::offset_of!(SpreadRun, first) == 12);
+    assert!(std::mem::offset_of!(SpreadRun, scale) == 16);
+    assert!(std::mem::offset_of!(SpreadRun, offset) == 20);
+    assert!(std::mem::offset_of!(SpreadRun, key) == 24);
+    assert!(std::mem::offset_of!(SpreadRun, iterations) == 28);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct TangentWeights {
 /// The weight of the step before the key, and of the step after it.
     pub(crate) before: f32,
@@ -695,6 +754,22 @@ pub(crate) enum Kernel {
     ArcTimesCoalescedMatrix3x4,
     ArcTimesCoalescedSnorm16,
     ArcTimesCoalescedVector,
+    ArcFramesSpreadAxisAngle,
+    ArcFramesSpreadEuler,
+    ArcFramesSpreadF16,
+    ArcFramesSpreadF32,
+    ArcFramesSpreadMatrix3x3,
+    ArcFramesSpreadMatrix3x4,
+    ArcFramesSpreadSnorm16,
+    ArcFramesSpreadVector,
+    ArcTimesSpreadAxisAngle,
+    ArcTimesSpreadEuler,
+    ArcTimesSpreadF16,
+    ArcTimesSpreadF32,
+    ArcTimesSpreadMatrix3x3,
+    ArcTimesSpreadMatrix3x4,
+    ArcTimesSpreadSnorm16,
+    ArcTimesSpreadVector,
     PolynomialFramesAxisAngle,
     PolynomialFramesEuler,
     PolynomialFramesF16,
@@ -735,6 +810,22 @@ pub(crate) enum Kernel {
     PolynomialTimesCoalescedMatrix3x4,
     PolynomialTimesCoalescedSnorm16,
     PolynomialTimesCoalescedVector,
+    PolynomialFramesSpreadAxisAngle,
+    PolynomialFramesSpreadEuler,
+    PolynomialFramesSpreadF16,
+    PolynomialFramesSpreadF32,
+    PolynomialFramesSpreadMatrix3x3,
+    PolynomialFramesSpreadMatrix3x4,
+    PolynomialFramesSpreadSnorm16,
+    PolynomialFramesSpreadVector,
+    PolynomialTimesSpreadAxisAngle,
+    PolynomialTimesSpreadEuler,
+    PolynomialTimesSpreadF16,
+    PolynomialTimesSpreadF32,
+    PolynomialTimesSpreadMatrix3x3,
+    PolynomialTimesSpreadMatrix3x4,
+    PolynomialTimesSpreadSnorm16,
+    PolynomialTimesSpreadVector,
     FromKeysArcs,
     FromKeysTwoKeys,
     FromKeysCubics,
@@ -769,6 +860,8 @@ pub(crate) enum List {
     Samples,
     FramesCoalesced,
     TimesCoalesced,
+    FramesSpread,
+    TimesSpread,
 }
 /// What a kernel stores a rotation as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -826,6 +919,22 @@ impl Kernel {
             (Form::Arc, List::TimesCoalesced, Store::Matrix3x4) => Self::ArcTimesCoalescedMatrix3x4,
             (Form::Arc, List::TimesCoalesced, Store::Snorm16) => Self::ArcTimesCoalescedSnorm16,
             (Form::Arc, List::TimesCoalesced, Store::Vector) => Self::ArcTimesCoalescedVector,
+            (Form::Arc, List::FramesSpread, Store::AxisAngle) => Self::ArcFramesSpreadAxisAngle,
+            (Form::Arc, List::FramesSpread, Store::Euler) => Self::ArcFramesSpreadEuler,
+            (Form::Arc, List::FramesSpread, Store::F16) => Self::ArcFramesSpreadF16,
+            (Form::Arc, List::FramesSpread, Store::F32) => Self::ArcFramesSpreadF32,
+            (Form::Arc, List::FramesSpread, Store::Matrix3x3) => Self::ArcFramesSpreadMatrix3x3,
+            (Form::Arc, List::FramesSpread, Store::Matrix3x4) => Self::ArcFramesSpreadMatrix3x4,
+            (Form::Arc, List::FramesSpread, Store::Snorm16) => Self::ArcFramesSpreadSnorm16,
+            (Form::Arc, List::FramesSpread, Store::Vector) => Self::ArcFramesSpreadVector,
+            (Form::Arc, List::TimesSpread, Store::AxisAngle) => Self::ArcTimesSpreadAxisAngle,
+            (Form::Arc, List::TimesSpread, Store::Euler) => Self::ArcTimesSpreadEuler,
+            (Form::Arc, List::TimesSpread, Store::F16) => Self::ArcTimesSpreadF16,
+            (Form::Arc, List::TimesSpread, Store::F32) => Self::ArcTimesSpreadF32,
+            (Form::Arc, List::TimesSpread, Store::Matrix3x3) => Self::ArcTimesSpreadMatrix3x3,
+            (Form::Arc, List::TimesSpread, Store::Matrix3x4) => Self::ArcTimesSpreadMatrix3x4,
+            (Form::Arc, List::TimesSpread, Store::Snorm16) => Self::ArcTimesSpreadSnorm16,
+            (Form::Arc, List::TimesSpread, Store::Vector) => Self::ArcTimesSpreadVector,
             (Form::Polynomial, List::Frames, Store::AxisAngle) => Self::PolynomialFramesAxisAngle,
             (Form::Polynomial, List::Frames, Store::Euler) => Self::PolynomialFramesEuler,
             (Form::Polynomial, List::Frames, Store::F16) => Self::PolynomialFramesF16,
@@ -866,51 +975,83 @@ impl Kernel {
             (Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4) => Self::PolynomialTimesCoalescedMatrix3x4,
             (Form::Polynomial, List::TimesCoalesced, Store::Snorm16) => Self::PolynomialTimesCoalescedSnorm16,
             (Form::Polynomial, List::TimesCoalesced, Store::Vector) => Self::PolynomialTimesCoalescedVector,
+            (Form::Polynomial, List::FramesSpread, Store::AxisAngle) => Self::PolynomialFramesSpreadAxisAngle,
+            (Form::Polynomial, List::FramesSpread, Store::Euler) => Self::PolynomialFramesSpreadEuler,
+            (Form::Polynomial, List::FramesSpread, Store::F16) => Self::PolynomialFramesSpreadF16,
+            (Form::Polynomial, List::FramesSpread, Store::F32) => Self::PolynomialFramesSpreadF32,
+            (Form::Polynomial, List::FramesSpread, Store::Matrix3x3) => Self::PolynomialFramesSpreadMatrix3x3,
+            (Form::Polynomial, List::FramesSpread, Store::Matrix3x4) => Self::PolynomialFramesSpreadMatrix3x4,
+            (Form::Polynomial, List::FramesSpread, Store::Snorm16) => Self::PolynomialFramesSpreadSnorm16,
+            (Form::Polynomial, List::FramesSpread, Store::Vector) => Self::PolynomialFramesSpreadVector,
+            (Form::Polynomial, List::TimesSpread, Store::AxisAngle) => Self::PolynomialTimesSpreadAxisAngle,
+            (Form::Polynomial, List::TimesSpread, Store::Euler) => Self::PolynomialTimesSpreadEuler,
+            (Form::Polynomial, List::TimesSpread, Store::F16) => Self::PolynomialTimesSpreadF16,
+            (Form::Polynomial, List::TimesSpread, Store::F32) => Self::PolynomialTimesSpreadF32,
+            (Form::Polynomial, List::TimesSpread, Store::Matrix3x3) => Self::PolynomialTimesSpreadMatrix3x3,
+            (Form::Polynomial, List::TimesSpread, Store::Matrix3x4) => Self::PolynomialTimesSpreadMatrix3x4,
+            (Form::Polynomial, List::TimesSpread, Store::Snorm16) => Self::PolynomialTimesSpreadSnorm16,
+            (Form::Polynomial, List::TimesSpread, Store::Vector) => Self::PolynomialTimesSpreadVector,
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 106] = [
+pub(crate) static KERNELS: [KernelCode; 138] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: &[Read, Write], segments: None },
-    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3536), texels: Some(("arc_frames_euler_texels", 3654)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2114), texels: Some(("arc_frames_f16_texels", 2232)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1858), texels: Some(("arc_frames_f32_texels", 2089)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2565), texels: Some(("arc_frames_matrix3x3_texels", 2683)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcFramesMatrix3x4, storage: ("arc_frames_matrix3x4", 2599), texels: Some(("arc_frames_matrix3x4_texels", 2721)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcFramesSnorm16, storage: ("arc_frames_snorm16", 1995), texels: Some(("arc_frames_snorm16_texels", 2113)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcFramesVector, storage: ("arc_frames_vector", 2034), texels: Some(("arc_frames_vector_texels", 2152)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 2940), texels: Some(("arc_times_axis_angle_texels", 3097)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3597), texels: Some(("arc_times_euler_texels", 3750)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcTimesF16, storage: ("arc_times_f16", 2179), texels: Some(("arc_times_f16_texels", 2328)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcTimesF32, storage: ("arc_times_f32", 1923), texels: Some(("arc_times_f32_texels", 2185)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcTimesMatrix3x3, storage: ("arc_times_matrix3x3", 2626), texels: Some(("arc_times_matrix3x3_texels", 2779)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcTimesMatrix3x4, storage: ("arc_times_matrix3x4", 2664), texels: Some(("arc_times_matrix3x4_texels", 2817)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcTimesSnorm16, storage: ("arc_times_snorm16", 2060), texels: Some(("arc_times_snorm16_texels", 2209)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcTimesVector, storage: ("arc_times_vector", 2095), texels: Some(("arc_times_vector_texels", 2248)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcSamplesAxisAngle, storage: ("arc_samples_axis_angle", 2554), texels: Some(("arc_samples_axis_angle_texels", 2605)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcSamplesEuler, storage: ("arc_samples_euler", 3223), texels: Some(("arc_samples_euler_texels", 3266)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcSamplesF16, storage: ("arc_samples_f16", 1797), texels: Some(("arc_samples_f16_texels", 1840)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcSamplesF32, storage: ("arc_samples_f32", 1537), texels: Some(("arc_samples_f32_texels", 1693)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcSamplesMatrix3x3, storage: ("arc_samples_matrix3x3", 2252), texels: Some(("arc_samples_matrix3x3_texels", 2295)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcSamplesMatrix3x4, storage: ("arc_samples_matrix3x4", 2286), texels: Some(("arc_samples_matrix3x4_texels", 2333)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcSamplesSnorm16, storage: ("arc_samples_snorm16", 1678), texels: Some(("arc_samples_snorm16_texels", 1721)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcSamplesVector, storage: ("arc_samples_vector", 1717), texels: Some(("arc_samples_vector_texels", 1764)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3860), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4761), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedF16, storage: ("arc_frames_coalesced_f16", 3103), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedF32, storage: ("arc_frames_coalesced_f32", 2843), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x3, storage: ("arc_frames_coalesced_matrix3x3", 3790), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x4, storage: ("arc_frames_coalesced_matrix3x4", 3824), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedSnorm16, storage: ("arc_frames_coalesced_snorm16", 2984), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedVector, storage: ("arc_frames_coalesced_vector", 3254), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3925), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4822), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedF16, storage: ("arc_times_coalesced_f16", 3168), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedF32, storage: ("arc_times_coalesced_f32", 2908), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x3, storage: ("arc_times_coalesced_matrix3x3", 3851), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x4, storage: ("arc_times_coalesced_matrix3x4", 3889), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedSnorm16, storage: ("arc_times_coalesced_snorm16", 3049), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedVector, storage: ("arc_times_coalesced_vector", 3315), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2937), texels: Some(("arc_frames_axis_angle_texels", 3063)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3598), texels: Some(("arc_frames_euler_texels", 3716)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2176), texels: Some(("arc_frames_f16_texels", 2294)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1920), texels: Some(("arc_frames_f32_texels", 2151)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2627), texels: Some(("arc_frames_matrix3x3_texels", 2745)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcFramesMatrix3x4, storage: ("arc_frames_matrix3x4", 2661), texels: Some(("arc_frames_matrix3x4_texels", 2783)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcFramesSnorm16, storage: ("arc_frames_snorm16", 2057), texels: Some(("arc_frames_snorm16_texels", 2175)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcFramesVector, storage: ("arc_frames_vector", 2096), texels: Some(("arc_frames_vector_texels", 2214)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 3002), texels: Some(("arc_times_axis_angle_texels", 3159)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3659), texels: Some(("arc_times_euler_texels", 3812)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcTimesF16, storage: ("arc_times_f16", 2241), texels: Some(("arc_times_f16_texels", 2390)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcTimesF32, storage: ("arc_times_f32", 1985), texels: Some(("arc_times_f32_texels", 2247)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcTimesMatrix3x3, storage: ("arc_times_matrix3x3", 2688), texels: Some(("arc_times_matrix3x3_texels", 2841)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcTimesMatrix3x4, storage: ("arc_times_matrix3x4", 2726), texels: Some(("arc_times_matrix3x4_texels", 2879)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcTimesSnorm16, storage: ("arc_times_snorm16", 2122), texels: Some(("arc_times_snorm16_texels", 2271)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcTimesVector, storage: ("arc_times_vector", 2157), texels: Some(("arc_times_vector_texels", 2310)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcSamplesAxisAngle, storage: ("arc_samples_axis_angle", 2616), texels: Some(("arc_samples_axis_angle_texels", 2667)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcSamplesEuler, storage: ("arc_samples_euler", 3285), texels: Some(("arc_samples_euler_texels", 3328)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcSamplesF16, storage: ("arc_samples_f16", 1859), texels: Some(("arc_samples_f16_texels", 1902)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcSamplesF32, storage: ("arc_samples_f32", 1599), texels: Some(("arc_samples_f32_texels", 1755)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcSamplesMatrix3x3, storage: ("arc_samples_matrix3x3", 2314), texels: Some(("arc_samples_matrix3x3_texels", 2357)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcSamplesMatrix3x4, storage: ("arc_samples_matrix3x4", 2348), texels: Some(("arc_samples_matrix3x4_texels", 2395)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcSamplesSnorm16, storage: ("arc_samples_snorm16", 1740), texels: Some(("arc_samples_snorm16_texels", 1783)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcSamplesVector, storage: ("arc_samples_vector", 1779), texels: Some(("arc_samples_vector_texels", 1826)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3722), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4624), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedF16, storage: ("arc_frames_coalesced_f16", 2965), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedF32, storage: ("arc_frames_coalesced_f32", 2705), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x3, storage: ("arc_frames_coalesced_matrix3x3", 3653), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x4, storage: ("arc_frames_coalesced_matrix3x4", 3687), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedSnorm16, storage: ("arc_frames_coalesced_snorm16", 2846), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedVector, storage: ("arc_frames_coalesced_vector", 3117), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3787), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4685), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedF16, storage: ("arc_times_coalesced_f16", 3030), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedF32, storage: ("arc_times_coalesced_f32", 2770), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x3, storage: ("arc_times_coalesced_matrix3x3", 3714), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x4, storage: ("arc_times_coalesced_matrix3x4", 3752), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedSnorm16, storage: ("arc_times_coalesced_snorm16", 2911), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedVector, storage: ("arc_times_coalesced_vector", 3178), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadAxisAngle, storage: ("arc_frames_spread_axis_angle", 3984), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadEuler, storage: ("arc_frames_spread_euler", 4349), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadF16, storage: ("arc_frames_spread_f16", 3223), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadF32, storage: ("arc_frames_spread_f32", 2967), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x3, storage: ("arc_frames_spread_matrix3x3", 3378), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x4, storage: ("arc_frames_spread_matrix3x4", 3416), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadSnorm16, storage: ("arc_frames_spread_snorm16", 3104), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcFramesSpreadVector, storage: ("arc_frames_spread_vector", 2847), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadAxisAngle, storage: ("arc_times_spread_axis_angle", 4062), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadEuler, storage: ("arc_times_spread_euler", 4413), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadF16, storage: ("arc_times_spread_f16", 3301), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadF32, storage: ("arc_times_spread_f32", 3045), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x3, storage: ("arc_times_spread_matrix3x3", 3442), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x4, storage: ("arc_times_spread_matrix3x4", 3484), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadSnorm16, storage: ("arc_times_spread_snorm16", 3182), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcTimesSpreadVector, storage: ("arc_times_spread_vector", 2911), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Vector)) },
     KernelCode { kernel: Kernel::PolynomialFramesAxisAngle, storage: ("polynomial_frames_axis_angle", 2557), texels: Some(("polynomial_frames_axis_angle_texels", 2846)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::PolynomialFramesEuler, storage: ("polynomial_frames_euler", 3218), texels: Some(("polynomial_frames_euler_texels", 3499)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Euler)) },
     KernelCode { kernel: Kernel::PolynomialFramesF16, storage: ("polynomial_frames_f16", 1792), texels: Some(("polynomial_frames_f16_texels", 2073)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::F16)) },
@@ -935,24 +1076,40 @@ pub(crate) static KERNELS: [KernelCode; 106] = [
     KernelCode { kernel: Kernel::PolynomialSamplesMatrix3x4, storage: ("polynomial_samples_matrix3x4", 1972), texels: Some(("polynomial_samples_matrix3x4_texels", 2178)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Matrix3x4)) },
     KernelCode { kernel: Kernel::PolynomialSamplesSnorm16, storage: ("polynomial_samples_snorm16", 1356), texels: Some(("polynomial_samples_snorm16_texels", 1562)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Snorm16)) },
     KernelCode { kernel: Kernel::PolynomialSamplesVector, storage: ("polynomial_samples_vector", 1395), texels: Some(("polynomial_samples_vector_texels", 1601)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3542), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4443), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF16, storage: ("polynomial_frames_coalesced_f16", 2781), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF32, storage: ("polynomial_frames_coalesced_f32", 2521), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x3, storage: ("polynomial_frames_coalesced_matrix3x3", 3472), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x4, storage: ("polynomial_frames_coalesced_matrix3x4", 3510), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedSnorm16, storage: ("polynomial_frames_coalesced_snorm16", 2662), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedVector, storage: ("polynomial_frames_coalesced_vector", 2932), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3607), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4504), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF16, storage: ("polynomial_times_coalesced_f16", 2846), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF32, storage: ("polynomial_times_coalesced_f32", 2586), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x3, storage: ("polynomial_times_coalesced_matrix3x3", 3533), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x4, storage: ("polynomial_times_coalesced_matrix3x4", 3575), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedSnorm16, storage: ("polynomial_times_coalesced_snorm16", 2727), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedVector, storage: ("polynomial_times_coalesced_vector", 2993), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::FromKeysArcs, storage: ("from_keys_arcs", 2361), texels: Some(("from_keys_arcs_texels", 2514)), bindings: &[Read, Read, Write], segments: None },
-    KernelCode { kernel: Kernel::FromKeysTwoKeys, storage: ("from_keys_two_keys", 3121), texels: Some(("from_keys_two_keys_texels", 3274)), bindings: &[Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3342), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4244), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF16, storage: ("polynomial_frames_coalesced_f16", 2581), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF32, storage: ("polynomial_frames_coalesced_f32", 2321), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x3, storage: ("polynomial_frames_coalesced_matrix3x3", 3273), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x4, storage: ("polynomial_frames_coalesced_matrix3x4", 3311), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedSnorm16, storage: ("polynomial_frames_coalesced_snorm16", 2462), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedVector, storage: ("polynomial_frames_coalesced_vector", 2733), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3407), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4305), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF16, storage: ("polynomial_times_coalesced_f16", 2646), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF32, storage: ("polynomial_times_coalesced_f32", 2386), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x3, storage: ("polynomial_times_coalesced_matrix3x3", 3334), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x4, storage: ("polynomial_times_coalesced_matrix3x4", 3376), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedSnorm16, storage: ("polynomial_times_coalesced_snorm16", 2527), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedVector, storage: ("polynomial_times_coalesced_vector", 2794), texels: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadAxisAngle, storage: ("polynomial_frames_spread_axis_angle", 3855), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadEuler, storage: ("polynomial_frames_spread_euler", 4220), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadF16, storage: ("polynomial_frames_spread_f16", 3090), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadF32, storage: ("polynomial_frames_spread_f32", 2834), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x3, storage: ("polynomial_frames_spread_matrix3x3", 3245), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x4, storage: ("polynomial_frames_spread_matrix3x4", 3291), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadSnorm16, storage: ("polynomial_frames_spread_snorm16", 2971), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadVector, storage: ("polynomial_frames_spread_vector", 2714), texels: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadAxisAngle, storage: ("polynomial_times_spread_axis_angle", 3933), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadEuler, storage: ("polynomial_times_spread_euler", 4284), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadF16, storage: ("polynomial_times_spread_f16", 3168), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadF32, storage: ("polynomial_times_spread_f32", 2912), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x3, storage: ("polynomial_times_spread_matrix3x3", 3309), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x4, storage: ("polynomial_times_spread_matrix3x4", 3359), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadSnorm16, storage: ("polynomial_times_spread_snorm16", 3049), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadVector, storage: ("polynomial_times_spread_vector", 2778), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Vector)) },
+    KernelCode { kernel: Kernel::FromKeysArcs, storage: ("from_keys_arcs", 2423), texels: Some(("from_keys_arcs_texels", 2576)), bindings: &[Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::FromKeysTwoKeys, storage: ("from_keys_two_keys", 3183), texels: Some(("from_keys_two_keys_texels", 3336)), bindings: &[Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::FromKeysCubics, storage: ("from_keys_cubics", 5760), texels: Some(("from_keys_cubics_texels", 5904)), bindings: &[Read, Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::PosesAdd, storage: ("poses_add", 3201), texels: None, bindings: &[Read, Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::PosesBlend, storage: ("poses_blend", 3326), texels: None, bindings: &[Read, Read, Write], segments: None },
@@ -960,10 +1117,10 @@ pub(crate) static KERNELS: [KernelCode; 106] = [
     KernelCode { kernel: Kernel::PosesSmooth, storage: ("poses_smooth", 3625), texels: None, bindings: &[Read, Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::PosesSteps, storage: ("poses_steps", 3346), texels: None, bindings: &[Read, Write], segments: None },
     KernelCode { kernel: Kernel::PosesWorld, storage: ("poses_world", 3378), texels: None, bindings: &[Read, Read, ReadWrite], segments: None },
-    KernelCode { kernel: Kernel::CrowdRotations, storage: ("crowd_rotations", 5707), texels: Some(("crowd_rotations_texels", 5793)), bindings: &[Read, Read, Read, Read, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2354), texels: Some(("crowd_plain_rotations_texels", 2446)), bindings: &[Read, Read, Read, Read, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6327), texels: Some(("crowd_locals_texels", 6413)), bindings: &[Read, Read, Read, Read, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 2978), texels: Some(("crowd_plain_locals_texels", 3070)), bindings: &[Read, Read, Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdRotations, storage: ("crowd_rotations", 5769), texels: Some(("crowd_rotations_texels", 5855)), bindings: &[Read, Read, Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2416), texels: Some(("crowd_plain_rotations_texels", 2508)), bindings: &[Read, Read, Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6389), texels: Some(("crowd_locals_texels", 6475)), bindings: &[Read, Read, Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 3040), texels: Some(("crowd_plain_locals_texels", 3132)), bindings: &[Read, Read, Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::CrowdGather, storage: ("crowd_gather", 565), texels: None, bindings: &[Read, Read, Write], segments: None },
     KernelCode { kernel: Kernel::CrowdScatter, storage: ("crowd_scatter", 463), texels: None, bindings: &[Read, Write], segments: None },
     KernelCode { kernel: Kernel::CrowdTimes, storage: ("crowd_times", 2589), texels: None, bindings: &[Read, Read, Read, Read, Write], segments: None },
@@ -971,9 +1128,9 @@ pub(crate) static KERNELS: [KernelCode; 106] = [
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1260), texels: None, bindings: &[Read, ReadWrite], segments: None },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, bindings: &[Read, ReadWrite], segments: None },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, bindings: &[Read, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8619), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5299), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10335), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
-    KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7023), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
-    KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1808), texels: None, bindings: &[Read, Read, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8681), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5361), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10397), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
+    KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7085), texels: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None },
+    KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, bindings: &[Read, Read, Write], segments: None },
 ];

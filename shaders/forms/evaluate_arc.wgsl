@@ -15,7 +15,16 @@ alias Segment = ArcSegment;
 
 // `parameter` runs from -1/2 to 1/2 over the segment.
 fn evaluate(segment: Segment, parameter: f32) -> vec4f {
-    let z = parameter * parameter * norm_squared(segment.tangent);
+    return evaluate_with(segment, constant_of(segment), parameter);
+}
+
+// A number that is the same for all samples of a segment.
+fn constant_of(segment: Segment) -> f32 {
+    return norm_squared(segment.tangent);
+}
+
+fn evaluate_with(segment: Segment, square: f32, parameter: f32) -> vec4f {
+    let z = parameter * parameter * square;
     let sines = sine_cosm1_quarter(parameter, z);
     return segment.middle + (segment.middle * sines.y + segment.tangent * sines.x);
 }

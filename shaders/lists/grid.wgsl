@@ -1,9 +1,8 @@
-// The arguments of one dispatch whose neighbouring invocations take neighbouring samples, and which
-// those are.
+// The arguments of one dispatch whose neighbouring invocations take neighbouring tracks, and which
+// samples those are.
 
-/// The arguments of one dispatch over a grid of samples. Track by track (`stride` is 1), the
-/// samples of all tracks are one row, and a sample's position is where it is stored, less
-/// `shift`. Frame by frame each track is a row, and a position is a sample's number.
+/// The arguments of one dispatch over a grid of samples, frame by frame: each track is a row, and a
+/// position is a sample's number.
 struct Grid {
     /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
     detail: u32,
@@ -13,13 +12,10 @@ struct Grid {
     samples: u32,
     /// How many rows.
     rows: u32,
-    /// Frame by frame, where the first position of the first row is stored; track by track the first
-    /// position, a multiple of `BLOCK_SAMPLES`.
+    /// Where the first position of the first row is stored.
     first_output: u32,
     /// The block of the first positions of the first row.
     first_block: u32,
-    /// Track by track, how far behind its position a sample is stored.
-    shift: u32,
 }
 
 /// Which items the samples of 32 neighbouring positions belong to.
@@ -47,16 +43,15 @@ const BLOCK_SAMPLES: u32 = 32;
 // Neighbours that store one line of 128 bytes, where a rotation has 16.
 const LINE: u32 = 8;
 
-
 var<immediate> dispatch: Grid;
 
 // Where the samples of an invocation begin.
 struct Corner {
-    // The position, counted from the first of the row.
+    // The position.
     first: u32,
-    // Frame by frame, the distance from the beginning of the first row's line.
+    // The distance from the beginning of the first row's line.
     column: u32,
-    // The block of the first; frame by frame that of all, in the row in which `column` would be 0.
+    // The block of all of them, in the row in which `column` would be 0.
     block: u32,
 }
 
@@ -73,10 +68,6 @@ fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
     let tile = group.y * groups.x + group.x;
     let line = lane / LINE;
     let within = lane & (LINE - 1u);
-    if dispatch.stride == 1u {
-        let first = (tile * WORKGROUP + line * LINE) * SAMPLES_EACH + within;
-        return Corner(first, 0u, dispatch.first_block + first / BLOCK_SAMPLES);
-    }
     let first = (group.z * (WORKGROUP / LINE) + line) * SAMPLES_EACH;
     let block = dispatch.first_block + (first / BLOCK_SAMPLES) * dispatch.rows;
     return Corner(first, tile * LINE + within, block);
@@ -84,15 +75,8 @@ fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
 
 // The sample that an invocation takes in its `iteration`. Eight neighbours always store at eight
 // neighbouring cells, the first of which is a multiple of eight. An invocation's own samples are
-// near each other: track by track 8 apart, frame by frame one.
+// those of consecutive frames.
 fn cell_of(corner: Corner, iteration: u32) -> Cell {
-    if dispatch.stride == 1u {
-        let index = corner.first + iteration * LINE;
-        let position = dispatch.first_output + index;
-        let output = position + dispatch.shift;
-        let block = corner.block + iteration * LINE / BLOCK_SAMPLES;
-        return Cell(output, 0u, position, block, index < dispatch.samples);
-    }
     let sample = corner.first + iteration;
     let row = sample * dispatch.stride + dispatch.first_output;
     let output = (row & ~(LINE - 1u)) + corner.column;

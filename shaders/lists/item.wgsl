@@ -4,7 +4,8 @@
 struct Item {
     /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
     source: u32,
-    /// Where the first sample is stored, counted from where the dispatch's first is. In the blocks of a grid, the first sample's position.
+    /// Where the first sample is stored, counted from where the dispatch's first is; in a grid, the
+    /// first sample's position.
     output: u32,
     /// Number of samples, with the bit `IS_CONSTANT` if they are a constant. Where an invocation
     /// evaluates an item they are at most `ITEM_SAMPLES`; in a grid there are as many as there are,

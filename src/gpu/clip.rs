@@ -9,7 +9,7 @@ use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::job::{ClipBuffers, Job, KeptLists, ListCache};
 use crate::gpu::opened::Opened;
-use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::gpu::recorded::{Binding, CommandScopes, Commands, Recorded};
 use crate::machine::MachineClip;
 use crate::machine::error::{EvaluateError, VulkanError};
 use crate::output::encoded::EncodedOutput;
@@ -241,6 +241,25 @@ impl ClipTarget {
         commands: vk::CommandBuffer,
         offset: u64,
     ) -> Result<(), VulkanError> {
+        // SAFETY: promised by the caller.
+        unsafe { self.record_between(commands, offset, CommandScopes::default()) }
+    }
+
+    /// As [`ClipTarget::record`], with barriers for some users of the result's memory alone: the evaluation waits for
+    /// those before it, and those after it see the result.
+    ///
+    /// # Errors
+    /// As for [`ClipTarget::record`].
+    ///
+    /// # Safety
+    /// As for [`ClipTarget::record`]; and the application has its own barriers for other commands that use the result's
+    /// memory. Each recording of the target itself uses it by kernels and copies.
+    pub unsafe fn record_between(
+        &self,
+        commands: vk::CommandBuffer,
+        offset: u64,
+        scopes: CommandScopes,
+    ) -> Result<(), VulkanError> {
         let each = self.encoding.bytes() as u64;
         let fits = offset
             .checked_add(self.bytes)
@@ -258,7 +277,7 @@ impl ClipTarget {
         let first = (self.buffer.offset + offset - self.bound) / each;
         let mut work = lock(&self.work);
         self.fill(&mut work, first as u32);
-        work.record(commands, &[]);
+        work.record(commands.between(scopes), &[]);
         Ok(())
     }
 }

@@ -144,8 +144,8 @@ impl WorkLists {
             blocks,
         } = &self.uploads;
         match list {
-            List::Samples | List::Frames => vec![items],
-            List::Times => vec![items, distances],
+            List::Samples | List::Frames | List::FramesSpread => vec![items],
+            List::Times | List::TimesSpread => vec![items, distances],
             List::FramesCoalesced => vec![items, blocks],
             List::TimesCoalesced => vec![items, blocks, distances],
         }

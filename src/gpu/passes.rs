@@ -10,7 +10,7 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::recorded::{Binding, Commands, Recorded};
+use crate::gpu::recorded::{Binding, CommandScopes, Commands, Recorded};
 use crate::gpu::run_once::run_once;
 use crate::gpu::submission::Submission;
 use crate::machine::error::{EvaluateError, VulkanError};
@@ -305,7 +305,18 @@ impl PassTarget {
     /// one target must run on one queue.
     pub unsafe fn record(&self, commands: vk::CommandBuffer) {
         // SAFETY: promised by the caller.
-        self.record_into(unsafe { Commands::new(&self.engine.device, commands) });
+        unsafe { self.record_between(commands, CommandScopes::default()) };
+    }
+
+    /// As [`PassTarget::record`], with barriers for some users alone of the poses and of the result's memory. Earlier
+    /// recordings of the target are waited for in any case.
+    ///
+    /// # Safety
+    /// As for [`PassTarget::record`]; and the application has its own barriers for other commands that use this memory.
+    pub unsafe fn record_between(&self, commands: vk::CommandBuffer, scopes: CommandScopes) {
+        // SAFETY: promised by the caller.
+        let commands = unsafe { Commands::new(&self.engine.device, commands) };
+        self.record_into(commands.between(scopes.with_earlier_recordings()));
     }
 
     fn record_into(&self, commands: Commands<'_>) {

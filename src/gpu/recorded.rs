@@ -161,11 +161,74 @@ fn found(memory: &[Binding], slice: &Slice) -> Binding {
     }
 }
 
+/// Users of a device's memory among an application's commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CommandUsers {
+    /// All commands.
+    #[default]
+    Any,
+    /// Compute shaders.
+    Kernels,
+    /// Copies, fills and updates of buffers.
+    Copies,
+    /// Compute shaders, copies, fills and updates.
+    KernelsAndCopies,
+    /// The host.
+    Host,
+}
+
+/// Between which of an application's commands a target is recorded. What it records waits for those before it and
+/// their writes, and those after it see its results. Fewer users are waited for in less time: all commands, the default,
+/// wait for drawing, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CommandScopes {
+    /// The users before it of its inputs and of the memory of its result.
+    pub before: CommandUsers,
+    /// The users after it of its result.
+    pub after: CommandUsers,
+}
+
+impl CommandScopes {
+    /// For work over memory of its own, which an earlier recording of the same target may still use.
+    pub(crate) fn with_earlier_recordings(self) -> Self {
+        let before = match self.before {
+            CommandUsers::Kernels | CommandUsers::Copies | CommandUsers::KernelsAndCopies => {
+                CommandUsers::KernelsAndCopies
+            }
+            CommandUsers::Any | CommandUsers::Host => CommandUsers::Any,
+        };
+        Self { before, ..self }
+    }
+
+    /// The users on both sides of a barrier. Any users before it or after it are those of the application.
+    fn of_barrier(self, [from, to]: [Users; 2]) -> [Users; 2] {
+        let either = |users, named: CommandUsers| match users {
+            Users::Any => named.into(),
+            others => others,
+        };
+        [either(from, self.before), either(to, self.after)]
+    }
+}
+
+impl From<CommandUsers> for Users {
+    fn from(users: CommandUsers) -> Self {
+        match users {
+            CommandUsers::Any => Self::Any,
+            CommandUsers::Kernels => Self::Kernel,
+            CommandUsers::Copies => Self::Copy,
+            CommandUsers::KernelsAndCopies => Self::KernelAndCopy,
+            CommandUsers::Host => Self::Host,
+        }
+    }
+}
+
 /// A command buffer in the recording state: a submission's, or an application's.
 #[derive(Clone, Copy)]
 pub(crate) struct Commands<'a> {
     device: &'a LogicalDevice,
     raw: vk::CommandBuffer,
+    /// What barriers to and from any other commands order.
+    scopes: CommandScopes,
 }
 
 impl<'a> Commands<'a> {
@@ -174,7 +237,17 @@ impl<'a> Commands<'a> {
     /// queue must support the recorded commands. The commands may use only objects of this device, which must live
     /// until the work has ended.
     pub(crate) unsafe fn new(device: &'a LogicalDevice, raw: vk::CommandBuffer) -> Self {
-        Self { device, raw }
+        let scopes = CommandScopes::default();
+        Self {
+            device,
+            raw,
+            scopes,
+        }
+    }
+
+    /// Commands between those of an application.
+    pub(crate) fn between(self, scopes: CommandScopes) -> Self {
+        Self { scopes, ..self }
     }
 
     /// Binds a pipeline and the buffers of a set.
@@ -247,6 +320,7 @@ impl<'a> Commands<'a> {
 
     /// Records a barrier: earlier writes by `from` are visible to `to` afterwards.
     fn barrier(self, from: Users, to: Users) {
+        let [from, to] = self.scopes.of_barrier([from, to]);
         let ((source, written), (destination, used)) = (scope(from, true), scope(to, false));
         let memory = [vk::MemoryBarrier::default()
             .src_access_mask(written)
@@ -375,5 +449,47 @@ impl Drop for DescriptorPool {
             // type); null is allowed.
             unsafe { self.device.raw.destroy_descriptor_pool(self.raw, None) };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Memory that a pass or a crowd has of its own was used by its own kernels and copies.
+    #[test]
+    fn earlier_recordings_of_a_target_are_waited_for() {
+        use CommandUsers::{Any, Copies, Host, Kernels, KernelsAndCopies};
+        for (before, waited_for) in [
+            (Any, Any),
+            (Kernels, KernelsAndCopies),
+            (Copies, KernelsAndCopies),
+            (KernelsAndCopies, KernelsAndCopies),
+            (Host, Any),
+        ] {
+            let scopes = CommandScopes {
+                before,
+                after: Kernels,
+            };
+            let found = scopes.with_earlier_recordings();
+            assert_eq!((found.before, found.after), (waited_for, Kernels));
+        }
+    }
+
+    #[test]
+    fn barriers_to_other_commands_are_for_the_users_that_the_application_names() {
+        let scopes = CommandScopes {
+            before: CommandUsers::Copies,
+            after: CommandUsers::Host,
+        };
+        let of = |from, to| scopes.of_barrier([from, to]);
+        let (any, kernel) = (Users::Any, Users::Kernel);
+        assert_eq!(
+            of(any, Users::KernelAndCopy),
+            [Users::Copy, Users::KernelAndCopy]
+        );
+        assert_eq!(of(kernel, any), [kernel, Users::Host]);
+        assert_eq!(of(kernel, Users::Copy), [kernel, Users::Copy]);
+        assert_eq!(CommandScopes::default().of_barrier([any, any]), [any, any]);
     }
 }

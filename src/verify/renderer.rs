@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::gpu::clip::ClipTarget;
 use crate::gpu::crowd::CrowdTarget;
 use crate::gpu::passes::PassTarget;
+use crate::gpu::recorded::{CommandScopes, CommandUsers};
 use crate::machine::options::{EngineOptions, ReadBack, Transfer};
 use crate::method::{self, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
@@ -173,8 +174,13 @@ pub(crate) fn record(
 
 /// Records a pass.
 fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
-    // SAFETY: as in `record_clip`.
-    unsafe { target.record(commands) }
+    // Clips were evaluated into its inputs.
+    let scopes = CommandScopes {
+        before: CommandUsers::KernelsAndCopies,
+        after: CommandUsers::Any,
+    };
+    // SAFETY: as in `record_clip`; the result's memory is used by passes and clips alone until all is read back.
+    unsafe { target.record_between(commands, scopes) }
 }
 
 /// Makes a device as a renderer does, and checks the uses of the engine on it. With `validation`, the Khronos

@@ -18,22 +18,20 @@ use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
 use crate::method::slerp::SLERP;
+use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::preparation::SetRequest;
-use crate::shader::{
-    Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, Kernel, KeySample, List, ListedSample, Store,
-    TangentWeights, WORKGROUP,
-};
-use crate::time::frames::{SampleTimes, Ticks, Timeline};
+use crate::shader::{FROM_KEYS_WORKGROUP, Form, Kernel, KeySample, List, Store, TangentWeights};
+use crate::time::error::SampleTimesError;
+use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::TrackSet;
 use crate::twin::entries::Global;
 use crate::twin::machine::{Memory, UNTOUCHED, Watch};
-use crate::work::lists::grid::{GridRows, write_blocks};
 use crate::work::lists::keys::KeyJob;
-use crate::work::lists::sample_list::SampleList;
-use crate::work::lists::{Cut, GroupWork, work, write};
+use crate::work::lists::{ListRequest, ListRoom, Lister, Stored};
+use crate::work::recording::{Recording, Step};
 use crate::{Device, Engine};
 
 use super::numbers::{Kind, Number, is_planted, is_touched};
@@ -67,8 +65,8 @@ struct Blocks {
     path: Cell<u64>,
     /// How often each line of the file was entered from each path.
     entered: RefCell<BTreeMap<(u64, u32), u64>>,
-    /// The line of each path, and its operations.
-    steps: RefCell<BTreeMap<u64, (u32, usize)>>,
+    /// The operations of each path.
+    steps: RefCell<BTreeMap<u64, u64>>,
 }
 
 /// What an invocation did.
@@ -99,7 +97,7 @@ impl Seen {
             .fold(0xcbf2_9ce4_8422_2325, |hash, n| {
                 (hash ^ n).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
             });
-        self.blocks.steps.borrow_mut().insert(path, (line, steps));
+        self.blocks.steps.borrow_mut().insert(path, steps as u64);
         self.blocks.path.set(path);
         Left(Rc::clone(&self.blocks), before)
     }
@@ -258,8 +256,6 @@ pub(super) struct Count {
     of_workgroups: Lines,
     /// Operations of waves of 32 lanes, and of their lanes.
     pub(super) steps: [u64; 2],
-    /// How many waves entered each line of the file, once for each path, and how many lanes.
-    lines: BTreeMap<u32, [u64; 2]>,
 }
 
 impl Count {
@@ -288,26 +284,11 @@ impl Count {
             let mut together = BTreeMap::new();
             for lane in wave {
                 let steps = lane.blocks.steps.borrow();
-                self.steps[1] += steps.values().map(|(_, steps)| *steps as u64).sum::<u64>();
-                for (line, _) in steps.values() {
-                    self.lines.entry(*line).or_default()[1] += 1;
-                }
+                self.steps[1] += steps.values().sum::<u64>();
                 together.extend(steps.iter().map(|(path, block)| (*path, *block)));
             }
-            for (line, steps) in together.into_values() {
-                self.steps[0] += steps as u64;
-                self.lines.entry(line).or_default()[0] += 1;
-            }
+            self.steps[0] += together.values().sum::<u64>();
         }
-    }
-
-    /// How often waves and lanes entered a function of the generated file.
-    fn entered(&self, function: &str) -> [u64; 2] {
-        let text = include_str!("../../shaders/compiled/entries.rs");
-        let start = format!("fn {function}<");
-        let before = text.lines().position(|line| line.contains(&start));
-        let mut behind = self.lines.range(before.expect("it is a function") as u32..);
-        behind.next().map_or([0; 2], |(_, count)| *count)
     }
 }
 
@@ -436,20 +417,36 @@ fn scattered(tracks: usize) -> (TrackSet, SampleTimes) {
 
 // ---------------------------------------------------------------- the dispatches
 
+/// Memory for the lists of a window.
+#[derive(Default)]
+struct Room([Vec<u32>; 3]);
+
+impl<'r> ListRoom<'r> for &'r mut Room {
+    type Error = SampleTimesError;
+
+    fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], SampleTimesError> {
+        let mut lists = self.0.each_mut();
+        for (list, bytes) in lists.iter_mut().zip(bytes) {
+            list.resize(bytes.unwrap_or_default() / size_of::<u32>(), 0);
+        }
+        Ok(lists.map(|list| bytemuck::cast_slice_mut(list)))
+    }
+}
+
 /// A clip's dispatch, as a device gets it: on cards, or with an item for each invocation.
 fn of_clip(
     set: &TrackSet,
     frames: &SampleTimes,
     method: Method,
     layout: Layout,
-    cut: Cut,
+    maps_samples: bool,
 ) -> Launch {
     let request = PrepareRequest {
         group_bytes: Some(1 << 30),
         ..PrepareRequest::all(set)
     };
-    let clip = ClipData::new(set, method.into(), request).unwrap();
-    let timeline = frames.resolve(clip.track_count(), clip.time_span).unwrap();
+    let clip = &ClipData::new(set, method.into(), request).unwrap();
+    let timeline = &frames.resolve(clip.track_count(), clip.time_span).unwrap();
     let window = Window::whole(clip.track_count(), timeline.len(), layout);
     let [group] = &clip.groups[..] else {
         panic!("one group");
@@ -458,70 +455,42 @@ fn of_clip(
         "slerp" => Form::Arc,
         _ => Form::Polynomial,
     };
+    let request = ListRequest {
+        maps_samples,
+        clip,
+        timeline,
+    };
+    let mut room = Room::default();
+    let work = (Lister::default().list(request, &window, &mut room)).unwrap();
+    let kernel = Kernel::over_segments(form, work.list, Store::F32);
+    let mut recording = Recording::default();
+    let bound = kernel.compiled().bindings.iter();
+    let bound = Vec::from_iter(bound.map(|_| recording.resource().into()));
+    recording.set(kernel, bound);
+    let stored = Stored {
+        encoding: Encoding::F32,
+        stride: window.stride() as u32,
+        first: 0,
+        begins_lines: maps_samples,
+    };
+    let mut sets = recording.all_sets();
+    work.record(&mut recording, &mut sets, stored);
+    let [Step::Dispatch { push, groups, .. }] = recording.steps() else {
+        panic!("one dispatch");
+    };
     let mut inputs = vec![group.segments.as_bytes().to_vec(), bytes(&group.constants)];
-    let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
-    if let Some(list) = SampleList::new(&clip, &timeline, &window) {
-        let mut samples = vec![
-            ListedSample {
-                source: 0,
-                parameter: 0.0
-            };
-            window.len()
-        ];
-        list.write(&mut samples).unwrap();
-        inputs.push(bytes(&samples));
-        return Launch {
-            kernel: Kernel::over_segments(form, List::Samples, Store::F32),
-            groups: [(samples.len() as u32).div_ceil(WORKGROUP), 1, 1],
-            inputs,
-            arguments: bytes(&[dispatch_of(samples.len(), 1)]),
-        };
-    }
-    let lists = work(&clip, &timeline, &window, cut, &mut Vec::new()).unwrap();
-    let count: usize = lists.iter().map(GroupWork::item_count).sum();
-    let chunks = lists.iter().flat_map(|list| &list.chunks);
-    let distances: usize = chunks.map(|chunk| chunk.distances.len()).sum();
-    let mut items: Vec<Item> = vec![bytemuck::Zeroable::zeroed(); count + 1];
-    let mut distances = vec![0.0; distances];
-    let rows = GridRows::new(&window).filter(|_| cut == Cut::Whole);
-    write(&lists, rows, &mut items[..count], &mut distances);
-    inputs.push(bytes(&items));
-    let times = is_timed.then(|| bytes(&distances));
-    let Some(rows) = rows else {
-        inputs.extend(times);
-        let list = if is_timed { List::Times } else { List::Frames };
-        return Launch {
-            kernel: Kernel::over_segments(form, list, Store::F32),
-            groups: [(count as u32).div_ceil(WORKGROUP), 1, 1],
-            inputs,
-            arguments: bytes(&[dispatch_of(count, window.stride())]),
-        };
-    };
-    let grids = rows.of_groups(&lists).expect("items in order");
-    let mut blocks: Vec<Block> = vec![bytemuck::Zeroable::zeroed(); grids[0].blocks() as usize];
-    write_blocks(&lists, &grids, count as u32, &mut blocks);
-    inputs.push(bytes(&blocks));
-    inputs.extend(times);
-    let list = match is_timed {
-        true => List::TimesCoalesced,
-        false => List::FramesCoalesced,
-    };
+    let [items, distances, blocks] = room.0.map(|list| bytes(&list));
+    inputs.extend(match work.list {
+        List::Frames | List::FramesSpread | List::Samples => vec![items],
+        List::Times | List::TimesSpread => vec![items, distances],
+        List::FramesCoalesced => vec![items, blocks],
+        List::TimesCoalesced => vec![items, blocks, distances],
+    });
     Launch {
-        kernel: Kernel::over_segments(form, list, Store::F32),
-        groups: grids[0].workgroups(),
+        kernel,
+        groups: *groups,
         inputs,
-        arguments: bytes(&[grids[0].arguments]),
-    }
-}
-
-fn dispatch_of(count: usize, stride: usize) -> Dispatch {
-    Dispatch {
-        first_item: 0,
-        item_count: count as u32,
-        stride: stride as u32,
-        detail: 0,
-        first_output: 0,
-        idle: 0,
+        arguments: recording.bytes(push).to_vec(),
     }
 }
 
@@ -599,8 +568,8 @@ fn assert_is_the_cpus(
 
 // ---------------------------------------------------------------- the tests
 
-/// Stores touch at most 1.1 times as many lines as they need, and loads 1.3 times; 1.4 times frame by
-/// frame.
+/// Stores touch at most 1.1 times as many lines as they need, those of runs, which end anywhere, 1.2 times as many
+/// of 128 bytes; and loads 1.3 times, frame by frame 1.4 times.
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];
@@ -615,7 +584,7 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             ("odd", sparse(509)),
         ] {
             let mut launches = Vec::from(layouts.map(|layout| {
-                let launch = of_clip(&set, &frames, method, layout, Cut::Whole);
+                let launch = of_clip(&set, &frames, method, layout, true);
                 (format!("{name}, {method}, {layout:?}"), launch, layout)
             }));
             if ["dense", "crowd"].contains(&name) {
@@ -636,12 +605,19 @@ fn cards_touch_hardly_more_lines_than_they_need() {
 
 fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
     let count = launch.run();
+    let is_spread = (launch.kernel.compiled().segments)
+        .is_some_and(|(_, list, _)| matches!(list, List::FramesSpread | List::TimesSpread));
     let mut ratios = String::new();
     for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
         let (stored, loaded) = (stores.ratio(), loads.ratio());
         ratios += &format!(" {stored:.2} {loaded:.2} |");
         let label = format!("{name}, {wave} lanes, lines of {line}");
-        assert!(stored <= 1.1, "{label}: stores {stored}");
+        // Where a run ends within a line, the next one stores the rest of it, in another wave.
+        let limit = match (is_spread, line) {
+            (true, 128) => 1.2,
+            _ => 1.1,
+        };
+        assert!(stored <= limit, "{label}: stores {stored}");
         // Frame by frame neighbours have items of their own, some of which lie across lines.
         let limit = if name.ends_with("FrameMajor") {
             1.4
@@ -665,7 +641,7 @@ fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
 fn an_item_for_each_invocation_touches_more_lines() {
     let (set, frames) = sparse(96);
     for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-        let launch = of_clip(&set, &frames, SLERP, layout, Cut::Short);
+        let launch = of_clip(&set, &frames, SLERP, layout, false);
         assert_eq!(launch.kernel, Kernel::ArcFramesF32);
         let count = launch.run();
         for ((_, line), [stores, _]) in CARDS.into_iter().zip(count.of_cards) {
@@ -676,23 +652,42 @@ fn an_item_for_each_invocation_touches_more_lines() {
     }
     for method in [SLERP, BESSEL_OVERHAUSER] {
         let (set, frames) = scattered(24);
-        let launch = of_clip(&set, &frames, method, Layout::TrackMajor, Cut::Short);
+        let launch = of_clip(&set, &frames, method, Layout::TrackMajor, false);
         assert_is_the_cpus(&launch, (&set, &frames), method, Layout::TrackMajor);
     }
 }
 
-/// A lane looks for an item in few of its iterations, but a wave in most, for some lane of it does.
+/// Tracks whose keys lie a number of frames apart, each on a frame.
+fn even(tracks: usize, step: usize) -> (TrackSet, SampleTimes) {
+    let (mut random, mut set) = (Rng::with_seed(5), TrackSet::new());
+    let keys = 960 / step + 1;
+    let times: Vec<f64> = (0..keys).map(|key| (key * step) as f64 / 60.0).collect();
+    for _ in 0..tracks {
+        set.push("", &times, &walk(&mut random, keys, 1.0)).unwrap();
+    }
+    let last = ((keys - 1) * step) as f64;
+    (set, SampleTimes::fps(60).between(0.0, last / 60.0))
+}
+
+/// The operations of a wave for a rotation, of arcs and of cubics, for runs of some lengths: at most a fiftieth more than
+/// counted.
 #[test]
-fn a_wave_switches_segments_more_often_than_its_lanes() {
-    let (set, frames) = sparse(96);
-    let launch = of_clip(&set, &frames, SLERP, Layout::TrackMajor, Cut::Whole);
-    assert_eq!(launch.kernel, Kernel::ArcFramesCoalescedF32);
-    let count = launch.run();
-    let (iterations, switches) = (count.entered("cell_of"), count.entered("item_of"));
-    let share = |i: usize| switches[i] as f64 / iterations[i] as f64;
-    let (wave, lane) = (share(0), share(1));
-    println!("switches an iteration: a wave's {wave:.2}, a lane's {lane:.2}");
-    assert!(iterations[0] > 100 && iterations[1] == 32 * iterations[0]);
-    assert!(wave > 0.7 && lane < 0.5 * wave, "{wave}, {lane}");
-    assert!(count.steps[1] < 32 * count.steps[0]);
+fn a_wave_executes_few_operations_for_a_rotation() {
+    for (step, counted) in [
+        (8, [95.4, 109.7]),
+        (16, [68.5, 76.2]),
+        (48, [60.6, 66.6]),
+        (192, [52.3, 56.2]),
+    ] {
+        for (method, counted) in [SLERP, BESSEL_OVERHAUSER].into_iter().zip(counted) {
+            let (set, frames) = even(40, step);
+            let launch = of_clip(&set, &frames, method, Layout::TrackMajor, true);
+            let count = launch.run();
+            let each = 4.0 * 32.0 * count.steps[0] as f64 / count.words as f64;
+            let label = format!("{method}, runs of {step}: {each:.1} operations");
+            println!("{label}");
+            assert!((0.9 * counted..1.02 * counted).contains(&each), "{label}");
+            assert_is_the_cpus(&launch, (&set, &frames), method, Layout::TrackMajor);
+        }
+    }
 }

@@ -156,6 +156,7 @@ impl Trial {
             List::Frames | List::Times | List::Samples => {
                 self.pushed::<crate::shader::Dispatch>().detail
             }
+            List::FramesSpread | List::TimesSpread => self.pushed::<crate::shader::Spread>().detail,
             _ => self.pushed::<crate::shader::Grid>().detail,
         }
     }

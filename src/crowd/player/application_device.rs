@@ -10,7 +10,7 @@ use crate::crowd::player::Crowd;
 use crate::crowd_error::CrowdError;
 use crate::gpu::crowd::{CrowdTarget, DeviceCrowd, VulkanCrowd};
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::recorded::Commands;
+use crate::gpu::recorded::{CommandScopes, Commands};
 use crate::machine::crowd::MachineCrowd;
 use crate::output::crowd::CrowdOutput;
 use crate::output::pose_error::OFFSET_STEP;
@@ -83,6 +83,25 @@ impl Crowd {
         target: &CrowdTarget,
         commands: vk::CommandBuffer,
     ) -> Result<(), CrowdError> {
+        // SAFETY: promised by the caller.
+        unsafe { self.record_between(target, commands, CommandScopes::default()) }
+    }
+
+    /// As [`Crowd::record`], with barriers for some users of the result's memory alone. Earlier evaluations of the crowd
+    /// are waited for in any case.
+    ///
+    /// # Errors
+    /// As for [`Crowd::record`].
+    ///
+    /// # Safety
+    /// As for [`Crowd::record`]; and the application has its own barriers for other commands that use the result's
+    /// memory.
+    pub unsafe fn record_between(
+        &mut self,
+        target: &CrowdTarget,
+        commands: vk::CommandBuffer,
+        scopes: CommandScopes,
+    ) -> Result<(), CrowdError> {
         let device = vulkan_crowd(self.device.as_deref());
         let Some(device) = device.filter(|device| Arc::ptr_eq(device, &target.crowd)) else {
             return Err(CrowdError::OtherDevice);
@@ -99,6 +118,7 @@ impl Crowd {
             // SAFETY: promised by the caller.
             let commands = unsafe { Commands::new(&device.engine.device, commands) };
             let layers = self.layer_count();
+            let commands = commands.between(scopes.with_earlier_recordings());
             target.record(commands, &self.instances.take_frame(layers));
         }
         Ok(())

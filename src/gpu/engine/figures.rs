@@ -12,9 +12,8 @@ use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::Submission;
 use crate::machine::error::VulkanError;
-use crate::shader::{
-    BLOCK_SAMPLES, Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SAMPLES_EACH,
-};
+use crate::shader::{Dispatch, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SpreadRun};
+use crate::work::lists::spread::{NO_RUN, SpreadLanes};
 use crate::work::recording::workgroups;
 
 /// The engine's choices for a device, where options are `Automatic`.
@@ -187,24 +186,23 @@ impl VulkanEngine {
                 )
             });
         }
-        let item = Item {
-            count: samples | IS_CONSTANT,
-            ..Item::zeroed()
-        };
-        let grid = Grid {
-            stride: 1,
-            samples,
-            rows: 1,
-            ..Grid::zeroed()
-        };
-        let blocks = vec![Block::zeroed(); samples.div_ceil(BLOCK_SAMPLES) as usize];
-        let items = upload(bytemuck::bytes_of(&item))?;
-        let blocks = upload(bytemuck::cast_slice(&blocks))?;
-        let buffers = [&constants, &constants, &items, &blocks, buffer];
-        let groups = workgroups(samples.div_ceil(SAMPLES_EACH));
+        // Eight lanes store a line.
+        let lanes = SpreadLanes::new(3);
+        let each = 128;
+        let runs: Vec<SpreadRun> = (0..samples / each)
+            .map(|run| SpreadRun {
+                output: run * each,
+                count: each | IS_CONSTANT,
+                ..NO_RUN
+            })
+            .collect();
+        let dispatch = lanes.dispatch([0, runs.len() as u32], 0, 0);
+        let groups = lanes.workgroups(runs.len() as u32);
+        let runs = upload(bytemuck::cast_slice(&runs))?;
+        let buffers = [&constants, &constants, &runs, buffer];
         self.rate(bytes, |submission| {
-            let kernel = Kernel::ArcFramesCoalescedF32;
-            self.dispatch_once(submission, kernel, &buffers, &grid, groups)
+            let kernel = Kernel::ArcFramesSpreadF32;
+            self.dispatch_once(submission, kernel, &buffers, &dispatch, groups)
         })
     }
 

@@ -183,6 +183,7 @@ impl VulkanEngine {
         let has_room = self.device.reads_texels || self.device.physical.storage_buffers > 4;
         all.extend(has_room.then_some(List::Times));
         if self.maps_samples {
+            all.extend([List::FramesSpread, List::TimesSpread]);
             all.extend([List::FramesCoalesced, List::TimesCoalesced]);
         }
         all

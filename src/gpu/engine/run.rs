@@ -16,7 +16,7 @@ use crate::machine::error::{EvaluateError, VulkanError};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
-use crate::shader::Item;
+use crate::shader::SpreadRun;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
 use crate::work::lists::Stored;
@@ -218,7 +218,7 @@ impl VulkanEngine {
         const AT_ONCE: usize = 1 << 24;
         let info = &self.device.physical.info;
         let largest = (info.max_storage_buffer_range).min(info.max_memory_allocation_size);
-        let listed = largest / size_of::<Item>() as u64 / 2;
+        let listed = largest / size_of::<SpreadRun>() as u64 / 2;
         (self.maps_samples).then(|| AT_ONCE.min(usize::try_from(listed).unwrap_or(AT_ONCE)))
     }
 

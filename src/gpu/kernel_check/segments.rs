@@ -5,11 +5,13 @@ use crate::math::canonical::canonical;
 use crate::output::encoding::Encoding;
 use crate::shader::{
     ArcSegment, BLOCK_SAMPLES, Block, Dispatch, Form, Grid, IS_CONSTANT, ITEM_SAMPLES, Item,
-    Kernel, LINE, List, ListedSample, MAY_BE_TINY, PolynomialSegment, SAMPLES_EACH, Store,
-    WORKGROUP,
+    Kernel, LINE, List, ListedSample, MAY_BE_TINY, NEEDS_CARE, PolynomialSegment, SAMPLES_EACH,
+    SpreadRun, Store, WORKGROUP,
 };
 use crate::twin::Evaluate;
 use crate::twin::arc_between::arc_between;
+use crate::work::lists::WorkChunk;
+use crate::work::lists::spread::{NO_RUN, SpreadLanes};
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
@@ -79,10 +81,10 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
                 List::Frames => scene.runs(random, false, first),
                 List::Times => scene.runs(random, true, first),
                 List::Samples => scene.samples(random, first),
-                List::FramesCoalesced if first => scene.track_by_track(random, false),
-                List::TimesCoalesced if first => scene.track_by_track(random, true),
                 List::FramesCoalesced => scene.frame_by_frame(random, false),
                 List::TimesCoalesced => scene.frame_by_frame(random, true),
+                List::FramesSpread => scene.spread(random, false, first),
+                List::TimesSpread => scene.spread(random, true, first),
             }
         })
         .collect()
@@ -266,24 +268,63 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &grid, groups)
     }
 
-    /// A grid with contiguous samples, as one row.
-    fn track_by_track(mut self, random: &mut Random, is_listed: bool) -> Trial {
-        const SAMPLES: u32 = 709;
-        let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
-        const SHIFT: u32 = 3;
-        self.row(random, is_listed, ends);
-        let blocks = [vec![OTHER], self.blocks(0, ends)].concat();
-        let grid = Grid {
-            detail: self.detail(),
-            stride: 1,
-            samples: SAMPLES,
-            rows: 1,
-            first_output: BLOCK_SAMPLES,
-            first_block: 1,
-            shift: SHIFT,
+    /// Runs of contiguous samples, between some of which there are samples of no run.
+    fn spread(mut self, random: &mut Random, is_listed: bool, is_narrow: bool) -> Trial {
+        const RUNS: usize = 60;
+        const FIRST: u32 = 3;
+        let lanes = SpreadLanes::new(random.below(2) + if is_narrow { 2 } else { 4 });
+        let mut chunk = WorkChunk::default();
+        let mut output = 0;
+        for _ in 0..RUNS {
+            let max = if random.once_in(8) { 150 } else { 40 };
+            let length = 1 + random.below(max);
+            let count = length - random.below(3).min(length - 1);
+            self.item(random, is_listed, output, count);
+            chunk.runs.extend(
+                self.items
+                    .pop()
+                    .map(|item| self.run(random, is_listed, item)),
+            );
+            output += length;
+        }
+        let mut list = vec![NO_RUN; lanes.entries(&chunk)];
+        lanes.write_chunk(&chunk, 0, &mut list);
+        // Another dispatch has the first entry.
+        let entries = list.len() as u32;
+        list.insert(0, SpreadRun { count: 9, ..NO_RUN });
+        let dispatch = lanes.dispatch([1, entries], self.detail(), FIRST);
+        let [workgroups, ..] = lanes.workgroups(entries);
+        let mut listed = vec![bytes(&list)];
+        listed.extend(is_listed.then(|| bytes(&self.distances)));
+        self.finish(listed, &dispatch, [2, workgroups.div_ceil(2), 1])
+    }
+
+    /// The run of an item, which may begin with a key; in frames far from the middle, it says so.
+    fn run(&self, random: &mut Random, is_listed: bool, item: Item) -> SpreadRun {
+        let mut run = SpreadRun {
+            source: item.source,
+            output: item.output,
+            count: item.count,
+            first: item.first,
+            scale: item.scale,
+            offset: item.offset,
+            ..NO_RUN
         };
-        let tiles = SAMPLES.div_ceil(WORKGROUP * SAMPLES_EACH);
-        self.grid(&blocks, grid, [2, tiles.div_ceil(2), 1], is_listed)
+        if run.count & IS_CONSTANT != 0 {
+            return run;
+        }
+        if random.once_in(3) {
+            run.key = random.below(CONSTANTS as u32);
+        }
+        let mut needs_care = !self.segments[run.source as usize].is_canonical();
+        if !is_listed && random.once_in(6) {
+            (run.first, run.scale) = (random.word() as i32 >> 2, 0.25 / (1 << 30) as f32);
+            needs_care = true;
+        }
+        if needs_care || random.once_in(8) {
+            run.count |= NEEDS_CARE;
+        }
+        run
     }
 
     /// A grid with contiguous tracks, with a row for each track.
@@ -309,7 +350,6 @@ impl<S: Segment> SegmentInputs<S> {
             rows: ROWS,
             first_output: FIRST,
             first_block: 1,
-            shift: 0,
         };
         // A row may begin anywhere in a line.
         let tiles = (LINE - 1 + ROWS).div_ceil(LINE);

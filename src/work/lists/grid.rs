@@ -1,5 +1,5 @@
-//! The grid of a window, for devices on which neighbouring invocations evaluate neighbouring samples. Blocks of
-//! samples specify the item of each sample, so that no search is needed.
+//! The grid of a window whose samples are stored frame by frame, for devices on which neighbouring invocations evaluate
+//! neighbouring tracks. Blocks of samples specify the item of each sample, so that no search is needed.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::shader::{
 };
 use crate::work::lists::GroupWork;
 
-/// The rows of a window: one for a track-major window, otherwise one for each track.
+/// The rows of a window, one for each track.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GridRows {
     /// Distance in the result between neighbouring samples of a track.
@@ -19,11 +19,10 @@ pub(crate) struct GridRows {
 }
 
 impl GridRows {
-    /// `None` for a window for which items are better: frame by frame, with fewer tracks than a memory line has
-    /// rotations.
+    /// `None` for a window with fewer tracks than a memory line has rotations.
     pub(crate) fn new(window: &Window) -> Option<Self> {
         let stride = window.stride() as u32;
-        (stride == 1 || stride >= LINE).then_some(Self {
+        (stride >= LINE).then_some(Self {
             stride,
             samples: window.samples.len() as u32,
         })
@@ -31,10 +30,7 @@ impl GridRows {
 
     /// The row and the position in it of an offset in the output.
     pub(crate) fn cell(self, offset: u32) -> (u32, u32) {
-        match self.stride {
-            1 => (0, offset),
-            stride => (offset % stride, offset / stride),
-        }
+        (offset % self.stride, offset / self.stride)
     }
 
     /// The grids of all groups, whose blocks are consecutive. `None` as in [`GridRows::of_group`].
@@ -51,35 +47,27 @@ impl GridRows {
     /// The rows and positions of a group, whose first block has the index `first_block`. `None` if items overlap, or
     /// are not in the order of their rows and positions.
     fn of_group(self, list: &GroupWork, first_block: u32) -> Option<GroupGrid> {
-        let (mut first, mut row, mut end) = (None, 0, 0);
+        let (mut first_row, mut row, mut end) = (None, 0, 0);
         for item in items(list) {
             let (item_row, position) = self.cell(item.output);
             let is_next = item_row > row || (item_row == row && position >= end);
-            if count(item) == 0 || (first.is_some() && !is_next) {
+            if count(item) == 0 || (first_row.is_some() && !is_next) {
                 return None;
             }
-            first.get_or_insert((item_row, position));
+            first_row.get_or_insert(item_row);
             (row, end) = (item_row, position + count(item));
         }
-        let (first_row, first) = first.unwrap_or_default();
-        let (rows, samples, first_output) = match self.stride {
-            1 => {
-                let first = first - first % BLOCK_SAMPLES;
-                (1, end - first, first)
-            }
-            _ => (row - first_row + 1, self.samples, first_row),
-        };
+        let first_row = first_row.unwrap_or_default();
         Some(GroupGrid {
             all: self,
             first_row,
             arguments: Grid {
                 detail: 0,
                 stride: self.stride,
-                samples,
-                rows,
-                first_output,
+                samples: self.samples,
+                rows: row - first_row + 1,
+                first_output: first_row,
                 first_block,
-                shift: 0,
             },
         })
     }
@@ -131,16 +119,12 @@ impl GroupGrid {
             first: nothing,
             starts: 0,
         });
-        let base = match self.all.stride {
-            1 => self.arguments.first_output,
-            _ => 0,
-        };
         let end = self.arguments.samples.div_ceil(BLOCK_SAMPLES);
         // The row, the first of its blocks that is not written, and the last item that began in it.
         let (mut row, mut next, mut last) = (0, 0, nothing);
         for (index, item) in (first_item..).zip(items(list)) {
             let (item_row, position) = self.all.cell(item.output);
-            let (item_row, position) = (item_row - self.first_row, position - base);
+            let item_row = item_row - self.first_row;
             if item_row != row || index == first_item {
                 self.go_on(row, next..end, last, blocks);
                 // Positions before the row's first item belong to it and lie before it.
@@ -174,16 +158,10 @@ impl GroupGrid {
 
     /// The workgroups of its dispatch.
     pub(crate) fn workgroups(&self) -> [u32; 3] {
-        let samples = WORKGROUP * SAMPLES_EACH;
-        let (tiles, z) = match self.all.stride {
-            1 => (self.arguments.samples.div_ceil(samples), 1),
-            // Rows of neighbours begin up to a line less one before the first track.
-            _ => {
-                let tiles = (self.arguments.rows + LINE - 1).div_ceil(LINE);
-                (tiles, self.arguments.samples.div_ceil(samples / LINE))
-            }
-        };
-        [tiles.max(1), 1, z]
+        // Rows of neighbours begin up to a line less one before the first track.
+        let tiles = (self.arguments.rows + LINE - 1).div_ceil(LINE);
+        let samples = WORKGROUP * SAMPLES_EACH / LINE;
+        [tiles, 1, self.arguments.samples.div_ceil(samples)]
     }
 }
 
@@ -204,12 +182,8 @@ mod tests {
             let mut sample = random.u32(..40);
             while sample < rows.samples {
                 let count = random.u32(1..50).min(rows.samples - sample);
-                let output = match rows.stride {
-                    1 => track * rows.samples + sample,
-                    stride => sample * stride + track,
-                };
                 let mut item = Item::zeroed();
-                (item.output, item.count) = (output, count);
+                (item.output, item.count) = (sample * rows.stride + track, count);
                 let flags = [0, IS_CONSTANT, MAY_BE_TINY];
                 item.count |= flags[random.usize(..3)];
                 chunks[usize::from(track > 4)].items.push(item);
@@ -223,55 +197,46 @@ mod tests {
     /// The item that blocks name for each sample is the one that has it, if any has.
     #[test]
     fn blocks_tell_the_item_of_every_sample() {
-        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-            for (tracks, samples) in [(9, 300), (8, 1), (40, 65), (11, 32)] {
-                let window = Window::whole(tracks as usize, samples as usize, layout);
-                let rows = GridRows::new(&window).unwrap();
-                let list = listed(rows, tracks);
-                let grid = rows.of_group(&list, 0).unwrap();
-                let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
-                let nothing = list.item_count() as u32 + 3;
-                grid.write(&list, 3, nothing, &mut blocks);
-                let all: Vec<Item> = items(&list).copied().collect();
-                let mut found = 0;
-                for row in 0..grid.arguments.rows {
-                    for position in 0..grid.arguments.samples {
-                        let block = blocks[grid.block_index(row, position / BLOCK_SAMPLES)];
-                        let begun = block.starts << (!position & (BLOCK_SAMPLES - 1));
-                        let index = block.first + begun.count_ones();
-                        let offset = match rows.stride {
-                            1 => grid.arguments.first_output + position,
-                            stride => position * stride + grid.arguments.first_output + row,
-                        };
-                        let has = |item: &Item| {
-                            let (item_row, at) = rows.cell(item.output);
-                            let (row, position) = rows.cell(offset);
-                            item_row == row && (at..at + count(item)).contains(&position)
-                        };
-                        let found_item = all.get((index - 3) as usize).filter(|item| has(item));
-                        assert_eq!(
-                            found_item,
-                            all.iter().find(|item| has(item)),
-                            "{layout:?}, {offset}"
-                        );
-                        found += u32::from(found_item.is_some());
-                    }
+        for (tracks, samples) in [(9, 300), (8, 1), (40, 65), (11, 32)] {
+            let window = Window::whole(tracks as usize, samples as usize, Layout::FrameMajor);
+            let rows = GridRows::new(&window).unwrap();
+            let list = listed(rows, tracks);
+            let grid = rows.of_group(&list, 0).unwrap();
+            let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
+            let nothing = list.item_count() as u32 + 3;
+            grid.write(&list, 3, nothing, &mut blocks);
+            let all: Vec<Item> = items(&list).copied().collect();
+            let mut found = 0;
+            for row in 0..grid.arguments.rows {
+                for position in 0..grid.arguments.samples {
+                    let block = blocks[grid.block_index(row, position / BLOCK_SAMPLES)];
+                    let begun = block.starts << (!position & (BLOCK_SAMPLES - 1));
+                    let index = block.first + begun.count_ones();
+                    let track = grid.arguments.first_output + row;
+                    let has = |item: &Item| {
+                        let (item_track, at) = rows.cell(item.output);
+                        item_track == track && (at..at + count(item)).contains(&position)
+                    };
+                    let found_item = all.get((index - 3) as usize).filter(|item| has(item));
+                    let expected = all.iter().find(|item| has(item));
+                    assert_eq!(found_item, expected, "track {track}, sample {position}");
+                    found += u32::from(found_item.is_some());
                 }
-                assert_eq!(found, all.iter().map(count).sum::<u32>());
             }
+            assert_eq!(found, all.iter().map(count).sum::<u32>());
         }
     }
 
     #[test]
     fn items_in_another_order_have_no_grid() {
-        let window = Window::whole(9, 300, Layout::TrackMajor);
+        let window = Window::whole(9, 300, Layout::FrameMajor);
         let rows = GridRows::new(&window).unwrap();
         let mut list = listed(rows, 9);
         list.chunks.reverse();
         assert!(rows.of_group(&list, 0).is_none());
         list.chunks.reverse();
-        let overlap = list.chunks[0].items[0].output + count(&list.chunks[0].items[0]);
-        list.chunks[0].items[1].output = overlap - 1;
+        let first = list.chunks[0].items[0];
+        list.chunks[0].items[1].output = first.output + (count(&first) - 1) * 9;
         assert!(rows.of_group(&list, 0).is_none());
         let narrow = Window::whole(7, 300, Layout::FrameMajor);
         assert!(GridRows::new(&narrow).is_none());

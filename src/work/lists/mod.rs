@@ -3,6 +3,7 @@
 pub(crate) mod grid;
 pub(crate) mod keys;
 pub(crate) mod sample_list;
+pub(crate) mod spread;
 
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
@@ -13,7 +14,7 @@ use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::shader::{
     Block, Dispatch, END_NEGATED, Form, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, KEY_OF_INTERVAL,
-    LINE, List, ListedSample, MAY_BE_TINY, START_NEGATED,
+    LINE, List, ListedSample, MAY_BE_TINY, NEEDS_CARE, NO_KEY, START_NEGATED, SpreadRun,
 };
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -24,7 +25,8 @@ use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
 use crate::twin::{COARSE, Evaluate as _};
 use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
-use crate::work::lists::sample_list::SampleList;
+use crate::work::lists::sample_list::{KeyDensity, SampleList};
+use crate::work::lists::spread::{NO_RUN, SpreadLanes};
 use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
@@ -51,17 +53,24 @@ impl Work {
     ) {
         for (group, set) in self.dispatched().zip(sets) {
             let detail = stored.encoding.row().detail;
-            if let Some(of_group) = group.grid {
-                let mut grid = Grid {
-                    detail,
-                    ..of_group.arguments
-                };
-                match grid.stride {
-                    1 => grid.shift = stored.first,
-                    _ => grid.first_output += stored.first,
+            match group.shape {
+                WorkShape::Alone => {}
+                WorkShape::Grid(of_group) => {
+                    let arguments = of_group.arguments;
+                    let grid = Grid {
+                        detail,
+                        first_output: arguments.first_output + stored.first,
+                        ..arguments
+                    };
+                    recording.dispatch(set, &grid, of_group.workgroups());
+                    continue;
                 }
-                recording.dispatch(set, &grid, of_group.workgroups());
-                continue;
+                WorkShape::Spread(lanes) => {
+                    let entries = [group.first_item, group.items];
+                    let dispatch = lanes.dispatch(entries, detail, stored.first);
+                    recording.dispatch(set, &dispatch, lanes.workgroups(group.items));
+                    continue;
+                }
             }
             let first_output = group.first_output + stored.first;
             // Only samples lie one after another.
@@ -129,8 +138,18 @@ pub(crate) struct GroupItems {
     pub(crate) items: u32,
     /// The offset of the first sample of a sample list.
     pub(crate) first_output: u32,
-    /// The samples of the group, if neighbouring invocations evaluate neighbours.
-    pub(crate) grid: Option<GroupGrid>,
+    pub(crate) shape: WorkShape,
+}
+
+/// Which invocation evaluates which sample of a group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum WorkShape {
+    /// Each an item, or a listed sample.
+    Alone,
+    /// Neighbours evaluate neighbouring tracks.
+    Grid(GroupGrid),
+    /// Neighbours evaluate neighbouring samples of a run.
+    Spread(SpreadLanes),
 }
 
 /// An offset in the window, and the rotation there.
@@ -147,8 +166,21 @@ pub(crate) struct GroupWork {
 #[derive(Default)]
 pub(crate) struct WorkChunk {
     pub(crate) items: Vec<Item>,
+    /// Instead of items, the runs to spread.
+    pub(crate) runs: Vec<SpreadRun>,
     pub(crate) distances: Vec<f32>,
     pub(crate) patches: Vec<Patch>,
+}
+
+impl WorkChunk {
+    /// Removes the last run if it is one sample that stands before this position and is a constant: the key at the
+    /// beginning of the run that begins here, or of the track before.
+    fn take_key(&mut self, output: u32) -> Option<u32> {
+        let is_key = |run: &mut SpreadRun| {
+            run.count == 1 | IS_CONSTANT && run.output.checked_add(1) == Some(output)
+        };
+        self.runs.pop_if(is_key).map(|run| run.source)
+    }
 }
 
 impl GroupWork {
@@ -200,10 +232,11 @@ impl Lister {
             clip,
             timeline,
         } = request;
-        if let Some(list) = SampleList::new(clip, timeline, window) {
-            let bytes = window.len() * size_of::<ListedSample>();
-            let [samples, ..] = memory.room([Some(bytes), None, None])?;
-            return Ok(list.write(bytemuck::cast_slice_mut(samples))?);
+        if let Some(list) = SampleList::new(clip, timeline, window, KeyDensity::Unknown) {
+            return write_samples(&list, window, memory);
+        }
+        if maps_samples && window.stride() == 1 {
+            return self.list_spread(request, window, memory);
         }
         let mut rows = GridRows::new(window).filter(|_| maps_samples);
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
@@ -246,7 +279,7 @@ impl Lister {
                 first_item,
                 items,
                 first_output: 0,
-                grid: grids.get(i).copied(),
+                shape: (grids.get(i)).map_or(WorkShape::Alone, |grid| WorkShape::Grid(*grid)),
             };
             first_item += items;
             group
@@ -263,17 +296,79 @@ impl Lister {
         })
     }
 
+    /// Lists the runs of a window whose samples are contiguous, so that neighbouring invocations evaluate neighbouring
+    /// samples.
+    fn list_spread<'r, R: ListRoom<'r>>(
+        &mut self,
+        request: ListRequest<'_>,
+        window: &Window,
+        memory: R,
+    ) -> Result<Work, R::Error> {
+        let ListRequest { clip, timeline, .. } = request;
+        let lists = work(clip, timeline, window, Cut::Spread, &mut self.spare)?;
+        let lanes = SpreadLanes::of_lists(&lists);
+        if SpreadLanes::are_too_short(&lists)
+            && let Some(list) = SampleList::new(clip, timeline, window, KeyDensity::ShortRuns)
+        {
+            self.take_back(lists);
+            return write_samples(&list, window, memory);
+        }
+        let mut first_item = 0;
+        let groups = lists.iter().map(|list| {
+            let items = lanes.entries_of_group(list) as u32;
+            first_item += items;
+            GroupItems {
+                group: list.group,
+                first_item: first_item - items,
+                items,
+                first_output: 0,
+                shape: WorkShape::Spread(lanes),
+            }
+        });
+        let groups = groups.collect();
+        let chunks = lists.iter().flat_map(|list| &list.chunks);
+        let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
+        let sizes = [
+            Some(first_item as usize * size_of::<SpreadRun>()),
+            Some(distance_count * size_of::<f32>()),
+            None,
+        ];
+        let [runs, distances, _] = memory.room(sizes)?;
+        let distances = bytemuck::cast_slice_mut(distances);
+        lanes.write(&lists, bytemuck::cast_slice_mut(runs), distances);
+        Ok(Work {
+            list: match timeline.ticks {
+                Ticks::Frames { .. } => List::FramesSpread,
+                Ticks::Times { .. } => List::TimesSpread,
+            },
+            groups,
+            patches: self.take_back(lists),
+        })
+    }
+
     /// Keeps the memory of lists for the next ones; returns the host's patches.
     fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
         let mut patches = Vec::new();
         for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
             patches.append(&mut chunk.patches);
             chunk.items.clear();
+            chunk.runs.clear();
             chunk.distances.clear();
             self.spare.push(chunk);
         }
         patches
     }
+}
+
+/// Writes a sample list into a device's memory.
+fn write_samples<'r, R: ListRoom<'r>>(
+    list: &SampleList<'_>,
+    window: &Window,
+    memory: R,
+) -> Result<Work, R::Error> {
+    let bytes = window.len() * size_of::<ListedSample>();
+    let [samples, ..] = memory.room([Some(bytes), None, None])?;
+    Ok(list.write(bytemuck::cast_slice_mut(samples))?)
 }
 
 /// The minimum number of parts of a group that one thread converts to items; more while they have fewer samples than
@@ -301,6 +396,8 @@ pub(crate) enum Cut {
     Short,
     /// The whole run, for a grid, with the bit `MAY_BE_TINY` if the run needs it.
     Whole,
+    /// The whole run with the key at its beginning, to be spread over neighbouring invocations.
+    Spread,
 }
 
 /// The work lists of a window: one for each group that has any of its tracks. `spare` are empty chunks for reuse,
@@ -381,16 +478,20 @@ impl Emit for PartsList<'_> {
         let (prepared, timeline, window) = (self.prepared, self.timeline, self.window);
         let (track, chunk) = (self.track, &mut self.chunk);
         let samples = run.sample..run.sample + run.count;
+        let output = window.offset(track, run.sample) as u32;
         let mut whole = Item::zeroed();
-        let mut flags = 0;
-        match run.source {
+        let mut key = None;
+        let flags = match run.source {
             RunSource::Constant(constant) => {
                 whole.source = constant;
-                flags = IS_CONSTANT;
+                IS_CONSTANT
             }
             RunSource::Segment(index, distance, affine) => {
                 whole.source = index;
                 (whole.scale, whole.offset) = (affine.scale, affine.offset);
+                if self.cut == Cut::Spread {
+                    key = chunk.take_key(output);
+                }
                 whole.first = match distance {
                     Distance::Near { first } => first as i32,
                     Distance::Frames { first } => first,
@@ -398,12 +499,18 @@ impl Emit for PartsList<'_> {
                         let first_distance = chunk.distances.len() as i32;
                         let from_middle =
                             |sample| distance.at_sample(0, || timeline.time_at(track, sample));
+                        // A key's is not used.
+                        chunk.distances.extend(key.map(|_| 0.0));
                         chunk.distances.extend(samples.map(from_middle));
-                        first_distance
+                        first_distance + i32::from(key.is_some())
                     }
                 };
-                if self.cut == Cut::Whole && may_be_tiny(prepared, index) {
-                    flags = MAY_BE_TINY;
+                match (self.cut, distance) {
+                    (Cut::Short, _) => 0,
+                    (Cut::Spread, Distance::Frames { .. }) => NEEDS_CARE,
+                    (Cut::Spread, _) if may_be_tiny(prepared, index) => NEEDS_CARE,
+                    (Cut::Whole, _) if may_be_tiny(prepared, index) => MAY_BE_TINY,
+                    (Cut::Spread | Cut::Whole, _) => 0,
                 }
             }
             RunSource::Exact { index, parameter } => {
@@ -413,10 +520,24 @@ impl Emit for PartsList<'_> {
                 }));
                 return;
             }
+        };
+        if self.cut == Cut::Spread {
+            let before = u32::from(key.is_some());
+            chunk.runs.push(SpreadRun {
+                source: whole.source,
+                output: output - before,
+                count: (run.count as u32 + before) | flags,
+                first: whole.first.wrapping_sub(before as i32),
+                scale: whole.scale,
+                offset: whole.offset,
+                key: key.unwrap_or(NO_KEY),
+                ..NO_RUN
+            });
+            return;
         }
         let max_samples = match self.cut {
             Cut::Short => ITEM_SAMPLES as usize,
-            Cut::Whole => usize::MAX,
+            Cut::Whole | Cut::Spread => usize::MAX,
         };
         let mut done = 0;
         while done < run.count {

@@ -17,7 +17,16 @@ use crate::time::frame_clock::{FrameClock, TrackCopy};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Affine, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
-use crate::work::lists::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
+use crate::work::lists::{GroupItems, Patch, Work, WorkShape, parts_in, parts_per_chunk};
+
+/// Whether the runs of a window are short.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum KeyDensity {
+    /// They are where there are no more samples than spans, or few explicit times.
+    Unknown,
+    /// They were listed, and are.
+    ShortRuns,
+}
 
 /// A window whose samples are listed separately.
 pub(crate) struct SampleList<'a> {
@@ -36,11 +45,13 @@ struct GroupParts<'a> {
 }
 
 impl<'a> SampleList<'a> {
-    /// `None` for a window that is listed by runs.
+    /// `None` for a window that is listed by runs: one with longer runs than `keys` says, or whose samples are not
+    /// stored in the order of the parts that have them.
     pub(crate) fn new(
         clip: &'a ClipData,
         timeline: &'a Timeline,
         window: &'a Window,
+        keys: KeyDensity,
     ) -> Option<Self> {
         let samples = window.samples.len();
         let are_rows = window.layout == Layout::TrackMajor || samples == 1;
@@ -70,7 +81,8 @@ impl<'a> SampleList<'a> {
                 first,
             });
         }
-        let is_dense = timeline.len().saturating_mul(window.tracks.len()) <= spans;
+        let is_dense = keys == KeyDensity::ShortRuns
+            || timeline.len().saturating_mul(window.tracks.len()) <= spans;
         let are_listed = match timeline.ticks {
             Ticks::Frames { .. } => is_dense,
             // Explicit times may alternate between the parts of a track: each must have only one.
@@ -110,7 +122,7 @@ impl<'a> SampleList<'a> {
                 first_item: group.first as u32,
                 items: (end - group.first) as u32,
                 first_output: group.first as u32,
-                grid: None,
+                shape: WorkShape::Alone,
             });
             let each = parts_per_chunk(self.window);
             let mut first = group.first;

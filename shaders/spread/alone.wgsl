@@ -1,0 +1,92 @@
+// Entry point for cards: neighbours evaluate one run together, and store neighbouring samples, so that a
+// wave's stores are whole lines of memory. The run is found once, and nothing is looked for between samples.
+// Of values of one part each invocation stores its own. It is joined with a form (`Segment`, `evaluate`), with
+// the functions that read buffers (`segment_at`, `constant_at`, `item_at`), with `distance_from_middle` and
+// `near_distance`, and with a `store`.
+
+@compute @workgroup_size(SPREAD_WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    let lanes = 1u << dispatch.lanes_log2;
+    let workgroup = group.y * groups.x + group.x;
+    let index = (workgroup * SPREAD_WORKGROUP + invocation) >> dispatch.lanes_log2;
+    if index >= dispatch.item_count {
+        return;
+    }
+    let item = item_at(dispatch.first_item + index);
+    let count = sample_count(item);
+    let first = item.output + dispatch.first_output;
+    // The first iteration begins where the line of the first sample does. What lies before that sample wraps to a
+    // large number.
+    let idle = first & dispatch.line_mask;
+    var j = (invocation & (lanes - 1u)) - idle;
+    if item.count != count {
+        store_with_care(item, first, count, j, lanes);
+        return;
+    }
+    let segment = segment_at(item.source);
+    let constant = constant_of(segment);
+    if j < count {
+        var rotation = evaluate_near(item, segment, constant, j);
+        if (j == 0u) & (item.key != NO_KEY) {
+            rotation = constant_at(item.key);
+        }
+        store(first + j, rotation);
+    }
+    j += lanes;
+    // Iterations in which every lane has a sample, two at a time.
+    let end = count + idle;
+    var pair_end = 3u * lanes;
+    if pair_end <= end {
+        loop {
+            let rotation = evaluate_near(item, segment, constant, j);
+            let next = evaluate_near(item, segment, constant, j + lanes);
+            store(first + j, rotation);
+            store(first + j + lanes, next);
+            j += 2u * lanes;
+            pair_end += 2u * lanes;
+            continuing {
+                break if pair_end > end;
+            }
+        }
+    }
+    if j < count {
+        loop {
+            store(first + j, evaluate_near(item, segment, constant, j));
+            j += lanes;
+            continuing {
+                break if j >= count;
+            }
+        }
+    }
+}
+
+fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> vec4f {
+    let parameter = near_distance(item.first, j) * item.scale + item.offset;
+    return evaluate_with(segment, constant, parameter);
+}
+
+// A constant, or a run whose samples are not all simple, which is rare.
+fn store_with_care(item: SpreadRun, first: u32, count: u32, first_j: u32, lanes: u32) {
+    var j = first_j;
+    if (item.count & IS_CONSTANT) != 0u {
+        let constant = constant_at(item.source);
+        if j < count {
+            store(first + j, constant);
+        }
+        for (j += lanes; j < count; j += lanes) {
+            store(first + j, constant);
+        }
+        return;
+    }
+    let segment = segment_at(item.source);
+    if j < count {
+        store(first + j, sample_of(item, segment, j));
+    }
+    for (j += lanes; j < count; j += lanes) {
+        store(first + j, sample_of(item, segment, j));
+    }
+}

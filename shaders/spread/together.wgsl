@@ -1,0 +1,57 @@
+// Entry point for cards, as `alone.wgsl`, for values of several parts: invocations that stored each its own
+// would write a little of many lines at a time. So those of a run put theirs together in memory of the
+// workgroup, and store the parts in the order in which they lie. It is joined with a store that has `parts`.
+
+// The values of an iteration, and of the one before, which neighbours may still read: so one barrier an iteration is enough.
+var<workgroup> tile: array<Stored, 2u * SPREAD_WORKGROUP * PARTS>;
+
+@compute @workgroup_size(SPREAD_WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    let lanes = 1u << dispatch.lanes_log2;
+    let workgroup = group.y * groups.x + group.x;
+    let first_index = workgroup * (SPREAD_WORKGROUP >> dispatch.lanes_log2);
+    if first_index >= dispatch.item_count {
+        return;
+    }
+    // All invocations take as many iterations, because they wait for each other.
+    let iterations = item_at(dispatch.first_item + first_index).iterations;
+    let index = first_index + (invocation >> dispatch.lanes_log2);
+    // It has no samples.
+    var item: SpreadRun;
+    if index < dispatch.item_count {
+        item = item_at(dispatch.first_item + index);
+    }
+    // Constants have no segment; the first one exists in any case.
+    let segment = segment_at(select(item.source, 0u, (item.count & IS_CONSTANT) != 0u));
+    let count = sample_count(item);
+    let first = item.output + dispatch.first_output;
+    let idle = first & dispatch.line_mask;
+    let lane = invocation & (lanes - 1u);
+    // The samples of an iteration: the first iteration begins where the line of the first sample does.
+    var begin = 0u;
+    var end = lanes - idle;
+    for (var iteration = 0u; iteration < iterations; iteration++) {
+        // Where the lanes put their values.
+        let values = ((iteration & 1u) * SPREAD_WORKGROUP + invocation - lane) * PARTS;
+        let j = end - lanes + lane;
+        if j < count {
+            var all = parts(sample_of(item, segment, j));
+            for (var part = 0u; part < PARTS; part++) {
+                tile[values + lane * PARTS + part] = all[part];
+            }
+        }
+        workgroupBarrier();
+        // From the number of a part in the run to its place.
+        let shift = values + (lanes - end) * PARTS;
+        let parts_end = select(end, count, count < end) * PARTS;
+        for (var part = begin * PARTS + lane; part < parts_end; part += lanes) {
+            rotations[first * PARTS + part] = tile[shift + part];
+        }
+        begin = end;
+        end += lanes;
+    }
+}

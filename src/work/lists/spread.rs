@@ -1,0 +1,243 @@
+//! Spread runs: the list of a window for devices on which neighbouring invocations evaluate a run together. A power of
+//! two of invocations, the lanes of a run, take its samples in turn.
+//!
+//! A wave of 32 or 64 invocations has several runs, and goes on until the longest one ends. So long runs are cut, and
+//! runs near each other in the list are put in order of their iterations. Their order in the list is free, because each
+//! says where its samples are stored.
+
+use rayon::prelude::*;
+
+use crate::shader::{IS_CONSTANT, LINE, NEEDS_CARE, NO_KEY, SPREAD_WORKGROUP, Spread, SpreadRun};
+use crate::work::lists::{GroupWork, WorkChunk};
+
+/// The maximum number of iterations of a run.
+const MAX_ITERATIONS: u32 = 16;
+
+/// Runs that are put in order of their iterations; whole workgroups with any number of lanes.
+const ORDERED_RUNS: usize = 128;
+
+/// A run without samples, which fills a workgroup.
+pub(crate) const NO_RUN: SpreadRun = SpreadRun {
+    source: 0,
+    output: 0,
+    count: 0,
+    first: 0,
+    scale: 0.0,
+    offset: 0.0,
+    key: NO_KEY,
+    iterations: 0,
+};
+
+/// The number of samples of a run.
+pub(crate) fn sample_count(run: &SpreadRun) -> u32 {
+    run.count & !(IS_CONSTANT | NEEDS_CARE)
+}
+
+/// Whether the runs of a window have on average fewer samples than this.
+fn are_shorter(lists: &[GroupWork], than: u64) -> bool {
+    let chunks = || lists.iter().flat_map(|list| &list.chunks);
+    let runs: usize = chunks().map(|chunk| chunk.runs.len()).sum();
+    let samples = chunks().flat_map(|chunk| &chunk.runs).map(sample_count);
+    samples.map(u64::from).sum::<u64>() < than * runs as u64
+}
+
+/// The number of lanes of a run: a power of two from 4 to 32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SpreadLanes {
+    log2: u32,
+}
+
+impl SpreadLanes {
+    pub(crate) fn new(log2: u32) -> Self {
+        Self { log2 }
+    }
+
+    /// The lanes for the runs of a window. What a run takes before its first sample, and the lanes without a sample in
+    /// its first and its last iteration, weigh less the fewer lanes it has; eight store a whole line.
+    pub(crate) fn of_lists(lists: &[GroupWork]) -> Self {
+        const SHORT: u64 = 16;
+        Self::new(if are_shorter(lists, SHORT) { 2 } else { 3 })
+    }
+
+    /// Whether runs have so few samples that samples should rather be listed one by one.
+    pub(crate) fn are_too_short(lists: &[GroupWork]) -> bool {
+        const TOO_SHORT: u64 = 4;
+        are_shorter(lists, TOO_SHORT)
+    }
+
+    fn lanes(self) -> u32 {
+        1 << self.log2
+    }
+
+    /// The lanes that store a line of memory together, less one.
+    fn line_mask(self) -> u32 {
+        self.lanes().min(LINE) - 1
+    }
+
+    fn runs_of_workgroup(self) -> usize {
+        (SPREAD_WORKGROUP >> self.log2) as usize
+    }
+
+    /// The iterations of a run, wherever in a line it begins.
+    fn iterations(self, samples: u32) -> u32 {
+        (samples + self.line_mask()).div_ceil(self.lanes())
+    }
+
+    /// The pieces into which a run is cut.
+    fn pieces(self, run: &SpreadRun) -> impl Iterator<Item = SpreadRun> + use<> {
+        let (run, count, each) = (*run, sample_count(run), MAX_ITERATIONS * self.lanes());
+        (0..count)
+            .step_by(each as usize)
+            .map(move |done| SpreadRun {
+                output: run.output + done,
+                count: (count - done).min(each) | (run.count & (IS_CONSTANT | NEEDS_CARE)),
+                first: run.first.wrapping_add(done as i32),
+                key: if done == 0 { run.key } else { NO_KEY },
+                iterations: self.iterations((count - done).min(each)),
+                ..run
+            })
+    }
+
+    /// The number of entries of a chunk in the list: whole workgroups.
+    pub(crate) fn entries(self, chunk: &WorkChunk) -> usize {
+        let each = MAX_ITERATIONS * self.lanes();
+        let pieces = |run| sample_count(run).div_ceil(each) as usize;
+        let pieces: usize = chunk.runs.iter().map(pieces).sum();
+        pieces.next_multiple_of(self.runs_of_workgroup())
+    }
+
+    /// The number of entries of a group in the list.
+    pub(crate) fn entries_of_group(self, list: &GroupWork) -> usize {
+        list.chunks.iter().map(|chunk| self.entries(chunk)).sum()
+    }
+
+    /// Writes the list of a chunk, whose distances begin at an index in the list of distances. Each element is written
+    /// once, in order, and none is read again, because the memory may be slow to read.
+    pub(crate) fn write_chunk(self, chunk: &WorkChunk, distances: i32, list: &mut [SpreadRun]) {
+        let mut pieces = chunk.runs.iter().flat_map(|run| self.pieces(run));
+        let mut ordered = [NO_RUN; ORDERED_RUNS];
+        for list in list.chunks_mut(ORDERED_RUNS) {
+            let ordered = &mut ordered[..list.len()];
+            ordered.fill_with(|| pieces.next().unwrap_or(NO_RUN));
+            ordered.sort_by_key(|piece| piece.iterations);
+            for workgroup in ordered.chunks_mut(self.runs_of_workgroup()) {
+                let iterations = workgroup.last().map_or(0, |piece| piece.iterations);
+                for piece in workgroup {
+                    piece.iterations = iterations;
+                    piece.first = piece.first.wrapping_add(distances);
+                }
+            }
+            list.copy_from_slice(ordered);
+        }
+    }
+
+    /// Writes the lists of all groups, one after another, as [`SpreadLanes::write_chunk`] does.
+    pub(crate) fn write(
+        self,
+        lists: &[GroupWork],
+        mut list: &mut [SpreadRun],
+        mut distances: &mut [f32],
+    ) {
+        let mut next_distance = 0;
+        let mut destinations = Vec::new();
+        for chunk in lists.iter().flat_map(|list| &list.chunks) {
+            let (runs, other_runs) = list.split_at_mut(self.entries(chunk));
+            let (chunk_distances, others) = distances.split_at_mut(chunk.distances.len());
+            (list, distances) = (other_runs, others);
+            destinations.push((chunk, runs, chunk_distances, next_distance));
+            next_distance += chunk.distances.len() as i32;
+        }
+        destinations
+            .into_par_iter()
+            .for_each(|(chunk, runs, distances, first)| {
+                distances.copy_from_slice(&chunk.distances);
+                let first = if distances.is_empty() { 0 } else { first };
+                self.write_chunk(chunk, first, runs);
+            });
+    }
+
+    /// The push constants of a dispatch, whose values are stored from an index on.
+    pub(crate) fn dispatch(self, [first, count]: [u32; 2], detail: u32, output: u32) -> Spread {
+        Spread {
+            detail,
+            first_item: first,
+            item_count: count,
+            first_output: output,
+            lanes_log2: self.log2,
+            line_mask: self.line_mask(),
+        }
+    }
+
+    /// The workgroups of a dispatch.
+    pub(crate) fn workgroups(self, entries: u32) -> [u32; 3] {
+        [(entries << self.log2).div_ceil(SPREAD_WORKGROUP), 1, 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each sample of each run is in one entry, at its place and with its distance; the key is in the first. Entries
+    /// that are near each other take as many iterations.
+    #[test]
+    fn entries_have_the_samples_of_all_runs() {
+        let mut random = fastrand::Rng::with_seed(7);
+        for log2 in 2..=5 {
+            let lanes = SpreadLanes::new(log2);
+            let mut chunk = WorkChunk::default();
+            let mut output = 5;
+            for source in 0..300 {
+                let max = [3, 90, 2000][random.usize(..3)];
+                let count = 1 + random.u32(..max);
+                let flags = [0, IS_CONSTANT, NEEDS_CARE][random.usize(..3)];
+                let key = [NO_KEY, source + 7][random.usize(..2)];
+                chunk.runs.push(SpreadRun {
+                    source,
+                    output,
+                    count: count | flags,
+                    first: -30 - source as i32,
+                    key,
+                    ..NO_RUN
+                });
+                output += count + random.u32(..3);
+            }
+            let mut list = vec![NO_RUN; lanes.entries(&chunk)];
+            lanes.write_chunk(&chunk, 1000, &mut list);
+            assert!(list.len().is_multiple_of(lanes.runs_of_workgroup()));
+            for workgroup in list.chunks(lanes.runs_of_workgroup()) {
+                let iterations = workgroup.iter().map(|run| match sample_count(run) {
+                    0 => 0,
+                    count => lanes.iterations(count),
+                });
+                let max = iterations.max().unwrap();
+                assert!(
+                    workgroup.iter().all(|run| run.iterations == max) && max <= MAX_ITERATIONS + 1
+                );
+            }
+            list.retain(|run| sample_count(run) > 0);
+            list.sort_by_key(|run| run.output);
+            let mut entries = list.iter();
+            for run in &chunk.runs {
+                let (mut done, count) = (0, sample_count(run));
+                while done < count {
+                    let piece = entries.next().unwrap();
+                    let expected = SpreadRun {
+                        output: run.output + done,
+                        first: run.first + 1000 + done as i32,
+                        key: if done == 0 { run.key } else { NO_KEY },
+                        count: piece.count,
+                        iterations: piece.iterations,
+                        ..*run
+                    };
+                    assert_eq!(*piece, expected);
+                    let flags = run.count - count;
+                    assert_eq!(piece.count - sample_count(piece), flags);
+                    done += sample_count(piece);
+                }
+                assert_eq!(done, count);
+            }
+            assert!(entries.next().is_none());
+        }
+    }
+}
