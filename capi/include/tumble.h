@@ -1092,7 +1092,7 @@ TumbleResult tumble_set_time_span(const struct TumbleSet *set,
 TumbleResult tumble_set_free(struct TumbleSet *set);
 
 /*
- Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
+ Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, pickles, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
  `.dat`.
 
  The format is recognised by the first bytes of the file, otherwise by the extension of its name. `path` is UTF-8;

@@ -35,7 +35,7 @@ pub(crate) fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
-/// Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
+/// Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, pickles, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
 /// `.dat`.
 ///
 /// The format is recognised by the first bytes of the file, otherwise by the extension of its name. `path` is UTF-8;

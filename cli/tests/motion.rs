@@ -660,3 +660,27 @@ fn fbx_goes_into_other_formats() {
         scaled.words
     );
 }
+
+/// The values of a pickle are listed whether or not they are a motion, and of one that is, the motion too.
+#[test]
+fn info_lists_the_values_of_a_pickle() {
+    let temporary = sample_folder();
+    let at = temporary.path();
+    fixture(at, "pickle/unknown.pkl", "unknown.pkl");
+    fixture(at, "pickle/inert.pkl", "inert.pkl");
+    fixture(at, "pickle/calls.pkl", "calls.pkl");
+    let values = String::from_utf8(line(at, "info unknown.pkl").out).unwrap();
+    let expected = "unknown.pkl\n  values             3: name, shape and type\n    a  () i8  1\n    b  (2,) f8\n    \
+                    c  () U4  text\n";
+    assert_eq!(values, expected);
+    let both = String::from_utf8(line(at, "info inert.pkl").out).unwrap();
+    for part in [
+        "rotations  (1, 3, 4) f8",
+        "pose  object of body.Pose",
+        "tracks             1",
+        "W911",
+    ] {
+        assert!(both.contains(part), "{part}: {both}");
+    }
+    assert!(refused(at, "info calls.pkl").words.contains("E911"));
+}

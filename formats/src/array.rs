@@ -48,8 +48,10 @@ pub(crate) enum Element {
     Unicode(usize),
     /// Text with this number of bytes.
     Bytes(usize),
-    /// Pickled Python objects, which are never read.
+    /// Pickled Python objects.
     Object,
+    /// One object of a class that is not read.
+    Class(String),
     /// Complex numbers, dates, records and others, by their name in `NumPy`.
     Other(String),
 }
@@ -63,7 +65,7 @@ impl Element {
             Self::F64 => Some(8),
             Self::Signed(size) | Self::Unsigned(size) | Self::Bytes(size) => Some(size),
             Self::Unicode(length) => length.checked_mul(4),
-            Self::Object | Self::Other(_) => None,
+            Self::Object | Self::Class(_) | Self::Other(_) => None,
         }
     }
 
@@ -87,6 +89,7 @@ impl fmt::Display for Element {
             Self::Unicode(length) => write!(f, "U{length}"),
             Self::Bytes(length) => write!(f, "S{length}"),
             Self::Object => f.write_str("objects"),
+            Self::Class(class) => write!(f, "an object of {class}"),
             Self::Other(name) => f.write_str(name),
         }
     }
@@ -316,7 +319,7 @@ impl<'a> Scanner<'a> {
 }
 
 /// The type of a string such as `<f8`.
-fn element(descr: &str) -> Result<(Element, bool), String> {
+pub(crate) fn element(descr: &str) -> Result<(Element, bool), String> {
     let wrong = || format!("`{descr}` is not a type");
     let rest = descr.strip_prefix(['<', '>', '|', '=']).unwrap_or(descr);
     let kind = rest.chars().next().ok_or_else(wrong)?;

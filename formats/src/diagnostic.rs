@@ -220,7 +220,7 @@ codes! {
     RepeatedMember = "E303", "two members of one name", "It is not clear which of them to read.";
     MemberSize = "E304", "a member of the wrong size", "The size or the checksum of a member differs from what the archive's directory says; the file is damaged.";
     ArrayHeader = "E305", "not an NPY array", "An array begins with `\\x93NUMPY`, a version, and a header with its type, order and shape.";
-    Pickled = "E306", "pickled Python objects", "Reading a pickle can run any code, so pickles are never read. Save numbers and texts as arrays of plain types.";
+    Pickled = "E306" elsewhere, "pickled Python objects", "An array of numbers or texts is needed here, and this one holds objects. Save numbers and texts as arrays of plain types.";
     ArraySize = "E307", "an array of the wrong size", "The number of bytes after the header does not agree with the shape and the type in the header.";
     ElementType = "E308", "an array of the wrong type", "Keys and vectors must be floats (f2, f4, f8), rates and parents numbers, names text.";
     Shape = "E309", "an array of the wrong shape", "All arrays of a clip must have the same number of frames and of tracks, at least one of each.";
@@ -233,7 +233,7 @@ codes! {
     Layout = "E316" elsewhere, "samples that do not fit the layout", "If the layout of a file is kept, the number of tracks must not change, and a file without a list of times needs frames at a constant rate.";
     NotPerFrame = "E317" elsewhere, "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, accepts names of numeric arrays that have an entry for each frame and are not keys.";
     RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
-    BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one for each gender. It must belong to the kind of body in the motion.";
+    BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ or pickle, or a folder with one for each gender. It must belong to the kind of body in the motion.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
     TableClaims = "E402", "more than the file can hold", "The file states more rows or bytes than its length can contain; nothing was read.";
@@ -281,6 +281,12 @@ codes! {
     RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
     RobotElement = "E903" elsewhere, "an element that is not read", "It would make or move bodies by rules that are not supported; the message says what to use instead.";
+    PickleDamaged = "E910", "a pickle that cannot be read", "It is truncated or damaged, or not a pickle. The location is a position in the file, or in what it unpacks to.";
+    PickleCalls = "E911", "a pickle that would run code", "It names a function or a class that Python would call when it reads the file. Such files may do anything to the computer of those who open them with Python. Only numbers, texts, lists, dicts and arrays are read.";
+    ObjectForValue = "E912", "an object where a value is needed", "The value is an object of a class that is not known here. Save it as numbers, text or an array.";
+    PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
+    PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
+    PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -320,7 +326,7 @@ codes! {
     OffsetsReplaced = "W212" elsewhere, "offsets in the file are replaced", "The file has offsets of its joints, and `--offsets` or `--body-model` gives others. Leave the option out to keep those of the file.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
-    ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
+    ObjectsBeside = "W303", "pickled Python objects beside the keys", "The keys are in other arrays, so that these are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
     TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file, or a number that is no rate; `--source-fps` is for files that state none.";
     TimeUnit = "W305", "times in another unit than seconds", "Seconds since 1970 have ten digits, milliseconds thirteen, microseconds sixteen, nanoseconds nineteen (ORB-SLAM writes them). A first time from 1e11 on is taken for milliseconds, from 1e14 on for microseconds, from 1e17 on for nanoseconds. `--time-unit` states the unit and avoids this warning.";
     ArraysNotRead = "W306", "arrays that are not read", "This is no error: the rotations were found in other arrays, and the names of these are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. What files of a layout usually have besides the motion, such as `betas` and `gender` of AMASS, the shape of the body that `--body-model` uses, causes no warning. A result in the same layout keeps arrays that are constant.";
@@ -341,6 +347,8 @@ codes! {
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
     RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
+    InertObjects = "W911", "objects of classes that are not read", "They are kept by the names of their classes alone; nothing is looked up or run. A value that the motion needs must not be one of them.";
+    TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
 }
 
 impl Code {

@@ -52,6 +52,7 @@ pub mod output;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod path;
+pub mod pickle;
 pub mod printable;
 pub mod quaternion;
 mod rate;
@@ -90,6 +91,8 @@ pub static FORMATS: &[&Format] = &[
     &bvh::FORMAT,
     #[cfg(feature = "fbx")]
     &fbx::FORMAT,
+    // Before NPZ: files of PyTorch are ZIP archives too.
+    &pickle::FORMAT,
     &npz::FORMAT,
     &npy::FORMAT,
     #[cfg(feature = "parquet")]

@@ -30,6 +30,7 @@ mod maps;
 mod mcap;
 mod npz;
 mod origins;
+mod pickles;
 // The guide has all formats.
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod readme;

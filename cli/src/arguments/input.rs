@@ -97,11 +97,7 @@ impl Inputs {
 
     /// Refuses options that apply to none of these inputs.
     pub(crate) fn check_formats(&self, paths: &[&PathBuf]) -> Result<(), Failure> {
-        let format = |path: &&PathBuf| match self.reading.from {
-            Some(format) => format,
-            None => Format::detected(path),
-        };
-        let formats = || paths.iter().map(format);
+        let formats = || paths.iter().map(|path| self.format(path));
         self.reading.check(formats).map_err(Failure::usage)
     }
 
@@ -129,10 +125,14 @@ impl Inputs {
         }
     }
 
+    /// The format in which an input is read.
+    pub(crate) fn format(&self, path: &Path) -> &'static Format {
+        self.reading.from.unwrap_or_else(|| Format::detected(path))
+    }
+
     /// Whether an input is read with extra keys that follow its curves.
     pub(crate) fn follows_curves(&self, path: &Path) -> bool {
-        let format = self.reading.from.unwrap_or_else(|| Format::detected(path));
-        format.takes(FormatOption::Keyframes) && !self.reading.reads_file_keys()
+        self.format(path).takes(FormatOption::Keyframes) && !self.reading.reads_file_keys()
     }
 
     /// The paths that the command line names.
@@ -191,26 +191,25 @@ impl Inputs {
         options.map_err(|fault| Failure::input(&fault, ""))
     }
 
+    /// The failure of an input that is not read, with the option that may help.
+    pub(crate) fn refused(&self, diagnostic: &Diagnostic) -> Failure {
+        let hint = match diagnostic.code {
+            Code::FileTooLong => " (--max-size)",
+            Code::Memory => " (--max-memory)",
+            Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",
+            _ => "",
+        };
+        Failure::input(diagnostic, hint)
+    }
+
     /// As [`Inputs::load_quietly`], without a progress display.
     pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
         let options = self.options()?;
         if path.is_dir() {
             return Err(directory_failure(path));
         }
-        let refuse = |diagnostic: Diagnostic| {
-            let hint = match diagnostic.code {
-                Code::FileTooLong => " (--max-size)",
-                Code::Memory => " (--max-memory)",
-                Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",
-                _ => "",
-            };
-            Failure::input(&diagnostic, hint)
-        };
-        let read = match self.reading.from {
-            Some(format) => format.open(path, &options),
-            None => Format::open_detected(path, &options),
-        };
-        let mut loaded = read.map_err(refuse)?;
+        let read = self.format(path).open(path, &options);
+        let mut loaded = read.map_err(|error| self.refused(&error))?;
         match (loaded.clips.is_empty(), loaded.refused.is_empty()) {
             (true, true) => return Err(no_clips(path)),
             (true, false) => return Err(Failure::parts(&loaded.refused)),

@@ -1,5 +1,6 @@
 //! `tumble info`: what is in a keyframe file, or in a file with a robot.
 
+mod pickle;
 mod robot;
 
 use std::collections::BTreeMap;
@@ -12,22 +13,23 @@ use serde::Serialize;
 use tumble::method::C2;
 use tumble::reference::angle_between;
 use tumble::{Channel, Interpolation, TrackSet};
-use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::Robot;
+use tumble_formats::{Code, Loaded};
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::curve_warning;
 use crate::batch::entry::InputEntry;
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::{listing, names, words};
+use pickle::PickleSummary;
 use robot::RobotSummary;
 
 /// Steps that differ by less than this (relative) are even: decimal times are
 /// rarely even to the last bit.
 const EVEN: f64 = 1e-6;
 
-/// Show what files contain: tracks, keys, times, the largest rotation; of robots (MJCF, URDF) bodies and joints
+/// Show what files contain: tracks, keys, times, the largest rotation; of robots (MJCF, URDF) bodies and joints; of pickles the values
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -47,6 +49,7 @@ pub(crate) struct Arguments {
 #[serde(untagged)]
 enum Report {
     Clip(Box<Summary>),
+    Pickle(PickleSummary),
     Robot(RobotSummary),
 }
 
@@ -54,6 +57,7 @@ impl Report {
     fn text(&self) -> String {
         match self {
             Self::Clip(summary) => summary.text(),
+            Self::Pickle(summary) => summary.text(),
             Self::Robot(summary) => summary.text(),
         }
     }
@@ -137,6 +141,18 @@ fn summarise(
     if Robot::has_extension(path) {
         summaries.push(Report::Robot(RobotSummary::read(path)?));
         return Ok(());
+    }
+    let format = arguments.inputs.format(path);
+    if format.name == tumble_formats::pickle::FORMAT.name && path.is_file() {
+        let options = arguments.inputs.options()?;
+        let refused = |error| arguments.inputs.refused(&error);
+        let contents = PickleSummary::read(path, &options).map_err(refused)?;
+        summaries.push(Report::Pickle(contents));
+        // A pickle may hold anything; its values are listed whether or not they are a motion.
+        let clips = format.open(path, &options);
+        if clips.is_err_and(|error| error.code == Code::UnknownArrays) {
+            return Ok(());
+        }
     }
     let loaded = arguments.inputs.load_quietly(path)?;
     let name = names::input(path);

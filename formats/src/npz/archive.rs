@@ -152,6 +152,54 @@ impl Archive {
         }
     }
 
+    /// An archive of values in some bytes.
+    pub(crate) fn of_values(
+        file: &str,
+        bytes: Vec<u8>,
+        budget: Budget,
+        members: Vec<Member>,
+    ) -> Self {
+        Self {
+            file: file.to_owned(),
+            bytes,
+            members,
+            budget,
+        }
+    }
+
+    /// Whether there is an array of objects.
+    pub(crate) fn has_objects(&self) -> bool {
+        self.members.iter().any(|member| member.objects().is_some())
+    }
+
+    /// Replaces a member with values, which are in other bytes.
+    pub(crate) fn replace(&mut self, member: usize, values: Self) -> Result<(), Diagnostic> {
+        self.take(1, values.bytes.len())?;
+        let before = self.bytes.len();
+        self.bytes.extend_from_slice(&values.bytes);
+        let values = values.members.into_iter().map(|mut value| {
+            value.data = value.data.start + before..value.data.end + before;
+            value
+        });
+        self.members.splice(member..=member, values);
+        Ok(())
+    }
+
+    /// The bytes of the file, and what is left of its budget.
+    pub(crate) fn into_parts(self) -> (Vec<u8>, Budget) {
+        (self.bytes, self.budget)
+    }
+
+    /// The bytes of the file.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Where the bytes of a member are in the file; `None` if they are packed.
+    pub(crate) fn stored(&self, member: &Member) -> Option<Range<usize>> {
+        (!member.is_deflated).then(|| member.data.clone())
+    }
+
     /// Takes memory for `count` elements of `bytes` each from the file's budget.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
         self.budget
@@ -187,9 +235,14 @@ impl Archive {
             self.refuse(member, Code::ArrayHeader, message)
         })?;
         if header.element == Element::Object {
-            let message = "the array holds pickled Python objects, which may run any program when \
-                           they are read; save numbers (dtype=float)";
+            let message = "the array holds pickled Python objects; save numbers (dtype=float)";
             return Err(self.refuse(member, Code::Pickled, message.to_owned()));
+        }
+        if let Element::Class(class) = &header.element {
+            let message = format!(
+                "it is an object of {class}, which is not read; save it as numbers or a text"
+            );
+            return Err(self.refuse(member, Code::ObjectForValue, message));
         }
         let held = self.members[member].size.checked_sub(header.start as u64);
         let said = header.byte_count();
@@ -283,6 +336,31 @@ impl Archive {
 }
 
 impl Member {
+    /// A value in some bytes. `place` says in messages where it is.
+    pub(crate) fn of_value(
+        name: String,
+        place: String,
+        header: ArrayHeader,
+        data: Range<usize>,
+    ) -> Self {
+        Self {
+            path: place,
+            name,
+            header: Ok(header),
+            is_deflated: false,
+            size: data.len() as u64,
+            data,
+            checksum: None,
+        }
+    }
+
+    /// Where the pickle of an array of objects begins in the member; `None` for others.
+    pub(crate) fn objects(&self) -> Option<usize> {
+        let header = self.header.as_ref().ok();
+        let header = header.filter(|header| header.element == Element::Object)?;
+        Some(header.start)
+    }
+
     /// The first bytes, as many as the longest header has.
     fn start<'a>(&self, bytes: &'a [u8]) -> Cow<'a, [u8]> {
         let packed = &bytes[self.data.clone()];

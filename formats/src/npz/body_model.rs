@@ -4,10 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::format::Format;
 use crate::limits::Limits;
 use crate::motion::{Motion, Shape};
 use crate::npz::archive::Archive;
 use crate::npz::plan::read_numbers;
+use crate::pickle;
 use crate::source::Source;
 
 /// The arrays of a motion that contain the shape of the body.
@@ -58,7 +60,12 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     };
     let source = Source::open(&file, false)?;
     let name = source.name.clone();
-    let archive = Archive::open(&name, source.into_bytes(limits.file)?, limits)?;
+    let bytes = source.into_bytes(limits.file)?;
+    let is_pickle = Format::detect(&file, &bytes).name == pickle::FORMAT.name;
+    let archive = match is_pickle {
+        true => pickle::Contents::read(&name, bytes, limits)?.into_parts().0,
+        false => Archive::open(&name, bytes, limits)?,
+    };
     let model = Model::read(&archive)?;
     let joints = model.joints(&archive, &shape.betas)?;
     let tracks = clip.skeleton.len();
@@ -104,15 +111,34 @@ fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
     let refuse =
         |message: String| Diagnostic::new(folder.display().to_string(), Code::BodyModel, message);
     let gender = if gender.is_empty() { "neutral" } else { gender };
+    let found = ["npz", "pkl"].map(|ending| files_of_gender(folder, gender, ending));
+    // A folder that has the same models in both forms has them in the first.
+    let found = found.into_iter().find(|found| !found.is_empty());
+    match &found.unwrap_or_default()[..] {
+        [only] => Ok(only.clone()),
+        [] => Err(refuse(format!(
+            "no model of gender `{gender}` is in the folder, as `…_{}.npz`, `{gender}/….npz` or the same as `.pkl`; \
+             name the file",
+            gender.to_uppercase()
+        ))),
+        [first, second, ..] => Err(refuse(format!(
+            "{} and {} are both of gender `{gender}`; name the file",
+            first.display(),
+            second.display()
+        ))),
+    }
+}
+
+/// The models for a gender in a folder, in files with this ending.
+fn files_of_gender(folder: &Path, gender: &str, ending: &str) -> Vec<PathBuf> {
     let files = |folder: &Path| -> Vec<PathBuf> {
         let entries = std::fs::read_dir(folder).into_iter().flatten();
         let paths = entries.flatten().map(|entry| entry.path());
-        paths
-            .filter(|path| {
-                path.extension()
-                    .is_some_and(|ending| ending.eq_ignore_ascii_case("npz"))
-            })
-            .collect()
+        let has_ending = |path: &PathBuf| {
+            let extension = path.extension();
+            extension.is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
+        };
+        paths.filter(has_ending).collect()
     };
     let stem = |path: &Path| {
         path.file_stem()
@@ -134,18 +160,7 @@ fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
         }
     }
     found.sort();
-    match &found[..] {
-        [only] => Ok(only.clone()),
-        [] => Err(refuse(format!(
-            "no model of gender `{gender}` is in the folder, as `…_{}.npz` or `{gender}/….npz`; name the file",
-            gender.to_uppercase()
-        ))),
-        [first, second, ..] => Err(refuse(format!(
-            "{} and {} are both of gender `{gender}`; name the file",
-            first.display(),
-            second.display()
-        ))),
-    }
+    found
 }
 
 /// The arrays that determine joint positions.

@@ -5,7 +5,7 @@
 //! their meaning and makes a `plan`; `clip` reads the arrays of a plan as a clip. `document` keeps the archive and
 //! the plan, so that the file can be written again in its layout; `write` writes clips of other formats.
 
-mod archive;
+pub(crate) mod archive;
 pub(crate) mod array;
 mod body_model;
 mod clip;
@@ -30,6 +30,8 @@ use crate::map::Map;
 use crate::npz::archive::{Archive, ONLY_ARRAY};
 pub use crate::npz::body_model::body_offsets;
 use crate::npz::document::NpzDocument;
+use crate::npz::plan::ArchivePlan;
+use crate::pickle;
 use crate::source::Source;
 use crate::warnings::Warnings;
 
@@ -92,18 +94,69 @@ fn open_npz(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
 /// When the input is invalid; the first error is returned.
 pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let archive = Archive::open(file, bytes, options.limits)?;
-    let mut warnings = Warnings::new(file);
-    if let Some(map) = map(file, options)? {
-        let mut plan = mapped::plan(&archive, &map)?;
-        let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
-        plan.warn_of_others(&archive, options, &mut warnings);
-        return Ok(Loaded::of(clip, warnings.into_list()));
+    let read = match map(file, options)? {
+        Some(_) => of_values(&archive, options).map(|loaded| (None, loaded)),
+        None => read_known(&archive, options).map(|(plan, loaded)| (Some(plan), loaded)),
+    };
+    match read {
+        Ok((Some(plan), loaded)) => {
+            let document = NpzDocument::new(archive, plan, &loaded.clips[0]);
+            Ok(Loaded {
+                document: Some(Arc::new(document)),
+                ..loaded
+            })
+        }
+        Ok((None, loaded)) => Ok(loaded),
+        Err(error) => match error.code {
+            // The keys may be in arrays of objects; others are not looked at.
+            Code::Pickled | Code::UnknownArrays | Code::Map if archive.has_objects() => {
+                read_with_objects(archive, options)
+            }
+            _ => Err(error),
+        },
     }
-    let plan = match tumble_layout::plan(&archive)? {
+}
+
+/// Reads an archive in which arrays of objects are replaced with the objects' values.
+fn read_with_objects(mut archive: Archive, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let mut warnings = Vec::new();
+    for index in (0..archive.members.len()).rev() {
+        if let Some(start) = archive.members[index].objects() {
+            // The only array of a file is the whole of it.
+            let name = match archive.members[index].path.is_empty() {
+                true => String::new(),
+                false => archive.members[index].name.clone(),
+            };
+            let bytes = archive.unpack(index)?.into_owned();
+            let pickle = start..bytes.len();
+            let file = archive.file.clone();
+            let read = pickle::of_objects(&file, &name, bytes, pickle, options.limits);
+            let path = &archive.members[index].path;
+            let at_member = |error: Diagnostic| match &error.location {
+                Some(place) => error.clone().inside(format!("{path}:{place}")),
+                None => error.inside(path),
+            };
+            let (values, mut found) = read.map_err(at_member)?.into_parts();
+            archive.replace(index, values)?;
+            warnings.append(&mut found);
+        }
+    }
+    let mut loaded = of_values(&archive, options)?;
+    loaded.warnings.splice(0..0, warnings);
+    Ok(loaded)
+}
+
+/// Reads arrays whose names are known.
+fn read_known(
+    archive: &Archive,
+    options: &ReadOptions,
+) -> Result<(ArchivePlan, Loaded), Diagnostic> {
+    let mut warnings = Warnings::new(&archive.file);
+    let plan = match tumble_layout::plan(archive)? {
         Some(plan) => Some(plan),
-        None => match smpl::plan(&archive, &mut warnings)? {
+        None => match smpl::plan(archive, &mut warnings)? {
             Some(plan) => Some(plan),
-            None => world_bodies::plan(&archive)?,
+            None => world_bodies::plan(archive)?,
         },
     };
     let mut plan = plan.ok_or_else(|| {
@@ -112,15 +165,31 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
              are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",
             archive.listing()
         );
-        Diagnostic::new(file, Code::UnknownArrays, message)
+        Diagnostic::new(&archive.file, Code::UnknownArrays, message)
     })?;
-    let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
-    plan.warn_of_others(&archive, options, &mut warnings);
-    let document = NpzDocument::new(archive, plan, &clip);
-    Ok(Loaded {
-        document: Some(Arc::new(document)),
-        ..Loaded::of(clip, warnings.into_list())
-    })
+    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
+    plan.warn_of_others(archive, options, &mut warnings);
+    Ok((plan, Loaded::of(clip, warnings.into_list())))
+}
+
+/// Reads arrays as those of an NPZ file that is not written again.
+///
+/// # Errors
+/// When their meaning is not known, or they are no motion.
+pub(crate) fn of_values(archive: &Archive, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    match map(&archive.file, options)? {
+        Some(map) => read_mapped(archive, &map, options),
+        None => Ok(read_known(archive, options)?.1),
+    }
+}
+
+/// Reads arrays whose meaning a map specifies.
+fn read_mapped(archive: &Archive, map: &Map, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let mut warnings = Warnings::new(&archive.file);
+    let mut plan = mapped::plan(archive, map)?;
+    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
+    plan.warn_of_others(archive, options, &mut warnings);
+    Ok(Loaded::of(clip, warnings.into_list()))
 }
 
 /// Reads the numbers of an NPY file.
@@ -163,6 +232,9 @@ pub(crate) fn open_npy(path: &Path, options: &ReadOptions) -> Result<Loaded, Dia
 /// When the input is invalid; the first error is returned.
 pub fn read_npy(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let archive = Archive::single(file, bytes, options.limits);
+    if archive.has_objects() {
+        return read_with_objects(archive, options);
+    }
     let mut warnings = Warnings::new(file);
     let map = match map(file, options)? {
         Some(map) => map,

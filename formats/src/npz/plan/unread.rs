@@ -23,7 +23,7 @@ impl ArchivePlan {
                 || self.is_tumble_layout && CONSTANTS.contains(&&*member.name)
                 || is_shape && SHAPE.contains(&&*member.name)
                 || self.is_note(member)
-                || header.is_ok_and(|it| it.element == Element::Object)
+                || header.is_ok_and(|it| matches!(it.element, Element::Object | Element::Class(_)))
         };
         let members = archive.members.iter().enumerate();
         let others = members.filter(|&(index, member)| !is_read(index, member));

@@ -1,0 +1,219 @@
+//! The classes and functions whose names mean something here, and those whose files are refused.
+
+/// A class or a function by its module and its name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct ClassName {
+    pub(super) module: String,
+    pub(super) name: String,
+}
+
+/// A class or a function.
+#[derive(Debug, Clone)]
+pub(super) enum Class {
+    Known(Global),
+    Other(ClassName),
+}
+
+/// The classes and functions whose meaning is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Global {
+    Reconstruct,
+    Scalar,
+    FromBuffer,
+    NdArray,
+    Dtype,
+    Encode,
+    Dict,
+    Set,
+    List,
+    Tuple,
+    ByteArray,
+    Object,
+    Reconstructor,
+    RebuildTensor,
+    RebuildParameter,
+    Storage(StorageKind),
+    Size,
+    Wrapper,
+    Csc,
+    Chumpy,
+    Path,
+}
+
+/// The type of the numbers of a storage of PyTorch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum StorageKind {
+    Float,
+    Double,
+    Half,
+    BFloat16,
+    Long,
+    Int,
+    Short,
+    Char,
+    Byte,
+    Bool,
+}
+
+/// The modules and the name of each. NumPy 2 renamed `numpy.core`, Python 3 `__builtin__` and `copy_reg`.
+const KNOWN: &[(&[&str], &str, Global)] = &[
+    (NUMPY_MULTIARRAY, "_reconstruct", Global::Reconstruct),
+    (NUMPY_MULTIARRAY, "scalar", Global::Scalar),
+    (NUMPY_NUMERIC, "_frombuffer", Global::FromBuffer),
+    (&["numpy"], "ndarray", Global::NdArray),
+    (&["numpy"], "dtype", Global::Dtype),
+    (&["_codecs"], "encode", Global::Encode),
+    (&["collections"], "OrderedDict", Global::Dict),
+    (BUILTINS, "dict", Global::Dict),
+    (BUILTINS, "set", Global::Set),
+    (BUILTINS, "frozenset", Global::Set),
+    (BUILTINS, "list", Global::List),
+    (BUILTINS, "tuple", Global::Tuple),
+    (BUILTINS, "bytearray", Global::ByteArray),
+    // How protocols 0 to 2 store bytes without any.
+    (BUILTINS, "bytes", Global::ByteArray),
+    (BUILTINS, "object", Global::Object),
+    (
+        &["copy_reg", "copyreg"],
+        "_reconstructor",
+        Global::Reconstructor,
+    ),
+    (
+        &["torch._utils"],
+        "_rebuild_tensor_v2",
+        Global::RebuildTensor,
+    ),
+    (
+        &["torch._utils"],
+        "_rebuild_parameter",
+        Global::RebuildParameter,
+    ),
+    (
+        &["torch"],
+        "FloatStorage",
+        Global::Storage(StorageKind::Float),
+    ),
+    (
+        &["torch"],
+        "DoubleStorage",
+        Global::Storage(StorageKind::Double),
+    ),
+    (
+        &["torch"],
+        "HalfStorage",
+        Global::Storage(StorageKind::Half),
+    ),
+    (
+        &["torch"],
+        "BFloat16Storage",
+        Global::Storage(StorageKind::BFloat16),
+    ),
+    (
+        &["torch"],
+        "LongStorage",
+        Global::Storage(StorageKind::Long),
+    ),
+    (&["torch"], "IntStorage", Global::Storage(StorageKind::Int)),
+    (
+        &["torch"],
+        "ShortStorage",
+        Global::Storage(StorageKind::Short),
+    ),
+    (
+        &["torch"],
+        "CharStorage",
+        Global::Storage(StorageKind::Char),
+    ),
+    (
+        &["torch"],
+        "ByteStorage",
+        Global::Storage(StorageKind::Byte),
+    ),
+    (
+        &["torch"],
+        "BoolStorage",
+        Global::Storage(StorageKind::Bool),
+    ),
+    (&["torch"], "Size", Global::Size),
+    (
+        &["joblib.numpy_pickle"],
+        "NumpyArrayWrapper",
+        Global::Wrapper,
+    ),
+    (SPARSE, "csc_matrix", Global::Csc),
+    (SPARSE, "csc_array", Global::Csc),
+    (&["chumpy.ch"], "Ch", Global::Chumpy),
+    (&["pathlib"], "PosixPath", Global::Path),
+];
+
+const NUMPY_MULTIARRAY: &[&str] = &["numpy.core.multiarray", "numpy._core.multiarray"];
+const NUMPY_NUMERIC: &[&str] = &["numpy.core.numeric", "numpy._core.numeric"];
+const BUILTINS: &[&str] = &["builtins", "__builtin__"];
+const SPARSE: &[&str] = &["scipy.sparse.csc", "scipy.sparse._csc"];
+
+/// Beginnings of modules of which only the names above are read.
+const REFUSED_BEGINNINGS: [&str; 3] = ["numpy", "torch", "scipy"];
+
+/// Modules whose functions only an attack names; of the first two, only the names above are read.
+const REFUSED: [&str; 17] = [
+    "builtins",
+    "__builtin__",
+    "os",
+    "posix",
+    "nt",
+    "sys",
+    "subprocess",
+    "shutil",
+    "socket",
+    "importlib",
+    "runpy",
+    "pty",
+    "ctypes",
+    "code",
+    "pickle",
+    "_pickle",
+    "marshal",
+];
+
+impl Global {
+    pub(super) fn name(self) -> &'static str {
+        let of = KNOWN.iter().find(|(_, _, global)| *global == self);
+        of.map_or("", |(_, name, _)| name)
+    }
+}
+
+impl Class {
+    /// The class with a name.
+    ///
+    /// # Errors
+    /// Why a file that names it is refused, as text.
+    pub(super) fn of(class: ClassName) -> Result<Self, String> {
+        let ClassName { module, name } = &class;
+        let known = KNOWN
+            .iter()
+            .find(|(modules, known, _)| modules.contains(&module.as_str()) && known == name);
+        if let Some(&(_, _, global)) = known {
+            return Ok(Self::Known(global));
+        }
+        let first = module.split('.').next().unwrap_or_default();
+        let is_refused = REFUSED_BEGINNINGS
+            .iter()
+            .any(|start| module.starts_with(start))
+            || REFUSED.contains(&first);
+        // Python follows the dots of a name to a class's members.
+        if is_refused || name.contains('.') {
+            return Err(format!(
+                "it names {class}, which Python would run; only numbers, texts and arrays are \
+                 read: save these alone"
+            ));
+        }
+        Ok(Self::Other(class))
+    }
+}
+
+impl std::fmt::Display for ClassName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = format!("{}.{}", self.module, self.name);
+        f.write_str(&super::machine::shown(&name))
+    }
+}
