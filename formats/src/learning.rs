@@ -19,7 +19,7 @@ pub use six::{SixOrder, rotation_of_six, six};
 use glam::{DQuat, DVec3};
 
 /// The smallest rotation from one direction to another; about any axis across if they are opposite.
-fn rotation_between(from: DVec3, to: DVec3) -> DQuat {
+pub(crate) fn rotation_between(from: DVec3, to: DVec3) -> DQuat {
     let w = libm::sqrt(from.length_squared() * to.length_squared()) + from.dot(to);
     let axis = from.cross(to);
     let rotation = DQuat::from_xyzw(axis.x, axis.y, axis.z, w);

@@ -57,6 +57,7 @@ pub mod printable;
 pub mod quaternion;
 mod rate;
 pub mod referred;
+pub mod retarget;
 pub mod robot;
 pub mod rotation_form;
 mod rotation_matrix;

@@ -35,6 +35,7 @@ mod pickles;
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod readme;
 mod reduce;
+mod retarget;
 mod robots;
 mod round_trip;
 mod skins;

@@ -28,6 +28,7 @@ mod pickle;
 mod poses;
 mod program;
 mod reduce;
+mod retarget;
 mod robot;
 mod route;
 mod run;
@@ -76,6 +77,8 @@ mod _tumble {
     use crate::program::{devices, encodings, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]
     use crate::reduce::{Reduction, reduce};
+    #[pymodule_export]
+    use crate::retarget::retarget;
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

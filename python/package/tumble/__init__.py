@@ -58,6 +58,7 @@ from tumble._tumble import (
     methods,
     path_errors,
     reduce,
+    retarget,
     save,
     walk,
 )
@@ -107,6 +108,7 @@ __all__ = [
     "path_errors",
     "read",
     "reduce",
+    "retarget",
     "save",
     "walk",
     "write",

@@ -64,6 +64,7 @@ __all__ = [
     "positions_of_humanml3d",
     "reduce",
     "referred_files",
+    "retarget",
     "rotations_of_six",
     "run",
     "save",
@@ -1228,6 +1229,15 @@ def mirrored_rotations(
     quaternions: _Array, *, order: _Order, axis: _Axis, pairs: Sequence[int] | None = None
 ) -> _Double: ...
 def humanml3d(positions: _Array, *, threshold: float = 0.002) -> _Double: ...
+def retarget(
+    clip: Clip,
+    target: Clip,
+    *,
+    bones: dict[str, str] | None = None,
+    rest: Literal["auto", "same", "directions"] = "auto",
+    scale: Literal["hips", "legs"] | float = "hips",
+    axes: _Array | None = None,
+) -> tuple[Clip, dict[str, Any]]: ...
 def positions_of_humanml3d(features: _Array) -> _Double: ...
 def encodings() -> dict[str, str]: ...
 def methods() -> dict[str, str]: ...

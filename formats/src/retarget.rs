@@ -1,0 +1,542 @@
+//! Carries a motion from one skeleton to another: rotations away from the rest pose, exactly, and the way of the hips.
+//!
+//! With the world rotations of a joint at rest `R_s` and now `W_s`, and the rotation `C` from the axes of the source to
+//! those of the target, the difference from rest is `D = C W_s R_s⁻¹ C⁻¹`. The joint of the target is then `D A R_t` in
+//! the world, where `A` aligns the target's rest pose with the source's; local rotations follow from the parents that
+//! were computed. Joints of the source that the target lacks collapse into the joint below, because `D` is relative to
+//! the world.
+
+mod roles;
+
+use glam::{DMat3, DQuat, DVec3};
+use tumble::{TrackError, names};
+
+pub use roles::{Role, Roles, recognise};
+
+use crate::learning::rotation_between;
+use crate::motion::keyed::{KeyedError, keyed};
+use crate::motion::world::{HierarchyError, parents_first};
+use crate::motion::{Channels, Motion};
+
+/// How a motion is carried over.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RetargetOptions {
+    /// Joints of the target and of the source, by names; empty to recognise both skeletons by their names.
+    pub bones: Vec<(String, String)>,
+    /// How the rest poses are compared.
+    pub rest: RestAlignment,
+    /// What the way of the hips is multiplied by.
+    pub scale: HipsScale,
+    /// The rotation from the axes of the source to those of the target; `None` to find it from where hips, head and
+    /// legs are at rest.
+    pub axes: Option<DQuat>,
+}
+
+/// How the rest poses of two skeletons are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum RestAlignment {
+    /// By directions if those of a limb differ by more than 5°, else as the same.
+    #[default]
+    Auto,
+    /// Both stand alike: nothing is aligned.
+    Same,
+    /// The limbs of the target are turned to the directions of the source's.
+    Directions,
+}
+
+names! {
+    RestAlignment, "alignment of rest poses",
+    Auto => "auto",
+    Same => "same",
+    Directions => "directions",
+}
+
+/// What the way of the hips is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum HipsScale {
+    /// The ratio of the heights of the hips above the lowest joint at rest.
+    #[default]
+    Hips,
+    /// The ratio of the lengths of the legs.
+    Legs,
+    /// A number.
+    Factor(f64),
+}
+
+/// What was done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RetargetReport {
+    /// Joints of the target and the joints of the source that they follow, by names.
+    pub pairs: Vec<(String, String)>,
+    /// Joints of the target that keep their rest rotations.
+    pub resting: Vec<String>,
+    /// Joints of the source that nothing follows.
+    pub dropped: Vec<String>,
+    /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
+    pub aligned: Vec<(String, f64)>,
+    /// What the way of the hips was multiplied by.
+    pub scale: f64,
+    /// The rotation from the axes of the source to those of the target.
+    pub axes: DQuat,
+    /// Whether `axes` was neither given nor found, and is the identity.
+    pub are_axes_assumed: bool,
+    /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
+    pub dropped_translation: f64,
+}
+
+/// Why a motion cannot be carried over.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RetargetError {
+    /// A clip is no skeleton.
+    #[error("the {which} has no skeleton; give a clip with joints, parents and offsets")]
+    NoSkeleton {
+        /// `source` or `target`.
+        which: &'static str,
+    },
+    /// A skeleton's joints have no names that are known.
+    #[error(
+        "the joints of the {which} are not those of a known human skeleton: {}; pair them by `bones`",
+        if missing.is_empty() { "two kinds fit as well".to_owned() } else { format!("it has no {}", missing.join(", ")) }
+    )]
+    NotRecognised {
+        /// `source` or `target`.
+        which: &'static str,
+        /// The roles without a joint.
+        missing: Vec<&'static str>,
+    },
+    /// A joint of `bones` does not exist, or is there twice.
+    #[error("bones: the {which} has no joint `{name}`, or it is paired twice")]
+    Bone {
+        /// `source` or `target`.
+        which: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// The scale is not a positive number.
+    #[error("scale: {0} is not a number greater than 0")]
+    Scale(f64),
+    /// The keys of the source are at different times.
+    #[error(transparent)]
+    Keyed(#[from] KeyedError),
+    /// The parents are no hierarchy.
+    #[error(transparent)]
+    Hierarchy(#[from] HierarchyError),
+    /// The motion cannot be stored.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+}
+
+/// Rotations and positions of joints.
+struct Pose {
+    rotations: Vec<DQuat>,
+    positions: Vec<DVec3>,
+}
+
+/// A skeleton: joints parents first, and its rest pose in the world.
+struct Rig<'a> {
+    clip: &'a Motion,
+    names: Vec<String>,
+    parents: Vec<Option<usize>>,
+    order: Vec<usize>,
+    rest: Pose,
+}
+
+impl<'a> Rig<'a> {
+    fn new(clip: &'a Motion, which: &'static str) -> Result<Self, RetargetError> {
+        if clip.skeleton.is_empty() {
+            return Err(RetargetError::NoSkeleton { which });
+        }
+        let joints = clip.set.track_count();
+        let mut rig = Self {
+            clip,
+            names: (0..joints)
+                .map(|joint| clip.set.track_name(joint))
+                .collect(),
+            parents: clip.skeleton.iter().map(|joint| joint.parent).collect(),
+            order: parents_first(clip, joints)?,
+            rest: Pose {
+                rotations: Vec::new(),
+                positions: Vec::new(),
+            },
+        };
+        rig.rest = rig.world(|joint| (rig.local_rest(joint), clip.rest_position(joint)));
+        Ok(rig)
+    }
+
+    fn local_rest(&self, joint: usize) -> DQuat {
+        let rest = self.clip.skeleton[joint].rest.rotation;
+        rest.as_dquat().normalize()
+    }
+
+    fn world(&self, local: impl Fn(usize) -> (DQuat, DVec3)) -> Pose {
+        let mut pose = Pose {
+            rotations: vec![DQuat::IDENTITY; self.names.len()],
+            positions: vec![DVec3::ZERO; self.names.len()],
+        };
+        for &joint in &self.order {
+            let (rotation, position) = local(joint);
+            (pose.rotations[joint], pose.positions[joint]) = match self.parents[joint] {
+                None => (rotation, position),
+                Some(parent) => (
+                    pose.rotations[parent] * rotation,
+                    pose.positions[parent] + pose.rotations[parent] * position,
+                ),
+            };
+        }
+        pose
+    }
+
+    /// The axis that points up: y or z, along which the joints at rest are further apart.
+    fn up(&self) -> DVec3 {
+        let extent = |axis: DVec3| {
+            let along = self.rest.positions.iter().map(|point| point.dot(axis));
+            along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+        };
+        match extent(DVec3::Z) > extent(DVec3::Y) {
+            true => DVec3::Z,
+            false => DVec3::Y,
+        }
+    }
+
+    fn named(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|joint| joint == name)
+    }
+}
+
+/// Carries the keys of `source` over to the skeleton of `target`; times, rate and names of the clip are the source's.
+/// Joints of the target without a partner rest.
+///
+/// # Errors
+/// A [`RetargetError`].
+pub fn retarget(
+    source: &Motion,
+    target: &Motion,
+    options: &RetargetOptions,
+) -> Result<(Motion, RetargetReport), RetargetError> {
+    let from = Rig::new(source, "source")?;
+    let to = Rig::new(target, "target")?;
+    let roles = [(&from, "source"), (&to, "target")].map(|(rig, which)| {
+        recognise(&rig.names, &rig.parents)
+            .map_err(|missing| RetargetError::NotRecognised { which, missing })
+    });
+    let pairs = Pairs::new(&from, &to, &options.bones, &roles)?;
+    let [from_roles, to_roles] = roles.map(Result::ok);
+    let found = || {
+        Some(axes_of(&to, to_roles.as_ref()?)? * axes_of(&from, from_roles.as_ref()?)?.inverse())
+    };
+    let known_axes = options.axes.map(DQuat::normalize).or_else(found);
+    let axes = known_axes.unwrap_or(DQuat::IDENTITY);
+    let segments = pairs.segments(&to, to_roles.as_ref());
+    let alignments = pairs.alignments(&from, &to, &segments, axes, options.rest);
+    let scale = match options.scale {
+        HipsScale::Factor(factor) if factor.is_finite() && factor > 0.0 => factor,
+        HipsScale::Factor(factor) => return Err(RetargetError::Scale(factor)),
+        HipsScale::Hips => pairs.height_ratio(&from, &to, axes),
+        HipsScale::Legs => pairs.leg_ratio(&from, &to, [from_roles.as_ref(), to_roles.as_ref()]),
+    };
+    let samples = keyed(source)?;
+    let joints = from.names.len();
+    let (mut rotations, mut hips) = (vec![Vec::new(); to.names.len()], Vec::new());
+    let mut dropped_translation = 0f64;
+    for sample in 0..samples.times.len() {
+        let local = |joint: usize| {
+            let index = sample * joints + joint;
+            let moved = samples.translations.get(index);
+            let position = moved.map_or_else(
+                || source.rest_position(joint),
+                |&moved| source.origin(joint) + moved.as_dvec3(),
+            );
+            (samples.rotations[index].as_dquat().normalize(), position)
+        };
+        for joint in (0..joints).filter(|&joint| Some(joint) != pairs.hips.map(|hips| hips.1)) {
+            let moved = (local(joint).1 - source.rest_position(joint)).length();
+            if from.parents[joint].is_some() {
+                dropped_translation = dropped_translation.max(moved);
+            }
+        }
+        let now = from.world(local);
+        let mut world = vec![DQuat::IDENTITY; to.names.len()];
+        for &joint in &to.order {
+            let above = to.parents[joint].map_or(DQuat::IDENTITY, |parent| world[parent]);
+            world[joint] = match pairs.source_of[joint] {
+                None => above * to.local_rest(joint),
+                Some(partner) => {
+                    let from_rest = now.rotations[partner] * from.rest.rotations[partner].inverse();
+                    let difference = axes * from_rest * axes.inverse();
+                    (difference * alignments[joint] * to.rest.rotations[joint]).normalize()
+                }
+            };
+            if pairs.source_of[joint].is_some() {
+                rotations[joint].push((above.inverse() * world[joint]).normalize().as_quat());
+            }
+        }
+        if let Some((joint, partner)) = pairs.hips {
+            let moved = now.positions[partner] - from.rest.positions[partner];
+            let position = to.rest.positions[joint] + scale * (axes * moved);
+            // The joints above the hips rest.
+            hips.push(match to.parents[joint] {
+                None => position,
+                Some(parent) => {
+                    to.rest.rotations[parent].inverse() * (position - to.rest.positions[parent])
+                }
+            });
+        }
+    }
+    let mut motion = Motion {
+        name: source.name.clone(),
+        rate: source.rate,
+        time_offset: source.time_offset,
+        channels: Vec::new(),
+        ..target.without_tracks()
+    };
+    for (joint, keys) in rotations.iter().enumerate() {
+        let name = &*to.names[joint];
+        match keys.is_empty() {
+            true => {
+                motion
+                    .set
+                    .push(name, &samples.times[..1], &[to.local_rest(joint).as_quat()])?
+            }
+            false => motion.set.push(name, &samples.times, keys)?,
+        }
+    }
+    if let Some((joint, _)) = pairs.hips {
+        motion.set_positions(joint, &samples.times, &hips)?;
+    }
+    if !source.channels.is_empty() {
+        let channel = |partner: &Option<usize>| {
+            let partner = partner.map_or(Channels::default(), |partner| source.channel(partner));
+            Channels {
+                scale: None,
+                ..partner
+            }
+        };
+        motion.channels = pairs.source_of.iter().map(channel).collect();
+    }
+    let aligned = alignments
+        .iter()
+        .enumerate()
+        .filter_map(|(joint, rotation)| {
+            let angle = 2.0 * libm::acos(rotation.w.abs().min(1.0));
+            (angle > 1e-9).then(|| (to.names[joint].clone(), angle.to_degrees()))
+        });
+    let used = |joint: &usize| pairs.source_of.contains(&Some(*joint));
+    let report = RetargetReport {
+        pairs: pairs.named(&from, &to),
+        resting: (0..to.names.len())
+            .filter(|&joint| pairs.source_of[joint].is_none())
+            .map(|joint| to.names[joint].clone())
+            .collect(),
+        dropped: (0..joints)
+            .filter(|joint| !used(joint))
+            .map(|joint| from.names[joint].clone())
+            .collect(),
+        aligned: aligned.collect(),
+        scale,
+        axes,
+        are_axes_assumed: known_axes.is_none(),
+        dropped_translation,
+    };
+    Ok((motion, report))
+}
+
+/// The axes of a skeleton by where its parts are at rest: its left, up and forward as columns, each along an axis of the
+/// coordinates. `None` where they are not told apart.
+fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
+    let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
+    let along = |vector: DVec3| {
+        let largest = vector.abs().max_element();
+        let axis = DVec3::AXES
+            .into_iter()
+            .find(|axis| vector.dot(*axis).abs() == largest)?;
+        (largest > 0.0).then(|| axis * vector.dot(axis).signum())
+    };
+    let up = along(at(Role::Head)? - at(Role::Hips)?)?;
+    let left = along(at(Role::LeftUpperLeg)? - at(Role::RightUpperLeg)?)?;
+    (up.dot(left) == 0.0).then(|| DQuat::from_mat3(&DMat3::from_cols(left, up, left.cross(up))))
+}
+
+/// Which joint follows which.
+struct Pairs {
+    /// The joint of the source for each joint of the target.
+    source_of: Vec<Option<usize>>,
+    /// The joints whose way is followed: of the target and of the source.
+    hips: Option<(usize, usize)>,
+}
+
+impl Pairs {
+    fn new(
+        from: &Rig<'_>,
+        to: &Rig<'_>,
+        bones: &[(String, String)],
+        roles: &[Result<Roles, RetargetError>; 2],
+    ) -> Result<Self, RetargetError> {
+        let mut source_of = vec![None; to.names.len()];
+        if bones.is_empty() {
+            let [from_roles, to_roles] = match roles {
+                [Ok(from), Ok(to)] => [from, to],
+                [Err(error), _] | [_, Err(error)] => return Err(error.again()),
+            };
+            for role in Role::ALL {
+                if let (Some(joint), partner) = (to_roles.joint(role), from_roles.joint(role)) {
+                    source_of[joint] = partner;
+                }
+            }
+        }
+        for (target, source) in bones {
+            let unknown = |which, name: &String| RetargetError::Bone {
+                which,
+                name: name.clone(),
+            };
+            let joint = to.named(target).ok_or_else(|| unknown("target", target))?;
+            let partner = from
+                .named(source)
+                .ok_or_else(|| unknown("source", source))?;
+            if source_of[joint].replace(partner).is_some() {
+                return Err(unknown("target", target));
+            }
+        }
+        // The first joint from the root on that has a partner.
+        let first = to
+            .order
+            .iter()
+            .find_map(|&joint| Some((joint, source_of[joint]?)));
+        Ok(Self {
+            hips: first,
+            source_of,
+        })
+    }
+
+    fn named(&self, from: &Rig<'_>, to: &Rig<'_>) -> Vec<(String, String)> {
+        let pairs = self.source_of.iter().enumerate();
+        let pairs = pairs.filter_map(|(joint, partner)| Some((joint, (*partner)?)));
+        let names = |(joint, partner): (usize, usize)| {
+            (to.names[joint].clone(), from.names[partner].clone())
+        };
+        pairs.map(names).collect()
+    }
+
+    /// The nearest joint above that has a partner.
+    fn above(&self, to: &Rig<'_>, joint: usize) -> Option<usize> {
+        let mut above = to.parents[joint];
+        while let Some(next) = above.filter(|&next| self.source_of[next].is_none()) {
+            above = to.parents[next];
+        }
+        above
+    }
+
+    /// The joint at the other end of each limb's part, for the joints of the target that have one. Without roles, parts
+    /// with one paired joint below them are limbs, from where the skeleton branches on.
+    fn segments(&self, to: &Rig<'_>, roles: Option<&Roles>) -> Vec<Option<usize>> {
+        let mut segments = vec![None; to.names.len()];
+        if let Some(roles) = roles {
+            for role in Role::ALL {
+                if let (Some(joint), Some(end)) = (roles.joint(role), role.limb_end()) {
+                    segments[joint] = roles
+                        .joint(end)
+                        .filter(|&end| self.source_of[end].is_some());
+                }
+            }
+            return segments;
+        }
+        let mut below = vec![Vec::new(); to.names.len()];
+        for joint in (0..to.names.len()).filter(|&joint| self.source_of[joint].is_some()) {
+            if let Some(above) = self.above(to, joint) {
+                below[above].push(joint);
+            }
+        }
+        for (segment, below) in segments.iter_mut().zip(&below) {
+            if let [end] = below[..] {
+                *segment = Some(end);
+            }
+        }
+        segments
+    }
+
+    /// The rotation in the world that aligns each joint of the target with the source's rest pose.
+    fn alignments(
+        &self,
+        from: &Rig<'_>,
+        to: &Rig<'_>,
+        segments: &[Option<usize>],
+        axes: DQuat,
+        rest: RestAlignment,
+    ) -> Vec<DQuat> {
+        let mut alignments = vec![DQuat::IDENTITY; to.names.len()];
+        if rest == RestAlignment::Same {
+            return alignments;
+        }
+        let of_segment = |joint: usize| {
+            let end = segments[joint]?;
+            let (start_partner, end_partner) = (self.source_of[joint]?, self.source_of[end]?);
+            let direction = |pose: &Pose, a: usize, b: usize| pose.positions[b] - pose.positions[a];
+            let target = direction(&to.rest, joint, end);
+            let source = axes * direction(&from.rest, start_partner, end_partner);
+            (target.length() > 0.0 && source.length() > 0.0)
+                .then(|| rotation_between(target, source))
+        };
+        let found: Vec<Option<DQuat>> = (0..to.names.len()).map(of_segment).collect();
+        // The cosine of half of 5°.
+        let is_large = |rotation: &DQuat| rotation.w < 0.999_048_221_581_857_8;
+        if rest == RestAlignment::Auto && !found.iter().flatten().any(is_large) {
+            return alignments;
+        }
+        for &joint in &to.order {
+            if self.source_of[joint].is_none() {
+                continue;
+            }
+            // What is below a part of a limb, such as a hand, stands as the part does.
+            let above = self.above(to, joint).map(|above| alignments[above]);
+            alignments[joint] = found[joint].or(above).unwrap_or_default();
+        }
+        alignments
+    }
+
+    fn height_ratio(&self, from: &Rig<'_>, to: &Rig<'_>, axes: DQuat) -> f64 {
+        let Some((joint, partner)) = self.hips else {
+            return 1.0;
+        };
+        let height = |rig: &Rig<'_>, hips: usize, up: DVec3| {
+            let heights = rig.rest.positions.iter().map(|point| point.dot(up));
+            rig.rest.positions[hips].dot(up) - heights.fold(f64::INFINITY, f64::min)
+        };
+        let up = from.up();
+        let [source, target] = [height(from, partner, up), height(to, joint, axes * up)];
+        match source > 0.0 && target > 0.0 {
+            true => target / source,
+            false => 1.0,
+        }
+    }
+
+    fn leg_ratio(&self, from: &Rig<'_>, to: &Rig<'_>, roles: [Option<&Roles>; 2]) -> f64 {
+        let length = |rig: &Rig<'_>, roles: &Roles| {
+            let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
+            let leg = [Role::LeftUpperLeg, Role::LeftLowerLeg, Role::LeftFoot].map(at);
+            let [upper, lower, foot] = leg;
+            Some((lower? - upper?).length() + (foot? - lower?).length())
+        };
+        let [source, target] = roles;
+        let lengths = (
+            source.and_then(|it| length(from, it)),
+            target.and_then(|it| length(to, it)),
+        );
+        match lengths {
+            (Some(source), Some(target)) if source > 0.0 && target > 0.0 => target / source,
+            _ => 1.0,
+        }
+    }
+}
+
+impl RetargetError {
+    /// The same of a skeleton that is not recognised.
+    fn again(&self) -> Self {
+        match self {
+            Self::NotRecognised { which, missing } => Self::NotRecognised {
+                which,
+                missing: missing.clone(),
+            },
+            _ => Self::NoSkeleton { which: "source" },
+        }
+    }
+}
