@@ -29,6 +29,7 @@ mod program;
 mod reduce;
 mod route;
 mod run;
+mod sampler;
 mod samples;
 mod save;
 mod shards;
@@ -71,6 +72,8 @@ mod _tumble {
     use crate::reduce::{Reduction, reduce};
     #[pymodule_export]
     use crate::route::{Route, Surface, Walk, walk};
+    #[pymodule_export]
+    use crate::sampler::Sampler;
     #[pymodule_export]
     use crate::save::save;
     #[pymodule_export]
