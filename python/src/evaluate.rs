@@ -550,7 +550,7 @@ const KEYS_OF_A_SAMPLE: usize = 2048;
 
 /// Where the curves of a clip are less smooth than their method promises, where no warning was given
 /// yet. Requests for few samples of many keys are not checked.
-fn curve_warnings(
+pub(crate) fn curve_warnings(
     py: Python<'_>,
     clip: &Arc<Motion>,
     request: &EvaluationKeywords,

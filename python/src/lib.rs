@@ -32,6 +32,7 @@ mod retarget;
 mod robot;
 mod route;
 mod run;
+mod sampler;
 mod samples;
 mod save;
 mod shards;
@@ -83,6 +84,8 @@ mod _tumble {
     use crate::robot::Robot;
     #[pymodule_export]
     use crate::route::{Route, Surface, Walk, walk};
+    #[pymodule_export]
+    use crate::sampler::Sampler;
     #[pymodule_export]
     use crate::save::save;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import warnings
 from pathlib import Path
@@ -65,6 +66,44 @@ def test_a_time_list_for_each_track(clip, rng):
     assert [part.shape for part in ragged] == [(50, 4), (7, 4), (0, 4)]
     assert np.array_equal(ragged[1], found[1][:7])
     assert np.shares_memory(ragged[0].base, ragged[1].base)
+
+
+def test_a_sampler_has_the_bits_of_evaluate(clip, rng):
+    at = np.concatenate([rng.uniform(-3, 5, 60), TIMES, np.linspace(0, 2, 40)])
+    for method, after in [("slerp", "hold"), ("c2", "loop"), ("squad", "extrapolate")]:
+        expected = clip.evaluate(at=at, method=method, after=after, layout="frame")
+        sampler = clip.sampler(method=method, after=after)
+        other = copy.copy(sampler)
+        out = np.empty((3, 4), np.float32)
+        for time, pose in zip(at, expected):
+            assert sampler.pose(time, out=out) is out
+            assert np.array_equal(out, pose)
+            assert np.array_equal(other.sample("b", time), pose[1])
+            swapped = other.pose(time, tracks=["c", 0], order="wxyz")
+            assert np.array_equal(swapped, pose[[2, 0]][:, [3, 0, 1, 2]])
+    assert (len(sampler), repr(sampler)) == (3, "Sampler(3 tracks)")
+
+
+def test_a_sampler_refuses_what_it_cannot_do(clip):
+    sampler = clip.sampler()
+    for call, words in [
+        (lambda: clip.sampler(fps=60), "its times later"),
+        (lambda: clip.sampler(before="leave-out"), "leaves none out"),
+        (lambda: sampler.pose(np.nan), "not finite"),
+        (lambda: sampler.pose(0, out=np.empty((2, 4), np.float32)), r"the result's is \(3, 4\)"),
+        (lambda: sampler.sample(3, 0), "there is no track 3"),
+        (lambda: sampler.pose(0, tracks=["d"]), "there is no track `d`"),
+        (lambda: sampler.sample(0, "now"), "give seconds"),
+    ]:
+        with pytest.raises((ValueError, LookupError, TypeError), match=words):
+            call()
+
+
+def test_a_sampler_takes_times_of_the_files_clock(rng):
+    clip = tumble.Clip(1.7e9 + TIMES, unit(rng, 3, 4))
+    sampler = clip.sampler(method="slerp")
+    assert np.array_equal(sampler.pose(1.7e9 + 0.25), clip.evaluate(at=0.25, method="slerp"))
+    assert np.array_equal(sampler.pose(0.25), sampler.pose(1.7e9 + 0.25))
 
 
 def test_tracks_of_different_lengths(rng):

@@ -270,6 +270,7 @@ def test_everything_takes_weak_references(clip, tmp_path):
     engine = tumble.Engine("cpu")
     library = tumble.MotionLibrary([clip])
     others = [clip, engine, tumble.load(tmp_path / "a.npz"), library, library._motions]
-    others += [tumble.Crowd([clip], 2), engine.stream(clip, fps=10), clip.view(methods=["slerp"], fps=5)]
+    others += [tumble.Crowd([clip], 2), clip.sampler(), engine.stream(clip, fps=10)]
+    others += [clip.view(methods=["slerp"], fps=5)]
     for value in [*values(clip), *others]:
         assert weakref.ref(value)() is value

@@ -27,7 +27,7 @@ fn samplers_have_the_bits_of_the_clip() {
         );
         let output = expected.as_mut_ptr().cast();
         let layout = TumbleLayout::FrameMajor as u32;
-        let done = tumble_clip_evaluate(clip, &samples, layout, output, 8 * times.len());
+        let done = tumble_clip_evaluate(clip, &raw const samples, layout, output, 8 * times.len());
         assert_eq!(done, TumbleResult::Ok, "{}", words());
         assert_eq!(tumble_sampler_new(clip, &raw mut sampler), TumbleResult::Ok);
         assert_eq!(tumble_clip_free(clip), TumbleResult::Ok);

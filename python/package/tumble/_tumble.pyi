@@ -29,6 +29,7 @@ __all__ = [
     "Reduction",
     "Robot",
     "Route",
+    "Sampler",
     "Spread",
     "Surface",
     "Verification",
@@ -312,6 +313,19 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
+    def sampler(
+        self,
+        *,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Outside | None = None,
+        after: _Outside | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> Sampler: ...
     def plot(
         self,
         track: int | str | None = None,
@@ -1543,6 +1557,23 @@ class DeviceArray:
     def __dlpack_device__(self) -> tuple[int, int]: ...
     def __len__(self) -> int: ...
     def numpy(self) -> NDArray[Any]: ...
+
+@final
+class Sampler:
+    def __len__(self) -> int: ...
+    def __copy__(self) -> Sampler: ...
+    def __deepcopy__(self, memo: Any, /) -> Sampler: ...
+    def sample(
+        self, track: int | str, time: float, *, order: _Order = "xyzw"
+    ) -> _Single: ...
+    def pose(
+        self,
+        time: float,
+        *,
+        tracks: Sequence[int | str] | None = None,
+        out: _Single | None = None,
+        order: _Order = "xyzw",
+    ) -> _Single: ...
 
 @final
 class Crowd:

@@ -18,6 +18,7 @@ use crate::errors::{guarded, input};
 use crate::options::frame_rate;
 use crate::pickle::{is_same, state};
 use crate::run::work;
+use crate::sampler::Sampler;
 
 impl PartialEq for Clip {
     /// Whether both have the same tracks, keys and skeleton, whatever files they come from.
@@ -344,6 +345,18 @@ impl Clip {
             device_array,
             options,
         )
+    }
+
+    /// A `Sampler`: it evaluates single rotations and poses, in loops that need one at a time, with the bits of
+    /// `evaluate`. It prepares the clip once; the options are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.sampler(method="slerp").pose(2.0)
+    /// array([[1., 0., 0., 0.]], dtype=float32)
+    #[pyo3(signature = (**options), text_signature = "($self, *, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
+    fn sampler(slf: &Bound<'_, Self>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Sampler> {
+        Sampler::of(slf, options)
     }
 
     /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
