@@ -5,5 +5,8 @@
 alias Stored = vec4<f16>;
 
 fn store(index: u32, rotation: vec4f) {
-    rotations[index] = vec4<f16>(rotation);
+    // The detail is 0, which compilers do not know. Else AMD's would make the last addition and the conversion one
+    // instruction, which rounds once (`v_fma_mixlo_f16`).
+    let rounded = bitcast<vec4f>(bitcast<vec4u>(rotation) ^ vec4u(dispatch.detail));
+    rotations[index] = vec4<f16>(rounded);
 }

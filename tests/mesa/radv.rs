@@ -88,10 +88,7 @@ fn compiled(
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{family}: {said}{errors}");
     let named = tumble::vulkan::kernels().map(|(name, _)| name);
-    let named = named.filter(|name| match kernels {
-        [] => !name.ends_with("_converting"),
-        _ => kernels.contains(name),
-    });
+    let named = named.filter(|name| kernels.is_empty() || kernels.contains(name));
     let listings = named.map(|name| {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
         (name.to_owned(), Listing::read(&text))
