@@ -42,6 +42,7 @@ const STORAGE_BUFFER: u32 = 12;
 /// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
 const EXACT: [u16; 4] = [127, 129, 131, MULTIPLY]; // FNegate FAdd FSub FMul
 const MULTIPLY: u16 = 133;
+const F_CONVERT: u16 = 115;
 const VECTOR_TIMES_SCALAR: u16 = 142;
 /// Float arithmetic with a looser bound, conversions that round freely, and what [`splat_products`]
 /// leaves nothing of.
@@ -103,17 +104,39 @@ pub enum PassError {
 /// A [`PassError`] for words that are no module, and for a module that computes
 /// anything whose last bit Vulkan leaves open.
 pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
+    decorated(module, false)
+}
+
+/// As [`no_contraction`], for a module that converts f32 to half precision. It gets the modes by which conversions round
+/// to nearest, ties to even, and keep subnormal numbers, so that only devices that report both may have it.
+///
+/// # Errors
+/// As for [`no_contraction`].
+pub fn of_halves(module: &[u32]) -> Result<Vec<u32>, PassError> {
+    const DENORM_PRESERVE: [u32; 2] = [4464, 4459]; // the capability and the mode
+    const ROUND_TO_NEAREST_EVEN: [u32; 2] = [4467, 4462];
+    let words = decorated(module, true)?;
+    let modes = [DENORM_PRESERVE, ROUND_TO_NEAREST_EVEN].map(|[capability, mode]| spirv::Mode {
+        capability,
+        mode,
+        width: 16,
+    });
+    Ok(spirv::with_modes(&words, &modes)?)
+}
+
+fn decorated(module: &[u32], converts: bool) -> Result<Vec<u32>, PassError> {
     let code = instructions(module)?;
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
         let (word, opcode) = (instruction.start, instruction.opcode);
         match (opcode, instruction.words) {
-            (TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 => {
+            (TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 && !(bits == 16 && converts) => {
                 return Err(PassError::FloatWidth { bits });
             }
             // Every built-in function of GLSL.std.450 that naga would emit for our
             // shaders is one of those that round freely.
+            (F_CONVERT, _) if converts => {}
             _ if opcode == EXT_INST || INEXACT.contains(&opcode) => {
                 return Err(PassError::Inexact { word, opcode });
             }

@@ -31,7 +31,7 @@ use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validato
 use entries::Source;
 use functions::Functions;
 use rust::{Compiled, Declared};
-use table::{Kernel, WIDE_STORE};
+use table::{CONVERTING_STORE, Kernel, WIDE_STORE};
 
 /// The engine's package.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -66,7 +66,11 @@ fn compile() -> Files {
     let (mut compiled, mut code) = (Vec::new(), Vec::new());
     let (mut parsed, mut of_texels) = (Vec::new(), Vec::new());
     for kernel in table::kernels() {
-        let (storage, texels) = modules(&kernel);
+        let Variants {
+            storage,
+            texels,
+            converting,
+        } = modules(&kernel);
         declared.collect(
             &storage.name,
             storage.layouts.as_ref().unwrap_or(&storage.parsed),
@@ -79,7 +83,8 @@ fn compile() -> Files {
         compiled.push(Compiled {
             bindings: storage.bindings(),
             words: emit(&storage),
-            texel_words: texels.as_ref().map(emit),
+            texel_words: texels.as_ref().map(&mut emit),
+            converting_words: converting.as_ref().map(emit),
             name: kernel.name,
         });
         let files = kernel.files.iter().chain(&WIDE_STORE);
@@ -148,7 +153,7 @@ pub fn sources() -> BTreeMap<String, String> {
     let modules = kernels
         .iter()
         .map(modules)
-        .flat_map(|(storage, texels)| [Some(storage), texels]);
+        .flat_map(|all| [Some(all.storage), all.texels, all.converting]);
     modules
         .flatten()
         .map(|module| (module.name, module.source))
@@ -163,12 +168,22 @@ struct Module {
     info: ModuleInfo,
     /// Whether its results go past the caches.
     streams_results: bool,
+    /// Whether it converts to half precision.
+    converts: bool,
     /// The same with the structs that its buffers hold, if it loads them by vectors.
     layouts: Option<naga::Module>,
 }
 
-/// A kernel, and its variant that reads texel buffers if it has one.
-fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
+/// A kernel and its variants.
+struct Variants {
+    storage: Module,
+    /// The one that reads texel buffers.
+    texels: Option<Module>,
+    /// The one that converts to half precision.
+    converting: Option<Module>,
+}
+
+fn modules(kernel: &Kernel) -> Variants {
     let Kernel {
         name,
         files,
@@ -176,6 +191,7 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         has_texels,
         loads_vectors,
         streams_results,
+        converts,
     } = kernel;
     let joined: String = files.iter().map(|file| read_shader(file)).collect();
     let source = match reads.is_empty() {
@@ -190,6 +206,23 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         storage.layouts = layouts;
     }
     storage.streams_results = *streams_results;
+    let converting = converts.then(|| {
+        let files = files.iter().filter(|file| **file != "math/half");
+        let files = files.map(|&file| match file {
+            "stores/f16" => CONVERTING_STORE,
+            other => other,
+        });
+        let joined: String = files.map(read_shader).collect();
+        let layouts = storage.layouts.as_ref().unwrap_or(&storage.parsed);
+        let readers = match loads_vectors {
+            true => readers::vectors(reads, layouts),
+            false => readers::storage(reads),
+        };
+        let source = format!("enable f16;\n{readers}{joined}");
+        let mut module = Module::parse(format!("{name}_converting"), source);
+        (module.streams_results, module.converts) = (*streams_results, true);
+        module
+    });
     let texels = has_texels.then(|| {
         let wide = files.iter().flat_map(|&file| match file {
             "stores/f32" => WIDE_STORE.to_vec(),
@@ -199,7 +232,11 @@ fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
         let source = readers::texels(reads, &storage.parsed) + &joined;
         Module::parse(format!("{name}_texels"), source)
     });
-    (storage, texels)
+    Variants {
+        storage,
+        texels,
+        converting,
+    }
 }
 
 fn read_shader(file: &str) -> String {
@@ -216,7 +253,8 @@ impl Module {
         let parsed = Frontend::new_with_options(options)
             .parse(&source)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
-        let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
+        let capabilities =
+            Capabilities::IMMEDIATES | Capabilities::SHADER_INT64 | Capabilities::SHADER_FLOAT16;
         let info = Validator::new(ValidationFlags::all(), capabilities)
             .validate(&parsed)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
@@ -226,6 +264,7 @@ impl Module {
             parsed,
             info,
             streams_results: false,
+            converts: false,
             layouts: None,
         }
     }
@@ -253,6 +292,7 @@ impl Module {
             parsed,
             info,
             streams_results,
+            converts,
             ..
         } = self;
         let options = spv::Options {
@@ -261,6 +301,7 @@ impl Module {
             force_loop_bounding: false,
             flags: spv::WriterFlags::empty(),
             // What a workgroup shares is written before it is read.
+            use_storage_input_output_16: false,
             zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
             ..spv::Options::default()
         };
@@ -272,8 +313,11 @@ impl Module {
             exactness::workgroup_layouts(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
             exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words =
-            exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let words = match converts {
+            true => exactness::of_halves(&words),
+            false => exactness::no_contraction(&words),
+        };
+        let words = words.unwrap_or_else(|error| panic!("{name}: {error}"));
         match streams_results {
             true => exactness::nontemporal_stores(&words)
                 .unwrap_or_else(|error| panic!("{name}: {error}")),

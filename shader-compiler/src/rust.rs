@@ -225,6 +225,8 @@ pub(crate) struct Compiled {
     pub(crate) words: usize,
     /// Of its variant that reads texel buffers.
     pub(crate) texel_words: Option<usize>,
+    /// Those of the variant that converts to half precision.
+    pub(crate) converting_words: Option<usize>,
 }
 
 /// The kernels as Rust: an enum of their names, their code, and the choice of a kernel by form,
@@ -290,14 +292,17 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
             bindings,
             words,
             texel_words,
+            converting_words,
         } = kernel;
         let texels = texel_words.map(|words| (format!("{name}_texels"), words));
+        let converting = converting_words.map(|words| (format!("{name}_converting"), words));
         let segments = over_segments
             .get(name)
             .map_or_else(|| "None".to_owned(), |choice| format!("Some({choice})"));
         writeln!(
             text,
             "    KernelCode {{ kernel: Kernel::{}, storage: ({name:?}, {words}), texels: {texels:?}, \
+             converting: {converting:?}, \
              bindings: &[{}], segments: {segments} }},",
             variant(name),
             bindings.join(", ")

@@ -39,6 +39,8 @@ pub(crate) struct Kernel {
     pub(crate) loads_vectors: bool,
     /// Whether its results go past the caches, so that what it reads stays there.
     pub(crate) streams_results: bool,
+    /// Whether it has a variant that converts to half precision as the device does.
+    pub(crate) converts: bool,
 }
 
 /// The forms of segments, each with what its formula needs.
@@ -160,8 +162,8 @@ pub(crate) fn stores() -> Vec<Store> {
             .expect("a file's name")
             .display()
             .to_string();
-        let is_wide = WIDE_STORE.contains(&&*format!("stores/{name}"));
-        if text.contains("\nfn store(") && !is_wide {
+        let is_variant = [WIDE_STORE[1], CONVERTING_STORE].contains(&&*format!("stores/{name}"));
+        if text.contains("\nfn store(") && !is_variant {
             let mut lines = text.lines();
             let needed = lines.find_map(|line| line.strip_prefix("// Needs: "));
             let needed = needed.map_or_else(Vec::new, |files| {
@@ -392,6 +394,9 @@ const SELF_TEST: [&str; 3] = ["math/sine_cosine", "math/arc_tangent", "self_test
 /// that use these store words of 64 bits.
 pub(crate) const WIDE_STORE: [&str; 2] = ["math/wide", "stores/f32_wide"];
 
+/// The file that takes the place of `stores/f16` in kernels of devices whose conversions round as it does.
+pub(crate) const CONVERTING_STORE: &str = "stores/f16_converted";
+
 /// Every kernel.
 pub(crate) fn kernels() -> Vec<Kernel> {
     let mut kernels = vec![Kernel {
@@ -401,6 +406,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         has_texels: false,
         loads_vectors: false,
         streams_results: false,
+        converts: false,
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
@@ -423,6 +429,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
                     has_texels: folder.is_none(),
                     loads_vectors: folder == Some(SPREAD),
                     streams_results: folder.is_some(),
+                    converts: folder.is_some() && store.name == "f16",
                 });
             }
         }
@@ -439,6 +446,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: true,
             loads_vectors: false,
             streams_results: false,
+            converts: false,
         });
     }
     for file in POSES {
@@ -456,6 +464,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
             loads_vectors: false,
             streams_results: false,
+            converts: false,
         });
     }
     for (name, shared, parts) in CROWD_JOINTS {
@@ -466,6 +475,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: true,
             loads_vectors: false,
             streams_results: false,
+            converts: false,
         });
     }
     for (name, parts) in CROWD {
@@ -476,6 +486,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
             loads_vectors: false,
             streams_results: false,
+            converts: false,
         });
     }
     for (name, parts) in CROWD_WHOLE {
@@ -486,6 +497,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
             loads_vectors: false,
             streams_results: false,
+            converts: false,
         });
     }
     kernels.push(Kernel {
@@ -495,6 +507,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         has_texels: false,
         loads_vectors: false,
         streams_results: false,
+        converts: false,
     });
     kernels
 }

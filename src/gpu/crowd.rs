@@ -414,7 +414,9 @@ mod tests {
     fn kernels(crowd: &Crowd, output: CrowdOutput) -> Vec<&'static str> {
         let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
         let kernels = on_device.device.kernels(output).kernels.into_iter();
-        kernels.map(|kernel: Kernel| kernel.code(false).0).collect()
+        kernels
+            .map(|kernel: Kernel| kernel.code(crate::shader::Variants::default()).0)
+            .collect()
     }
 
     #[test]

@@ -22,6 +22,7 @@ use crate::machine::cache::Cache;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::machine::options::{EngineOptions, ReadBack};
+use crate::shader::Variants;
 use crate::threads::lock;
 
 /// The purpose of a submission.
@@ -70,6 +71,14 @@ pub(crate) struct LogicalDevice {
 }
 
 impl LogicalDevice {
+    /// The variants of kernels that the device takes.
+    pub(crate) fn variants(&self) -> Variants {
+        Variants {
+            reads_texels: self.reads_texels,
+            converts: self.physical.converts_halves,
+        }
+    }
+
     pub(crate) fn new(
         physical: PhysicalDevice,
         options: &EngineOptions,
@@ -124,6 +133,14 @@ impl LogicalDevice {
             .enabled_extension_names(&extensions);
         if copies_apart || exports_timelines {
             info = info.push_next(&mut timelines);
+        }
+        let mut halves =
+            vk::PhysicalDeviceShaderFloat16Int8Features::default().shader_float16(true);
+        let mut stored_halves = vk::PhysicalDevice16BitStorageFeatures::default()
+            .storage_buffer16_bit_access(true)
+            .uniform_and_storage_buffer16_bit_access(true);
+        if physical.converts_halves {
+            info = info.push_next(&mut halves).push_next(&mut stored_halves);
         }
         let instance = &physical.instance.raw;
         // SAFETY: the physical device belongs to the instance and has these families.

@@ -18,7 +18,7 @@ use crate::machine::poses::{Pass, PassRunner, SampleRows};
 use crate::memory::reserved;
 use crate::output::pose_error::{OFFSET_STEP, PoseError, check_fraction, check_weights};
 use crate::output::rotations::Layout;
-use crate::shader::{Kernel, Link, PoseDispatch};
+use crate::shader::{Kernel, Link, PoseDispatch, Variants};
 use crate::smooth::rows::{SampleRow, SmoothingPass};
 use crate::work::recording::{Resource, Slice, workgroups};
 
@@ -344,7 +344,7 @@ fn window_of_frames(tracks: usize) -> usize {
 impl std::fmt::Debug for PassTarget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PassTarget")
-            .field("pass", &self.kernel.code(false).0)
+            .field("pass", &self.kernel.code(Variants::default()).0)
             .field("weights", &self.weights)
             .field("bytes", &self.bytes)
             .finish_non_exhaustive()

@@ -50,7 +50,7 @@ impl Pipeline {
     /// The number of storage buffers that a kernel binds on a device: all its buffers, or only the one that it
     /// writes.
     pub(crate) fn storage_buffers(device: &LogicalDevice, kernel: Kernel) -> u32 {
-        let (.., reads_texels) = kernel.code(device.reads_texels);
+        let (.., reads_texels) = kernel.code(device.variants());
         match reads_texels {
             true => 1,
             false => kernel.compiled().bindings.len() as u32,
@@ -59,7 +59,7 @@ impl Pipeline {
 
     /// The hash of a kernel's code on this device.
     pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
-        let (_, code, _) = kernel.code(device.reads_texels);
+        let (_, code, _) = kernel.code(device.variants());
         spirv::hash(&words(device, code, Exactness::Demanded))
     }
 
@@ -68,7 +68,7 @@ impl Pipeline {
         kernel: Kernel,
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
-        let (name, code, reads_texels) = kernel.code(device.reads_texels);
+        let (name, code, reads_texels) = kernel.code(device.variants());
         let mut pipeline = Self {
             device: Arc::clone(device),
             raw: vk::Pipeline::null(),

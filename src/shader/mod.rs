@@ -52,10 +52,21 @@ pub(crate) struct KernelCode {
     storage: (&'static str, usize),
     /// The variant that reads texel buffers, for all bindings but the last.
     texels: Option<(&'static str, usize)>,
+    /// The variant that converts to half precision as the device does.
+    converting: Option<(&'static str, usize)>,
     /// How it uses the buffers that it binds, in the order of the bindings.
     pub(crate) bindings: &'static [Access],
     /// For kernels that evaluate segments: the form, the kind of work list, and the stored encoding.
     pub(crate) segments: Option<(Form, List, Store)>,
+}
+
+/// The variants of kernels that a device takes where they are.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Variants {
+    /// Those that read texel buffers.
+    pub(crate) reads_texels: bool,
+    /// Those that convert to half precision.
+    pub(crate) converts: bool,
 }
 
 impl Kernel {
@@ -66,12 +77,12 @@ impl Kernel {
 
     /// The name, the code, and whether the code reads texel buffers: it does if this is requested and the kernel has
     /// such a variant.
-    pub(crate) fn code(self, reads_texels: bool) -> (&'static str, &'static [u32], bool) {
-        let variants = self.compiled();
-        let (name, reads_texels) = match variants.texels {
-            Some((name, _)) if reads_texels => (name, true),
-            _ => (variants.storage.0, false),
-        };
+    pub(crate) fn code(self, variants: Variants) -> (&'static str, &'static [u32], bool) {
+        let all = self.compiled();
+        let texels = all.texels.filter(|_| variants.reads_texels);
+        let converting = all.converting.filter(|_| variants.converts);
+        let reads_texels = texels.is_some();
+        let (name, _) = texels.or(converting).unwrap_or(all.storage);
         let mut all = kernels();
         let (_, code) = all
             .find(|kernel| kernel.0 == name)
@@ -84,7 +95,7 @@ impl Kernel {
 /// controls that are added for the device.
 pub fn kernels() -> impl Iterator<Item = (&'static str, &'static [u8])> {
     let all = KERNELS.iter();
-    let all = all.flat_map(|kernel| [Some(kernel.storage), kernel.texels]);
+    let all = all.flat_map(|kernel| [Some(kernel.storage), kernel.texels, kernel.converting]);
     let mut rest = &SPIRV.0;
     all.flatten().map(move |(name, words)| {
         let (code, behind) = rest.split_at(4 * words);

@@ -95,14 +95,32 @@ pub struct FloatControls {
 /// # Errors
 /// When the words are not a complete module.
 pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>, SpirvError> {
-    // (capability, execution mode), SPIR-V 1.4; by extension before that.
-    let modes: Vec<(u32, u32)> = [
+    // SPIR-V 1.4; by extension before that.
+    let modes: Vec<Mode> = [
         (offered.preserve_signed_zero_inf_nan, (4466, 4461)),
         (offered.round_to_nearest_even, (4467, 4462)),
     ]
     .into_iter()
-    .filter_map(|(is_offered, mode)| is_offered.then_some(mode))
+    .filter(|(is_offered, _)| *is_offered)
+    .map(|(_, (capability, mode))| Mode {
+        capability,
+        mode,
+        width: 32,
+    })
     .collect();
+    with_modes(module, &modes)
+}
+
+/// An execution mode for floats of a width, and the capability that it needs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mode {
+    pub(crate) capability: u32,
+    pub(crate) mode: u32,
+    pub(crate) width: u32,
+}
+
+/// Adds modes of float controls to every entry point.
+pub(crate) fn with_modes(module: &[u32], modes: &[Mode]) -> Result<Vec<u32>, SpirvError> {
     let code = instructions(module)?;
     if modes.is_empty() {
         return Ok(module.to_vec());
@@ -123,7 +141,7 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
     }
 
     let mut head = Vec::new();
-    for &(capability, _) in &modes {
+    for &Mode { capability, .. } in modes {
         head.extend([instruction_word(op::CAPABILITY, 2), capability]);
     }
     let name = string_words("SPV_KHR_float_controls");
@@ -132,8 +150,8 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
     let mut execution_modes = Vec::new();
     for entry in &entry_points {
         let id = entry.word(2)?;
-        for &(_, mode) in &modes {
-            execution_modes.extend([instruction_word(op::EXECUTION_MODE, 4), id, mode, 32]);
+        for &Mode { mode, width, .. } in modes {
+            execution_modes.extend([instruction_word(op::EXECUTION_MODE, 4), id, mode, width]);
         }
     }
     Ok([

@@ -1,4 +1,5 @@
-//! Half precision, of `shaders/stores/f16.wgsl` and `shaders/math/half.wgsl`.
+//! Half precision, of `shaders/stores/f16.wgsl` and `shaders/math/half.wgsl`, and of `shaders/stores/f16_converted.wgsl`,
+//! which has the device convert.
 
 pub(crate) use crate::twin::functions::to_half;
 

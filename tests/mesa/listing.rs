@@ -166,6 +166,13 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
         "min_f32" | "max_f32" => true,
         "cvt_f32_i32" | "cvt_f32_u32" | "cvt_f32_ubyte0" | "cvt_f32_ubyte1" | "cvt_f32_ubyte2"
         | "cvt_f32_ubyte3" => true,
+        // The pass leaves it in kernels that ask for its rounding.
+        "cvt_f16_f32" => true,
+        // The same: a product with 1 and a sum with -0, which change nothing before the conversion.
+        "fma_mixlo_f16" | "fma_mixhi_f16" => {
+            let zero = operands.get(3).copied().unwrap_or_default();
+            operands.get(1) == Some(&"1.0") && (zero.starts_with("neg(0)") || zero == "neg(lo(0))")
+        }
         _ if name.starts_with("cmp_") || name.starts_with("cmpx_") => true,
         "mad_f32" | "mac_f32" | "madak_f32" | "madmk_f32" => generation == Generation::Gcn,
         // The product with a power of two is exact, and the sum is rounded once.
@@ -199,6 +206,9 @@ fn what_rounds_otherwise_is_refused() {
         "v_fmac_f32_e32 v1, 0.5, v2",
         "v_fmamk_f32 v1, v2, 0x40800000, v3",
         "v_min_f32_e32 v1, v2, v3",
+        "v_cvt_f16_f32_e32 v1, v2",
+        "v_fma_mixlo_f16 v1, 1.0, v2, neg(lo(0))",
+        "v_fma_mixhi_f16 v1, 1.0, v2, neg(0) op_sel_hi:[0,0,1]",
         "v_mad_u32_u24 v1, v2, v3, v4",
         "v_lshl_add_u32 v1, v2, 2, v3",
         "buffer_store_dwordx4 v[0:3], v4, s[0:3], 0 offen",
@@ -223,7 +233,7 @@ fn what_rounds_otherwise_is_refused() {
         "v_dual_dot2acc_f32_f16 v1, v2, v3",
         "v_rcp_f32_e32 v1, v2",
         "v_min3_f32 v1, v2, v3, v4",
-        "v_cvt_f16_f32_e32 v1, v2",
+        "v_fma_mixlo_f16 v1, 1.0, v2, v3",
         "v_add_f32_e64 v1, v2, v3 mul:2",
         "v_add_f32_e64 v1, v2, v3 clamp",
     ] {

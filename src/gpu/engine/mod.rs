@@ -161,6 +161,7 @@ impl VulkanEngine {
             physical.float_controls = FloatControls::default();
         }
         physical.has_int64 &= handles.shader_int64;
+        physical.converts_halves = false; // the application enabled what it needs
         let pipelines = match handles.pipeline_cache {
             Some(cache) => PipelineCache::of_application(cache, &physical),
             None => PipelineCache::new(&handles.device, &physical, &options.cache_files),
@@ -286,7 +287,7 @@ impl VulkanEngine {
     }
 
     fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
-        let (name, ..) = code.kernel.code(self.device.reads_texels);
+        let (name, ..) = code.kernel.code(self.device.variants());
         let hash = Pipeline::code_hash(&self.device, code.kernel);
         KernelCheck {
             name,

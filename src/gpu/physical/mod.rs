@@ -60,6 +60,9 @@ pub(crate) struct PhysicalDevice {
     pub(crate) pipeline_cache: (u32, u32, [u8; 16]),
     /// Whether shaders may use integers of 64 bits.
     pub(crate) has_int64: bool,
+    /// Whether kernels convert to half precision: conversions round to nearest, ties to even, and keep subnormal
+    /// numbers, whatever numbers of 32 bits do, and buffers may have halves.
+    pub(crate) converts_halves: bool,
     /// Whether memory and semaphores can be exported as file descriptors (`VK_KHR_external_memory_fd`,
     /// `VK_KHR_external_semaphore_fd`).
     pub(crate) memory_files: bool,
@@ -156,9 +159,26 @@ impl PhysicalDevice {
         if reports_timelines {
             features = features.push_next(&mut timelines);
         }
-        // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
+        let mut halves = vk::PhysicalDeviceShaderFloat16Int8Features::default();
+        let mut stored_halves = vk::PhysicalDevice16BitStorageFeatures::default();
+        if core_1_2 {
+            features = features
+                .push_next(&mut halves)
+                .push_next(&mut stored_halves);
+        }
+        // SAFETY: Vulkan 1.1; the device knows the structures that are chained.
         unsafe { vk_instance.get_physical_device_features2(raw, &mut features) };
         let has_int64 = features.features.shader_int64 == vk::TRUE;
+        let converts_halves = [
+            halves.shader_float16,
+            stored_halves.storage_buffer16_bit_access,
+            stored_halves.uniform_and_storage_buffer16_bit_access,
+            controls.shader_rounding_mode_rte_float16,
+            controls.shader_rounding_mode_rte_float32,
+            controls.shader_denorm_preserve_float16,
+        ];
+        let converts_halves = converts_halves.iter().all(|is_there| *is_there == vk::TRUE)
+            && controls.denorm_behavior_independence != vk::ShaderFloatControlsIndependence::NONE;
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
                 == vk::TRUE,
@@ -208,6 +228,7 @@ impl PhysicalDevice {
             has_timelines: timelines.timeline_semaphore == vk::TRUE,
             timelines_extension: reports_timelines && !core_1_2,
             has_int64,
+            converts_halves,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             non_coherent_atom: limits.non_coherent_atom_size.max(1),
             storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
