@@ -10,6 +10,7 @@ mod cases;
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod codes;
 mod dat_fixtures;
+mod dialects;
 mod end_frame;
 #[cfg(feature = "fbx")]
 mod fbx;
@@ -36,6 +37,7 @@ mod readme;
 mod reduce;
 mod robots;
 mod round_trip;
+mod scalars;
 mod skins;
 mod support;
 mod table_options;

@@ -12,8 +12,9 @@ mod clip;
 mod document;
 mod linear;
 mod mapped;
-mod plan;
+pub(crate) mod plan;
 pub mod rotation_vector;
+pub(crate) mod scalars;
 mod smpl;
 mod tumble_layout;
 mod world_bodies;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 
 pub use crate::array::NumberArray;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::dialect;
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
@@ -59,6 +61,7 @@ pub static FORMAT: Format = Format {
         Feature::RestRotations,
         Feature::Translations,
         Feature::Scales,
+        Feature::Scalars,
         Feature::Steps,
         Feature::Lines,
         Feature::Curves,
@@ -99,14 +102,14 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         None => read_known(&archive, options).map(|(plan, loaded)| (Some(plan), loaded)),
     };
     match read {
-        Ok((Some(plan), loaded)) => {
+        Ok((Some(plan), loaded)) if !plan.is_part => {
             let document = NpzDocument::new(archive, plan, &loaded.clips[0]);
             Ok(Loaded {
                 document: Some(Arc::new(document)),
                 ..loaded
             })
         }
-        Ok((None, loaded)) => Ok(loaded),
+        Ok((_, loaded)) => Ok(loaded),
         Err(error) => match error.code {
             // The keys may be in arrays of objects; others are not looked at.
             Code::Pickled | Code::UnknownArrays | Code::Map if archive.has_objects() => {
@@ -152,11 +155,14 @@ fn read_known(
     options: &ReadOptions,
 ) -> Result<(ArchivePlan, Loaded), Diagnostic> {
     let mut warnings = Warnings::new(&archive.file);
-    let plan = match tumble_layout::plan(archive)? {
+    let plan = match tumble_layout::plan(archive, &mut warnings)? {
         Some(plan) => Some(plan),
         None => match smpl::plan(archive, &mut warnings)? {
             Some(plan) => Some(plan),
-            None => world_bodies::plan(archive)?,
+            None => match world_bodies::plan(archive, &mut warnings)? {
+                Some(plan) => Some(plan),
+                None => dialect::plan(archive, &mut warnings)?,
+            },
         },
     };
     let mut plan = plan.ok_or_else(|| {

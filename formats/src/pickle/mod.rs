@@ -49,8 +49,11 @@ pub static FORMAT: Format = Format {
         Feature::Quaternions,
         Feature::TrackNames,
         Feature::Skeleton,
+        Feature::ClipName,
+        Feature::SeveralClips,
         Feature::Translations,
         Feature::Scales,
+        Feature::Scalars,
         Feature::Curves,
         Feature::World,
         Feature::UnevenTimes,
@@ -69,6 +72,8 @@ pub static FORMAT: Format = Format {
 /// The values of a pickle.
 pub struct Contents {
     archive: Archive,
+    /// The dicts of a dict that holds nothing else, by their keys, and the number of values before each.
+    dicts: Vec<(String, usize)>,
     /// Warnings about the file.
     pub warnings: Vec<Diagnostic>,
 }
@@ -135,10 +140,11 @@ impl Contents {
             warnings.warn(Code::TrailingBytes, || (None, message));
         }
         let values = Values::of(file, &bytes, &tree, name, &budget, &mut warnings)?;
-        let (members, added) = values;
+        let (members, dicts, added) = values;
         bytes.extend(added);
         Ok(Self {
             archive: Archive::of_values(file, bytes, budget, members),
+            dicts,
             warnings: warnings.into_list(),
         })
     }
@@ -212,10 +218,68 @@ pub fn read_pickle(
 }
 
 fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let dicts = contents.dicts.clone();
     let (archive, warnings) = contents.into_parts();
-    let mut loaded = npz::of_values(&archive, options)?;
+    let mut loaded = match npz::of_values(&archive, options) {
+        // Each entry may be a clip.
+        Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {
+            clips_of_dicts(archive, &dicts, options).ok_or(error)?
+        }
+        read => read?,
+    };
     loaded.warnings.splice(0..0, warnings);
     Ok(loaded)
+}
+
+/// The clips that are the dicts of a dict; `None` if none of them is one.
+fn clips_of_dicts(
+    mut archive: Archive,
+    dicts: &[(String, usize)],
+    options: &ReadOptions,
+) -> Option<Loaded> {
+    let mut all = Loaded::default();
+    let mut members = std::mem::take(&mut archive.members);
+    let mut is_any = false;
+    for (index, (key, start)) in dicts.iter().enumerate().rev() {
+        archive.members = members.split_off(*start);
+        for member in &mut archive.members {
+            let name = member.name.strip_prefix(&**key);
+            let name = name.and_then(|name| name.strip_prefix('.'));
+            member.name = name.unwrap_or_default().to_owned();
+        }
+        match npz::of_values(&archive, options) {
+            Ok(mut loaded) => {
+                is_any = true;
+                for clip in &mut loaded.clips {
+                    clip.name = Some(key.clone());
+                    clip.index = index;
+                }
+                all.clips.append(&mut loaded.clips);
+                for warning in loaded.warnings {
+                    let known = all.warnings.iter_mut().find(|it| it.code == warning.code);
+                    match known {
+                        Some(known) => {
+                            let count = known.count + warning.count;
+                            *known = Diagnostic { count, ..warning };
+                        }
+                        None => all.warnings.push(warning),
+                    }
+                }
+            }
+            Err(mut error) => {
+                let place = error.location.map(|place| place.to_string());
+                let place = place.filter(|place| place.starts_with("['"));
+                error.location = None;
+                let place = place.unwrap_or_else(|| format!("['{key}']"));
+                let error = error.inside(place);
+                is_any |= error.code != Code::UnknownArrays;
+                all.refused.push(error);
+            }
+        }
+    }
+    all.clips.reverse();
+    all.refused.reverse();
+    is_any.then_some(all)
 }
 
 /// The values of an array of objects in a file, whose pickle is some of its bytes.

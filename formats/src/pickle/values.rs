@@ -26,6 +26,8 @@ pub(super) struct Values<'a> {
     /// Bytes that are not in the input; they are to follow it.
     added: Vec<u8>,
     members: Vec<Member>,
+    /// The dicts of a dict, by their keys, and the number of members before each.
+    entries: Vec<(String, usize)>,
     /// The objects of unknown classes, in words.
     inert: Vec<String>,
 }
@@ -36,10 +38,15 @@ struct Visit {
     /// The value as an expression of Python without the name of the whole.
     place: String,
     node: NodeId,
+    /// The value that it is part of.
+    parent: Option<NodeId>,
+    /// Its key there.
+    key: String,
 }
 
 impl<'a> Values<'a> {
-    /// The members of an archive with the values, and the bytes that are to follow the input. `name` is that of the
+    /// The members of an archive with the values; the dicts of a dict, with the number of members before each, if it
+    /// holds nothing else; and the bytes that are to follow the input. `name` is that of the
     /// whole value, or empty.
     ///
     /// # Errors
@@ -51,7 +58,7 @@ impl<'a> Values<'a> {
         name: &str,
         budget: &'a Budget,
         warnings: &mut Warnings,
-    ) -> Result<(Vec<Member>, Vec<u8>), Diagnostic> {
+    ) -> Result<(Vec<Member>, Vec<(String, usize)>, Vec<u8>), Diagnostic> {
         let mut values = Self {
             file,
             input,
@@ -59,19 +66,29 @@ impl<'a> Values<'a> {
             budget,
             added: Vec::new(),
             members: Vec::new(),
+            entries: Vec::new(),
             inert: Vec::new(),
         };
         values.visit(Visit {
             name: name.to_owned(),
             place: name.to_owned(),
             node: tree.root,
+            parent: None,
+            key: String::new(),
         })?;
+        let is_dict_of_dicts = match &tree.nodes[tree.root.index()] {
+            Node::Dict(pairs) => pairs.len() == values.entries.len(),
+            _ => false,
+        };
+        if !is_dict_of_dicts {
+            values.entries.clear();
+        }
         let count = values.inert.len();
         if let Some(objects) = listed(values.inert) {
             let message = format!("objects of classes that are not read: {objects}");
             warnings.warn_of(count, Code::InertObjects, || (None, message));
         }
-        Ok((values.members, values.added))
+        Ok((values.members, values.entries, values.added))
     }
 
     fn visit(&mut self, root: Visit) -> Result<(), Diagnostic> {
@@ -84,6 +101,9 @@ impl<'a> Values<'a> {
             match &tree.nodes[node.index()] {
                 Node::None => {}
                 Node::Dict(pairs) => {
+                    if visit.parent == Some(tree.root) {
+                        self.entries.push((visit.key.clone(), self.members.len()));
+                    }
                     let first = stack.len();
                     for (index, &(key, value)) in pairs.iter().enumerate() {
                         let key = self.key(key, index);
@@ -274,7 +294,13 @@ impl<'a> Values<'a> {
         };
         let place = format!("{}{place}", parent.place);
         self.take(1, size_of::<Visit>() + name.len() + place.len())?;
-        Ok(Visit { name, place, node })
+        Ok(Visit {
+            name,
+            place,
+            node,
+            parent: Some(parent.node),
+            key: key.to_owned(),
+        })
     }
 
     /// A key as a name: a text, or a whole number.
@@ -310,6 +336,8 @@ impl Visit {
             name: self.name.clone(),
             place: self.place.clone(),
             node: self.node,
+            parent: self.parent,
+            key: self.key.clone(),
         }
     }
 }
