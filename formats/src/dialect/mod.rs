@@ -9,6 +9,7 @@ mod mimickit;
 mod mjlab;
 mod motion_lib;
 mod protomotions;
+pub(crate) mod text;
 
 use tumble::Layout;
 

@@ -173,9 +173,20 @@ fn read_known(
         );
         Diagnostic::new(&archive.file, Code::UnknownArrays, message)
     })?;
-    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
+    let loaded = read_plan(archive, &mut plan, options, warnings)?;
+    Ok((plan, loaded))
+}
+
+/// Reads the arrays of a plan.
+pub(crate) fn read_plan(
+    archive: &Archive,
+    plan: &mut ArchivePlan,
+    options: &ReadOptions,
+    mut warnings: Warnings,
+) -> Result<Loaded, Diagnostic> {
+    let clip = clip::read(archive, plan, options, &mut warnings)?;
     plan.warn_of_others(archive, options, &mut warnings);
-    Ok((plan, Loaded::of(clip, warnings.into_list())))
+    Ok(Loaded::of(clip, warnings.into_list()))
 }
 
 /// Reads arrays as those of an NPZ file that is not written again.
@@ -191,11 +202,8 @@ pub(crate) fn of_values(archive: &Archive, options: &ReadOptions) -> Result<Load
 
 /// Reads arrays whose meaning a map specifies.
 fn read_mapped(archive: &Archive, map: &Map, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut warnings = Warnings::new(&archive.file);
     let mut plan = mapped::plan(archive, map)?;
-    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
-    plan.warn_of_others(archive, options, &mut warnings);
-    Ok(Loaded::of(clip, warnings.into_list()))
+    read_plan(archive, &mut plan, options, Warnings::new(&archive.file))
 }
 
 /// Reads the numbers of an NPY file.

@@ -63,11 +63,9 @@ impl ArchivePlan {
             return Err(archive.refuse(member, Code::Shape, message));
         }
         let names = names.unwrap_or_else(|| {
-            let name = &archive.members[member].name;
             warnings.warn(Code::UnnamedJoints, || {
                 let message = format!(
-                    "the file does not name the {count} joints of `{name}`; they are called joint_0, joint_1 …, in \
-                     the order of the file"
+                    "the file does not name its {count} joints; they are called joint_0, joint_1 …, in the order of the file"
                 );
                 (None, message)
             });
