@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use tumble::glam::Quat;
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npy::read_numbers;
+use tumble_formats::pickle::Contents;
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
 
 use crate::support::shared_data;
@@ -154,6 +155,20 @@ fn files_of_robots_hold_the_stored_numbers() {
             .name,
         "waist_yaw"
     );
+    // A person, whose pelvis is where `transl` has it.
+    let person = open("gvhmr.pt");
+    assert_eq!(codes(&person), [Code::AssumedRate]);
+    let path = layouts().unwrap().join("gvhmr.pt");
+    let stored = Contents::open(&path, &ReadOptions::default()).unwrap();
+    let stored = stored.numbers("smpl_params_global.transl").unwrap().values;
+    let set = &person.clips[0].set;
+    let keys = set.vector_keys(tumble::Channel::Translation, 0).unwrap();
+    let found: Vec<f64> = keys
+        .keys
+        .iter()
+        .flat_map(|key| key.as_dvec3().to_array())
+        .collect();
+    assert_eq!((found, set.track_count()), (stored, 22));
     // Breadth first, with other joints in other places, and nothing that says so.
     assert_eq!(open("beyondmimic.npz").clips[0].set.scalar_count(), 13);
 }

@@ -5,6 +5,7 @@
 //! follow from these, are not read.
 
 mod gmr;
+pub(crate) mod gvhmr;
 mod mimickit;
 mod mjlab;
 mod motion_lib;

@@ -18,6 +18,7 @@ use std::path::Path;
 use crate::array::{Element, NumberArray};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::dialect;
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::limits::Limits;
@@ -219,7 +220,15 @@ pub fn read_pickle(
 
 fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let dicts = contents.dicts.clone();
-    let (archive, warnings) = contents.into_parts();
+    let (mut archive, mut warnings) = contents.into_parts();
+    if options.map.is_none()
+        && let Some((options, assumed)) = dialect::gvhmr::narrowed(&mut archive, options)
+    {
+        warnings.extend(assumed);
+        let mut loaded = npz::of_values(&archive, &options)?;
+        loaded.warnings.splice(0..0, warnings);
+        return Ok(loaded);
+    }
     let mut loaded = match npz::of_values(&archive, options) {
         // Each entry may be a clip.
         Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {
