@@ -1,4 +1,4 @@
-//! MimicKit's motion of a robot: a pickle of a dict, with a list for each frame.
+//! `MimicKit`'s motion of a robot: a pickle of a dict, with a list for each frame.
 
 use tumble::Layout;
 

@@ -1,4 +1,4 @@
-//! A motion of ProtoMotions: a file of `torch.save` with the state of a simulation.
+//! A motion of `ProtoMotions`: a file of `torch.save` with the state of a simulation.
 
 use super::{Axis, Dialect, root_and_joints};
 use crate::npz::plan::KeyKind;

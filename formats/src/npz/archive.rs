@@ -195,11 +195,6 @@ impl Archive {
         &self.bytes
     }
 
-    /// Where the bytes of a member are in the file; `None` if they are packed.
-    pub(crate) fn stored(&self, member: &Member) -> Option<Range<usize>> {
-        (!member.is_deflated).then(|| member.data.clone())
-    }
-
     /// Takes memory for `count` elements of `bytes` each from the file's budget.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
         self.budget
@@ -352,6 +347,11 @@ impl Member {
             data,
             checksum: None,
         }
+    }
+
+    /// Where the bytes are in the file; `None` if they are packed.
+    pub(crate) fn stored(&self) -> Option<Range<usize>> {
+        (!self.is_deflated).then(|| self.data.clone())
     }
 
     /// Where the pickle of an array of objects begins in the member; `None` for others.

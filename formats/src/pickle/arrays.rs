@@ -1,4 +1,4 @@
-//! Arrays of NumPy, sparse matrices of SciPy and arrays of chumpy, as their pickles store them.
+//! Arrays of `NumPy`, sparse matrices of `SciPy` and arrays of chumpy, as their pickles store them.
 
 use std::borrow::Cow;
 
@@ -204,7 +204,7 @@ impl Machine<'_> {
         let &[height, width] = &*shape else {
             return Err(wrong());
         };
-        let count = height.checked_mul(width).unwrap_or(usize::MAX);
+        let count = height.saturating_mul(width);
         self.charge(count, size_of::<f64>())?;
         if width.checked_add(1) != Some(starts.len()) || rows.len() != values.len() {
             return Err(wrong());

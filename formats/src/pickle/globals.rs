@@ -40,7 +40,7 @@ pub(super) enum Global {
     Path,
 }
 
-/// The type of the numbers of a storage of PyTorch.
+/// The type of the numbers of a storage of `PyTorch`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StorageKind {
     Float,
@@ -55,7 +55,7 @@ pub(super) enum StorageKind {
     Bool,
 }
 
-/// The modules and the name of each. NumPy 2 renamed `numpy.core`, Python 3 `__builtin__` and `copy_reg`.
+/// The modules and the name of each. `NumPy` 2 renamed `numpy.core`, Python 3 `__builtin__` and `copy_reg`.
 const KNOWN: &[(&[&str], &str, Global)] = &[
     (NUMPY_MULTIARRAY, "_reconstruct", Global::Reconstruct),
     (NUMPY_MULTIARRAY, "scalar", Global::Scalar),

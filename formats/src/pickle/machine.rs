@@ -2,7 +2,7 @@
 //!
 //! Values are nodes of one list and refer to each other by index. So objects may share values and change after they
 //! are referred to, as in Python, and neither reading nor freeing them is recursive. What the names of a few classes
-//! mean stands in `globals`; the arrays of NumPy, joblib and PyTorch are made in the modules beside this one.
+//! mean stands in `globals`; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -135,7 +135,7 @@ pub(super) struct Machine<'a> {
     /// Where the opcode is that is carried out.
     opcode: usize,
     budget: &'a Budget,
-    /// The storages of a file of PyTorch.
+    /// The storages of a file of `PyTorch`.
     pub(super) storages: Option<&'a Storages>,
     nodes: Vec<Node>,
     stack: Vec<NodeId>,

@@ -26,7 +26,7 @@ use crate::npz;
 use crate::npz::archive::Archive;
 use crate::pickle::machine::Machine;
 use crate::pickle::torch::Storages;
-use crate::pickle::values::Values;
+use crate::pickle::values::{NamedValues, Values};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
@@ -84,7 +84,7 @@ pub struct Contents {
 pub struct Entry {
     /// Its name: of the entry `b` of a dict that is the entry `a`, `a.b`.
     pub name: String,
-    /// Its shape and its type as in NumPy: `(31, 13) f8`; of an object that is not read, its class.
+    /// Its shape and its type as in `NumPy`: `(31, 13) f8`; of an object that is not read, its class.
     pub kind: String,
     /// A single number or text, of which 60 characters are kept.
     pub value: Option<String>,
@@ -140,8 +140,11 @@ impl Contents {
             let message = format!("{after} bytes after the end of the pickle are not read");
             warnings.warn(Code::TrailingBytes, || (None, message));
         }
-        let values = Values::of(file, &bytes, &tree, name, &budget, &mut warnings)?;
-        let (members, dicts, added) = values;
+        let NamedValues {
+            members,
+            dicts,
+            added,
+        } = Values::of(file, &bytes, &tree, name, &budget, &mut warnings)?;
         bytes.extend(added);
         Ok(Self {
             archive: Archive::of_values(file, bytes, budget, members),

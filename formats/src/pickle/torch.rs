@@ -7,7 +7,7 @@ use half::bf16;
 
 use crate::array::{Element, shape_text};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::npz::archive::Archive;
+use crate::npz::archive::{Archive, Member};
 use crate::pickle::arrays::Dtype;
 use crate::pickle::globals::{Class, Global, StorageKind};
 use crate::pickle::machine::{Data, Machine, Node, NodeId};
@@ -15,7 +15,7 @@ use crate::pickle::machine::{Data, Machine, Node, NodeId};
 /// How the name of the pickle in an archive ends.
 const PICKLE: &str = "/data.pkl";
 
-/// How a file of PyTorch before 1.6 begins: with a pickle of a number.
+/// How a file of `PyTorch` before 1.6 begins: with a pickle of a number.
 const BEFORE_ARCHIVES: &[u8] = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19.";
 
 /// Whether a file that begins with these bytes is an archive of `torch.save`, whose first member is its pickle.
@@ -28,7 +28,7 @@ pub(super) fn is_archive(start: &[u8]) -> bool {
     start.starts_with(b"PK\x03\x04") && name().is_some_and(|name| name.ends_with(PICKLE.as_bytes()))
 }
 
-/// Refuses a file of PyTorch before 1.6.
+/// Refuses a file of `PyTorch` before 1.6.
 pub(super) fn refuse_before_archives(file: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     if !bytes.starts_with(BEFORE_ARCHIVES) {
         return Ok(());
@@ -56,8 +56,8 @@ impl Storages {
                 "it has no pickle, or several; save it with torch.save",
             ));
         };
-        let stored = |member| {
-            let range = archive.stored(member);
+        let stored = |member: &Member| {
+            let range = member.stored();
             range.ok_or_else(|| refuse("a member is compressed; save it with torch.save"))
         };
         let mut pickle = None;
@@ -70,10 +70,8 @@ impl Storages {
                 pickle = Some(stored(member)?);
             } else if let Some(key) = name.strip_prefix("/data/") {
                 members.insert(key.to_owned(), stored(member)?);
-            } else if name == "/byteorder" {
-                if &archive.bytes()[stored(member)?] != b"little" {
-                    return Err(refuse("its numbers are big-endian, which is not read"));
-                }
+            } else if name == "/byteorder" && &archive.bytes()[stored(member)?] != b"little" {
+                return Err(refuse("its numbers are big-endian, which is not read"));
             }
         }
         let pickle = pickle.ok_or_else(|| refuse("it has no pickle"))?;
@@ -89,7 +87,7 @@ pub(super) struct Storage {
 }
 
 impl StorageKind {
-    /// The type of the numbers; `None` for bfloat16, which NumPy lacks.
+    /// The type of the numbers; `None` for bfloat16, which `NumPy` lacks.
     fn element(self) -> Option<Element> {
         Some(match self {
             Self::Float => Element::F32,

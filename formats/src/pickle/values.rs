@@ -32,6 +32,15 @@ pub(super) struct Values<'a> {
     inert: Vec<String>,
 }
 
+/// The values of a pickle as the members of an archive.
+pub(super) struct NamedValues {
+    pub(super) members: Vec<Member>,
+    /// The dicts of a dict that holds nothing else, by their keys, and the number of members before each.
+    pub(super) dicts: Vec<(String, usize)>,
+    /// Bytes that are to follow the input.
+    pub(super) added: Vec<u8>,
+}
+
 /// A value to be visited.
 struct Visit {
     name: String,
@@ -45,9 +54,7 @@ struct Visit {
 }
 
 impl<'a> Values<'a> {
-    /// The members of an archive with the values; the dicts of a dict, with the number of members before each, if it
-    /// holds nothing else; and the bytes that are to follow the input. `name` is that of the
-    /// whole value, or empty.
+    /// Lists the values. `name` is that of the whole value, or empty.
     ///
     /// # Errors
     /// When they take more memory than the budget.
@@ -58,7 +65,7 @@ impl<'a> Values<'a> {
         name: &str,
         budget: &'a Budget,
         warnings: &mut Warnings,
-    ) -> Result<(Vec<Member>, Vec<(String, usize)>, Vec<u8>), Diagnostic> {
+    ) -> Result<NamedValues, Diagnostic> {
         let mut values = Self {
             file,
             input,
@@ -88,7 +95,11 @@ impl<'a> Values<'a> {
             let message = format!("objects of classes that are not read: {objects}");
             warnings.warn_of(count, Code::InertObjects, || (None, message));
         }
-        Ok((values.members, values.entries, values.added))
+        Ok(NamedValues {
+            members: values.members,
+            dicts: values.entries,
+            added: values.added,
+        })
     }
 
     fn visit(&mut self, root: Visit) -> Result<(), Diagnostic> {
