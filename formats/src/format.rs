@@ -112,6 +112,7 @@ impl FormatOption {
     ];
 
     /// The same options, and those for missing keys and for the order of written columns.
+    #[cfg(feature = "parquet")]
     pub(crate) const OF_TABLES: [Self; 7] = [
         Self::RawTimes,
         Self::Duplicates,

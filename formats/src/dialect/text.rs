@@ -91,8 +91,8 @@ pub(crate) fn read(
         if numbers.len() - before != width {
             return Ok(None);
         }
-        let taken = budget.take(width, 2 * size_of::<f64>());
-        taken.map_err(|error| Diagnostic::new(file, Code::Memory, error.to_string()))?;
+        let budgeted = budget.take(width, 2 * size_of::<f64>());
+        budgeted.map_err(|error| Diagnostic::new(file, Code::Memory, error.to_string()))?;
     }
     let norm = |row: &[f64]| row[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
     // A large first number is a time, as that of VINS-Mono's files.

@@ -331,15 +331,15 @@ impl Archive {
 }
 
 impl Member {
-    /// A value in some bytes. `place` says in messages where it is.
+    /// A value in some bytes. `location` says in messages where it is.
     pub(crate) fn of_value(
         name: String,
-        place: String,
+        location: String,
         header: ArrayHeader,
         data: Range<usize>,
     ) -> Self {
         Self {
-            path: place,
+            path: location,
             name,
             header: Ok(header),
             is_deflated: false,

@@ -136,7 +136,7 @@ fn read_with_objects(mut archive: Archive, options: &ReadOptions) -> Result<Load
             let read = pickle::of_objects(&file, &name, bytes, pickle, options.limits);
             let path = &archive.members[index].path;
             let at_member = |error: Diagnostic| match &error.location {
-                Some(place) => error.clone().inside(format!("{path}:{place}")),
+                Some(location) => error.clone().inside(format!("{path}:{location}")),
                 None => error.inside(path),
             };
             let (values, mut found) = read.map_err(at_member)?.into_parts();

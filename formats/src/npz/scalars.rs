@@ -105,7 +105,7 @@ impl ScalarArray {
                 .collect();
             if let Some(bad) = keys.iter().position(|key| !key.is_finite()) {
                 let number = numbers[at(kept[bad])];
-                let place = match self.layout {
+                let location = match self.layout {
                     Layout::FrameMajor => format!("{}, {}", kept[bad], self.first + index),
                     Layout::TrackMajor => format!("{}, {}", self.first + index, kept[bad]),
                 };
@@ -116,7 +116,7 @@ impl ScalarArray {
                     true => &member.name,
                     false => &member.path,
                 };
-                refusal.location = Some(Location::Inside(format!("{name}[{place}]")));
+                refusal.location = Some(Location::Inside(format!("{name}[{location}]")));
                 return Err(refusal);
             }
             let added = clip.add_scalar(*scalar, name, times, &keys, &[]);

@@ -872,8 +872,8 @@ impl<'a> Machine<'a> {
     }
 
     pub(super) fn refuse(&self, code: Code, message: String) -> Diagnostic {
-        let place = format!("byte {}", self.opcode);
-        Diagnostic::new(self.file, code, message).inside(place)
+        let location = format!("byte {}", self.opcode);
+        Diagnostic::new(self.file, code, message).inside(location)
     }
 }
 

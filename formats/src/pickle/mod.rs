@@ -279,11 +279,11 @@ fn clips_of_dicts(
                 }
             }
             Err(mut error) => {
-                let place = error.location.map(|place| place.to_string());
-                let place = place.filter(|place| place.starts_with("['"));
+                let location = error.location.map(|location| location.to_string());
+                let location = location.filter(|location| location.starts_with("['"));
                 error.location = None;
-                let place = place.unwrap_or_else(|| format!("['{key}']"));
-                let error = error.inside(place);
+                let location = location.unwrap_or_else(|| format!("['{key}']"));
+                let error = error.inside(location);
                 is_any |= error.code != Code::UnknownArrays;
                 all.refused.push(error);
             }

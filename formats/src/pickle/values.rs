@@ -45,7 +45,7 @@ pub(super) struct NamedValues {
 struct Visit {
     name: String,
     /// The value as an expression of Python without the name of the whole.
-    place: String,
+    location: String,
     node: NodeId,
     /// The value that it is part of.
     parent: Option<NodeId>,
@@ -78,7 +78,7 @@ impl<'a> Values<'a> {
         };
         values.visit(Visit {
             name: name.to_owned(),
-            place: name.to_owned(),
+            location: name.to_owned(),
             node: tree.root,
             parent: None,
             key: String::new(),
@@ -128,8 +128,8 @@ impl<'a> Values<'a> {
                     }
                     let first = stack.len();
                     for (index, &item) in items.iter().enumerate() {
-                        let place = format!("[{index}]");
-                        stack.push(self.child(&visit, &index.to_string(), &place, item)?);
+                        let location = format!("[{index}]");
+                        stack.push(self.child(&visit, &index.to_string(), &location, item)?);
                     }
                     stack[first..].reverse();
                 }
@@ -286,9 +286,9 @@ impl<'a> Values<'a> {
         } else {
             visit.name
         };
-        self.take(1, VALUE + name.len() + visit.place.len())?;
+        self.take(1, VALUE + name.len() + visit.location.len())?;
         self.members
-            .push(Member::of_value(name, visit.place, header, data));
+            .push(Member::of_value(name, visit.location, header, data));
         Ok(())
     }
 
@@ -296,18 +296,18 @@ impl<'a> Values<'a> {
         &self,
         parent: &Visit,
         key: &str,
-        place: &str,
+        location: &str,
         node: NodeId,
     ) -> Result<Visit, Diagnostic> {
         let name = match parent.name.is_empty() {
             true => key.to_owned(),
             false => format!("{}.{key}", parent.name),
         };
-        let place = format!("{}{place}", parent.place);
-        self.take(1, size_of::<Visit>() + name.len() + place.len())?;
+        let location = format!("{}{location}", parent.location);
+        self.take(1, size_of::<Visit>() + name.len() + location.len())?;
         Ok(Visit {
             name,
-            place,
+            location,
             node,
             parent: Some(parent.node),
             key: key.to_owned(),
@@ -336,8 +336,8 @@ impl<'a> Values<'a> {
     }
 
     fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
-        let taken = self.budget.take(count, bytes);
-        taken.map_err(|error| Diagnostic::new(self.file, Code::PickleLimits, error.to_string()))
+        let budgeted = self.budget.take(count, bytes);
+        budgeted.map_err(|error| Diagnostic::new(self.file, Code::PickleLimits, error.to_string()))
     }
 }
 
@@ -345,7 +345,7 @@ impl Visit {
     fn again(&self) -> Self {
         Self {
             name: self.name.clone(),
-            place: self.place.clone(),
+            location: self.location.clone(),
             node: self.node,
             parent: self.parent,
             key: self.key.clone(),
