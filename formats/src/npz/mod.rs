@@ -14,7 +14,6 @@ mod linear;
 mod mapped;
 pub(crate) mod plan;
 pub mod rotation_vector;
-pub(crate) mod scalars;
 mod smpl;
 mod tumble_layout;
 mod world_bodies;

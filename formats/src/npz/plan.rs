@@ -2,6 +2,7 @@
 //! layout becomes a plan, by which clips are read and files are written again.
 
 mod rate;
+pub(crate) mod scalars;
 mod unread;
 
 use std::ops::Range;
@@ -15,7 +16,7 @@ use crate::motion::WrittenJoint;
 use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
-use crate::npz::scalars::ScalarArray;
+use crate::npz::plan::scalars::ScalarArray;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 

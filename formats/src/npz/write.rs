@@ -15,7 +15,8 @@ use crate::format::{MotionOptions, WriteError};
 use crate::motion::WrittenJoint;
 use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip, Scalar};
 use crate::npz::plan::KeyKind;
-use crate::npz::{rotation_vector, scalars, tumble_layout};
+use crate::npz::plan::scalars;
+use crate::npz::{rotation_vector, tumble_layout};
 use crate::quaternion::ComponentOrder;
 use crate::rate::{Precision, RateSource, of};
 

@@ -4,6 +4,10 @@
 //! are referred to, as in Python, and neither reading nor freeing them is recursive. What the names of a few classes
 //! mean stands in `globals`; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
 
+pub(super) mod arrays;
+pub(super) mod joblib;
+pub(super) mod torch;
+
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -11,9 +15,9 @@ use std::ops::Range;
 use crate::array::ArrayHeader;
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::pickle::arrays::{Dtype, Unbuilt};
 use crate::pickle::globals::{Class, ClassName, Global};
-use crate::pickle::torch::{Storage, Storages};
+use crate::pickle::machine::arrays::{Dtype, Unbuilt};
+use crate::pickle::machine::torch::{Storage, Storages};
 
 /// The deepest nesting of values.
 const MAX_DEPTH: u32 = 1000;

@@ -1,15 +1,12 @@
 //! Pickles of Python, files of joblib and of `torch.save`, as data. No code of a file is run: a machine of this crate
 //! rebuilds numbers, texts, lists, dicts and arrays, and keeps objects of other classes by their names alone.
 //!
-//! `machine` carries out the opcodes; `globals` has the names that mean something; `arrays`, `joblib` and `torch` make
-//! arrays. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
+//! `machine` carries out the opcodes, and its children `arrays`, `joblib` and `torch` make arrays; `globals` has the names that
+//! mean something. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
 //! names there is known here.
 
-mod arrays;
 mod globals;
-mod joblib;
 mod machine;
-mod torch;
 mod values;
 
 use std::ops::Range;
@@ -24,8 +21,8 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::limits::Limits;
 use crate::npz;
 use crate::npz::archive::Archive;
-use crate::pickle::machine::Machine;
-use crate::pickle::torch::Storages;
+use crate::pickle::machine::torch::Storages;
+use crate::pickle::machine::{Machine, joblib, torch};
 use crate::pickle::values::{NamedValues, Values};
 use crate::source::Source;
 use crate::warnings::Warnings;

@@ -130,7 +130,7 @@ impl ScalarArray {
 }
 
 /// Passes some of the scalars of samples, from `first` on, to `put`.
-pub(super) fn put(
+pub(in crate::npz) fn put(
     sampled: &SampledClip<'_>,
     (first, count): (usize, usize),
     layout: Layout,
