@@ -281,6 +281,7 @@ codes! {
     RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
     RobotElement = "E903" elsewhere, "an element that is not read", "It would make or move bodies by rules that are not supported; the message says what to use instead.";
+    TwoDialects = "E908", "arrays of two dialects", "Layouts of robots' motion are recognised by the names and the shapes of their arrays, and the file has those of two. Save one of them, or name the arrays with `--map`.";
     PickleDamaged = "E910", "a pickle that cannot be read", "It is truncated or damaged, or not a pickle. The location is a position in the file, or in what it unpacks to.";
     PickleCalls = "E911", "a pickle that would run code", "It names a function or a class that Python would call when it reads the file. Such files may do anything to the computer of those who open them with Python. Only numbers, texts, lists, dicts and arrays are read.";
     ObjectForValue = "E912", "an object where a value is needed", "The value is an object of a class that is not known here. Save it as numbers, text or an array.";
@@ -346,7 +347,10 @@ codes! {
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
+    AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` gives another.";
     RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
+    UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it.";
+    QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as of a robot that stands where w is first. The columns have no names that say it; `--source-order` does.";
     InertObjects = "W911", "objects of classes that are not read", "They are kept by the names of their classes alone; nothing is looked up or run. A value that the motion needs must not be one of them.";
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
 }

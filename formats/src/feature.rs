@@ -21,6 +21,8 @@ pub enum Feature {
     Translations,
     /// Scales.
     Scales,
+    /// Scalars: numbers over time beside the tracks, such as the angles of a robot's joints.
+    Scalars,
     /// Channels that keep the value of each key until the next one.
     Steps,
     /// Channels that join their keys by straight lines and the shorter arcs. The keys of a file without this feature
@@ -52,7 +54,7 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -61,6 +63,7 @@ impl Feature {
         Self::RestRotations,
         Self::Translations,
         Self::Scales,
+        Self::Scalars,
         Self::Steps,
         Self::Lines,
         Self::Curves,
@@ -106,6 +109,7 @@ impl Feature {
             Self::RestRotations => "rotations at rest",
             Self::Translations => "translations",
             Self::Scales => "scales",
+            Self::Scalars => "scalars",
             Self::Steps => "steps",
             Self::Lines => "linear interpolation",
             Self::Curves => "smooth interpolation",

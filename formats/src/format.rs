@@ -112,6 +112,7 @@ impl FormatOption {
     ];
 
     /// The same options, and those for missing keys and for the order of written columns.
+    #[cfg(feature = "parquet")]
     pub(crate) const OF_TABLES: [Self; 7] = [
         Self::RawTimes,
         Self::Duplicates,
@@ -492,10 +493,12 @@ pub struct ResultShape<'a> {
 impl Format {
     /// Whether these clips, once sampled, are written as clips in this format; otherwise the rotations of one clip
     /// are written as a result. Clips are written if the format stores nothing else, if there are several, or if one
-    /// has a skeleton, translations or scales.
+    /// has a skeleton, translations, scales or scalars.
     #[must_use]
     pub fn takes_motion(&self, clips: &[&Motion]) -> bool {
-        let is_more = |clip: &&Motion| !clip.skeleton.is_empty() || clip.has_vectors();
+        let is_more = |clip: &&Motion| {
+            !clip.skeleton.is_empty() || clip.has_vectors() || clip.set.scalar_count() > 0
+        };
         self.write_motion.is_some()
             && (self.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
     }

@@ -28,6 +28,7 @@ pub mod csv;
 pub mod dat;
 mod decimal;
 pub mod diagnostic;
+pub mod dialect;
 pub mod euroc;
 #[cfg(feature = "fbx")]
 pub mod fbx;
@@ -76,7 +77,7 @@ pub use crate::format::{Format, Loaded, ReadOptions};
 pub use crate::limits::Limits;
 pub use crate::motion::{
     adjust, carried_mesh, compare, end_frame, keyed, keys, origin, outside, packed, poses, reduce,
-    sample, signs, skeleton, smooth, trajectory, trim, world,
+    sample, scalars, signs, skeleton, smooth, trajectory, trim, world,
 };
 use crate::path::PathFormat;
 pub use crate::source::file_kind;

@@ -15,6 +15,7 @@ pub mod packed;
 pub mod poses;
 pub mod reduce;
 pub mod sample;
+pub mod scalars;
 mod select;
 pub mod signs;
 pub mod skeleton;
@@ -32,6 +33,7 @@ use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
 use crate::motion::origin::{coordinate, origin_at_rest, relative};
+pub use crate::motion::scalars::{Scalar, ScalarKind};
 pub use crate::motion::written_joint::{WrittenChannel, WrittenJoint};
 use crate::names::same_named;
 
@@ -52,6 +54,8 @@ pub struct Motion {
     pub skeleton: Vec<Joint>,
     /// How each track's channels are interpolated; empty if rotations have keys and the file specifies no method.
     pub channels: Vec<Channels>,
+    /// What the scalars of `set` are, in their order; empty if nothing is known of them.
+    pub scalars: Vec<Scalar>,
     /// The rate of which all key times are frames, if there is one.
     pub rate: Option<FrameRate>,
     /// Whether rotations and translations are relative to the world instead of the parent.
@@ -83,7 +87,7 @@ pub fn clock_second<'a>(times: impl IntoIterator<Item = &'a f64>) -> i64 {
 }
 
 impl Motion {
-    /// The clip without its tracks, for a clip with other tracks.
+    /// The clip without its tracks and scalars, for a clip with others.
     pub(crate) fn without_tracks(&self) -> Self {
         Self {
             name: self.name.clone(),
@@ -94,6 +98,7 @@ impl Motion {
             no_world: self.no_world.clone(),
             written_joints: self.written_joints.clone(),
             body: self.body.clone(),
+            scalars: Vec::new(),
             ..*self
         }
     }
@@ -205,10 +210,10 @@ impl Motion {
         (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
     }
 
-    /// Whether the tracks are boxes of a chain: rotations alone, without a skeleton or positions.
+    /// Whether the tracks are boxes of a chain: rotations alone, without a skeleton, positions or scalars.
     #[must_use]
     pub fn is_chain(&self) -> bool {
-        self.skeleton.is_empty() && !self.has_vectors()
+        self.skeleton.is_empty() && !self.has_vectors() && self.set.scalar_count() == 0
     }
 
     /// The vector to add to a track's translations ([`origins`](Self::origins)).
@@ -430,6 +435,8 @@ pub struct SampledClip<'a> {
     pub translations: &'a [Vec3],
     /// Scales of all tracks; empty where no track has any.
     pub scales: &'a [Vec3],
+    /// All scalars of the clip, in the order `[sample][scalar]`.
+    pub scalars: &'a [f32],
     /// How the samples were made, for formats that can store it: `("method", "slerp")`.
     pub notes: &'a [(&'a str, String)],
     /// Whether the samples are those of the clip's keys. A format with separate key times for each channel (glTF)
@@ -445,10 +452,16 @@ impl SampledClip<'_> {
     pub(crate) fn checked_len(&self) -> io::Result<usize> {
         let tracks = self.clip.set.track_count();
         let all = tracks.saturating_mul(self.times.len());
+        let scalars = self
+            .clip
+            .set
+            .scalar_count()
+            .saturating_mul(self.times.len());
         let lists = [
             ("rotations", self.rotations.len(), all, false),
             ("translations", self.translations.len(), all, true),
             ("scales", self.scales.len(), all, true),
+            ("scalars", self.scalars.len(), scalars, false),
             ("joints", self.clip.skeleton.len(), tracks, true),
             ("channels", self.clip.channels.len(), tracks, true),
         ];

@@ -10,6 +10,7 @@ mod cases;
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod codes;
 mod dat_fixtures;
+mod dialects;
 mod end_frame;
 #[cfg(feature = "fbx")]
 mod fbx;
@@ -38,6 +39,7 @@ mod reduce;
 mod retarget;
 mod robots;
 mod round_trip;
+mod scalars;
 mod skins;
 mod support;
 mod table_options;

@@ -43,6 +43,7 @@ fn sampled<'a>(clip: &'a Motion, times: &'a [f64], rotations: &'a [Quat]) -> Sam
         rotations,
         translations: &[],
         scales: &[],
+        scalars: &[],
         notes: &[],
         is_at_keys: false,
     }

@@ -71,6 +71,7 @@ fn more_than_a_glb_holds_is_refused_before_any_work() {
         rotations: &[],
         translations: &[],
         scales: &[],
+        scalars: &[],
         notes: &[],
         is_at_keys: false,
     };

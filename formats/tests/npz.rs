@@ -41,6 +41,7 @@ struct Picked {
     times: Vec<f64>,
     rotations: Vec<Quat>,
     translations: Vec<Vec3>,
+    scalars: Vec<f32>,
 }
 
 impl Picked {
@@ -64,6 +65,12 @@ impl Picked {
             times: frames.iter().map(|&frame| all[frame]).collect(),
             rotations: frames.iter().flat_map(keys).collect(),
             translations: frames.iter().flat_map(vectors).collect(),
+            scalars: (frames.iter())
+                .flat_map(|&frame| {
+                    let scalars = 0..clip.set.scalar_count();
+                    scalars.map(move |index| clip.set.scalar(index).unwrap().keys[frame])
+                })
+                .collect(),
         }
     }
 
@@ -75,6 +82,7 @@ impl Picked {
             rotations: &self.rotations,
             translations: &self.translations,
             scales: &[],
+            scalars: &self.scalars,
             notes: &[],
             is_at_keys: false,
         }

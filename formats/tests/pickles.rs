@@ -1,4 +1,4 @@
-//! Pickles: those of Python, NumPy, joblib and PyTorch are read as data, and whatever else a file may be is refused
+//! Pickles: those of Python, NumPy, joblib and `PyTorch` are read as data, and whatever else a file may be is refused
 //! within its memory.
 
 use std::collections::BTreeMap;

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
+use tumble_formats::dialect::DIALECTS;
 use tumble_formats::surface::SurfaceKind;
 use tumble_formats::{FORMATS, Feature, PATHS, SURFACES};
 
@@ -83,6 +84,15 @@ fn the_table_of_paths_is_that_of_the_code() {
         .unwrap();
     }
     update("paths.md", "paths", &table);
+}
+
+#[test]
+fn the_table_of_dialects_is_that_of_the_code() {
+    let mut table = String::from("| dialect | arrays |\n|---|---|\n");
+    for dialect in DIALECTS {
+        writeln!(table, "| {} | {} |", dialect.name, dialect.summary).unwrap();
+    }
+    update("robots.md", "dialects", &table);
 }
 
 /// Compares a table of a page of `docs/` with the code's, or writes it.

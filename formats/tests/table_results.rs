@@ -77,6 +77,7 @@ fn sampled_clips_come_back_bit_for_bit() {
         rotations: &quats,
         translations: &moved,
         scales: &scaled,
+        scalars: &[],
         notes: &[("method", "slerp".to_owned())],
         is_at_keys: false,
     };
@@ -117,6 +118,7 @@ fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
         rotations: &quats[..3 * tracks],
         translations: &[],
         scales: &[],
+        scalars: &[],
         notes: match method {
             "slerp" => &NOTES[..1],
             _ => &NOTES[1..],
@@ -188,6 +190,7 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
         rotations: &rotations(2),
         translations: &[],
         scales: &[],
+        scalars: &[],
         notes: &[],
         is_at_keys: false,
     };

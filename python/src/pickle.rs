@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
 use tumble_formats::motion::{
-    Body, ChannelInterpolation, Channels, Joint, Motion, Shape, Transform,
+    Body, ChannelInterpolation, Channels, Joint, Motion, Scalar, Shape, Transform,
 };
 use tumble_formats::motion::{WrittenChannel, WrittenJoint};
 
@@ -121,6 +121,24 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
         .flat_map(|channel| [channel.rotation, channel.translation, channel.scale].map(number))
         .collect();
     state.set_item("channels", rows(py, channels, 3)?)?;
+    let scalars = PyList::empty(py);
+    for index in 0..motion.set.scalar_count() {
+        let Some(keys) = motion.set.scalar(index) else {
+            continue;
+        };
+        let scalar = motion.scalar(index);
+        scalars.append((
+            keys.name,
+            PyArray1::from_slice(py, keys.times),
+            PyArray1::from_slice(py, keys.keys),
+            rows(py, keys.tangents.as_flattened().to_vec(), 2)?,
+            scalar.kind.name(),
+            scalar.origin,
+            scalar.limits,
+            number(scalar.interpolation),
+        ))?;
+    }
+    state.set_item("scalars", scalars)?;
     let origins: Vec<f64> = motion.origins.iter().flat_map(DVec3::to_array).collect();
     state.set_item("origins", rows(py, origins, 3)?)?;
     let bvh = PyList::empty(py);
@@ -286,6 +304,30 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
             scale,
         }
     });
+    type Scalars<'py> = (
+        String,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+        String,
+        f64,
+        Option<[f64; 2]>,
+        i64,
+    );
+    let mut scalars = Vec::new();
+    let all: Vec<Scalars<'_>> = entry(state, "scalars")?.extract()?;
+    for (name, times, keys, tangents, kind, origin, limits, interpolation) in all {
+        let (times, keys): (Vec<f64>, Vec<f32>) = (list(&times)?, list(&keys)?);
+        let tangents: Vec<[f32; 2]> = chunks(&tangents)?;
+        set.push_scalar(name, &times, &keys, &tangents)
+            .map_err(of_set)?;
+        scalars.push(Scalar {
+            kind: kind.parse().map_err(|_| broken())?,
+            origin,
+            limits,
+            interpolation: sampler(interpolation),
+        });
+    }
     let origins: Vec<[f64; 3]> = chunks(&entry(state, "origins")?)?;
     let bvh: Vec<(Vec<usize>, Bound<'_, PyAny>)> = entry(state, "bvh")?.extract()?;
     let bvh = bvh.into_iter().map(|(channels, sites)| {
@@ -312,6 +354,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         name: entry(state, "name")?.extract()?,
         index: entry(state, "place")?.extract()?,
         set,
+        scalars,
         skeleton: parents.into_iter().zip(rests).map(joint).collect(),
         channels: channels.collect(),
         rate: rate.map_err(|error: tumble::SampleTimesError| input(error.to_string()))?,
@@ -362,4 +405,8 @@ pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
         && a.written_joints == b.written_joints
         && a.body == b.body
         && (0..tracks).all(is_same_track)
+        && a.set.scalar_count() == b.set.scalar_count()
+        && (0..a.set.scalar_count()).all(|index| {
+            a.set.scalar(index) == b.set.scalar(index) && a.scalar(index) == b.scalar(index)
+        })
 }

@@ -246,6 +246,7 @@ fn write(
             .map(|position| Vec3::from_array([position.x, position.y, position.z]))
             .collect(),
         scales: Vec::new(),
+        scalars: Vec::new(),
     };
     let notes = [("input", name.to_owned())];
     let sampled: [SampledClip<'_>; 1] = [samples.of(&clip, rate, &notes)];

@@ -14,6 +14,7 @@ use tumble::method::C2;
 use tumble::reference::angle_between;
 use tumble::{Channel, Interpolation, TrackSet};
 use tumble_formats::motion::Motion;
+use tumble_formats::printable::printable;
 use tumble_formats::robot::Robot;
 use tumble_formats::{Code, Loaded};
 
@@ -93,6 +94,8 @@ struct Summary {
     moved: usize,
     #[serde(skip_serializing_if = "is_zero")]
     scaled: usize,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    scalars: Vec<ScalarSummary>,
     /// Whole seconds that all times are to be moved by, as those of clocks that count from 1970 are.
     #[serde(skip_serializing_if = "is_second_zero")]
     time_offset: i64,
@@ -114,6 +117,48 @@ struct Summary {
     up: Option<[f64; 3]>,
     /// Of the whole file, with its first animation, and of the curves of each: `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
+}
+
+/// A number over time beside the tracks, such as the angle of a joint.
+#[derive(Serialize)]
+struct ScalarSummary {
+    name: String,
+    /// `angle`, `length`, `plain` or `contact`.
+    kind: &'static str,
+    keys: usize,
+    /// The smallest and the largest key.
+    range: [f64; 2],
+    /// Those that the joint allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limits: Option<[f64; 2]>,
+}
+
+impl ScalarSummary {
+    fn of(clip: &Motion, index: usize) -> Option<Self> {
+        let (keys, scalar) = (clip.set.scalar(index)?, clip.scalar(index));
+        let values = keys.keys.iter().map(|&key| f64::from(key) + scalar.origin);
+        let range = values.fold(
+            [f64::INFINITY, f64::NEG_INFINITY],
+            |[least, largest], value| [least.min(value), largest.max(value)],
+        );
+        Some(Self {
+            name: keys.name.to_owned(),
+            kind: scalar.kind.name(),
+            keys: keys.keys.len(),
+            range,
+            limits: scalar.limits,
+        })
+    }
+
+    fn text(&self) -> String {
+        let [least, largest] = self.range;
+        let name = printable(&self.name);
+        let mut text = format!("{name}  {}  {least:.4} to {largest:.4}", self.kind);
+        if let Some([least, largest]) = self.limits {
+            let _ = write!(text, ", limits {least:.4} to {largest:.4}");
+        }
+        text
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -249,6 +294,9 @@ impl Summary {
             largest_rotation_degrees: rotation.to_degrees(),
             moved: with(Channel::Translation),
             scaled: with(Channel::Scale),
+            scalars: (0..set.scalar_count())
+                .filter_map(|index| ScalarSummary::of(clip, index))
+                .collect(),
             time_offset: clip.time_offset,
             origins: clip.origins.iter().map(DVec3::to_array).collect(),
             rate: clip.rate.map(|rate| rate.to_string()),
@@ -350,6 +398,16 @@ impl Summary {
         }
         for warning in &self.warnings {
             line("warning", warning.clone());
+        }
+        if !self.scalars.is_empty() {
+            let count = self.scalars.len();
+            line(
+                "scalars",
+                format!("{count}: name, kind, smallest and largest key"),
+            );
+        }
+        for scalar in &self.scalars {
+            let _ = writeln!(text, "    {}", scalar.text());
         }
         text
     }

@@ -62,7 +62,17 @@ pub static FORMAT: Format = Format {
         Feature::Start,
         Feature::Nanoseconds,
     ],
-    options: &FormatOption::OF_TABLES,
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::SourceRate,
+        FormatOption::Map,
+        FormatOption::TimeUnit,
+        FormatOption::BridgeGaps,
+        FormatOption::Order,
+        // Of robots' files without names of columns.
+        FormatOption::SourceOrder,
+    ],
 };
 
 impl<W: Write> ResultWriter for CsvWriter<'_, W> {

@@ -9,6 +9,7 @@ use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use crate::budget::Budget;
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::dialect;
 use crate::format::{Loaded, ReadOptions, TimeUnit};
 use crate::rate::last_digit_power;
 use crate::source::Source;
@@ -36,6 +37,16 @@ pub fn open_csv(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
 pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut warnings = Warnings::new(name);
     let start = check_encoding(name, &bytes, &mut warnings)?;
+    if options.map.is_none()
+        && let Some(mut loaded) = dialect::text::read(name, &bytes[start..], options)?
+    {
+        loaded.warnings.splice(0..0, warnings.into_list());
+        return Ok(loaded);
+    }
+    if options.source_order.is_some() {
+        let message = "the names of the columns say which is which; --source-order is for files without names";
+        return Err(Diagnostic::new(name, Code::Map, message));
+    }
     let mut sheet = Sheet {
         name,
         bytes: &bytes[start..],

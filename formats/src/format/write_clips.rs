@@ -216,6 +216,7 @@ fn loss(
             let is_scaled = |scale: &Vec3| !scale.abs_diff_eq(Vec3::ONE, UNSCALED);
             (sampled.scales.iter().any(is_scaled), "the scales")
         }
+        Feature::Scalars => (clip.set.scalar_count() > 0, "the scalars"),
         Feature::Steps => (
             clip.channels
                 .iter()

@@ -152,7 +152,7 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
         }
         adjusted.set_origin(index, origin);
     }
-    Ok(adjusted)
+    adjusted.with_scalars_of(clip, scale)
 }
 
 /// Sets the offsets of the joints of all clips of a file by [`set_offsets`]; `numbers` has those of each clip. If they

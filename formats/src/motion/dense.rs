@@ -85,12 +85,13 @@ impl Motion {
             translation: line(channels.translation),
             scale: line(channels.scale),
         });
-        Ok(Self {
+        let dense = Self {
             set,
             channels: channels.collect(),
             rate: None,
             ..self.without_tracks()
-        })
+        };
+        dense.with_sampled_scalars_of(self, samples)
     }
 
     /// The samples at the first and the last key time only, for formats that write the keys of the clip
@@ -112,14 +113,16 @@ impl Motion {
         self.key_lists().map(<[f64]>::len).sum()
     }
 
-    /// The key times of each channel that has keys.
-    fn key_lists(&self) -> impl Iterator<Item = &[f64]> {
+    /// The key times of each channel that has keys, and of each scalar.
+    pub(crate) fn key_lists(&self) -> impl Iterator<Item = &[f64]> {
         let channels = [Channel::Translation, Channel::Scale];
-        (0..self.set.track_count()).flat_map(move |track| {
+        let scalars = self.scalar_keys().map(|keys| keys.times);
+        let tracks = (0..self.set.track_count()).flat_map(move |track| {
             let vectors = channels.map(|channel| self.set.vector_keys(channel, track));
             let rotations = self.set.get(track).map(|track| track.times);
             let vectors = vectors.into_iter().flatten().map(|keys| keys.times);
             rotations.into_iter().chain(vectors)
-        })
+        });
+        tracks.chain(scalars)
     }
 }

@@ -202,6 +202,7 @@ pub fn sample_to_end(
         samples.rotations.extend(last.rotations);
         samples.translations.extend(last.translations);
         samples.scales.extend(last.scales);
+        samples.scalars.extend(last.scalars);
         continue_signs(&mut samples.rotations, clip.set.track_count());
     }
     Ok(samples)

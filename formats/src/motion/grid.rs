@@ -3,7 +3,7 @@
 //! glTF stores times in f32, and text has few decimals. A key at frame 17 of 24 fps is then at 0.70833331 s, and
 //! sampling at 120 fps would miss it, and the end, by 2e-9 s.
 
-use tumble::{Channel, FrameRate};
+use tumble::FrameRate;
 
 use crate::motion::Motion;
 use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of};
@@ -63,16 +63,8 @@ impl Motion {
     /// such rate.
     #[must_use]
     pub fn rate_of_keys(&self) -> Option<FrameRate> {
-        let channels = [Channel::Translation, Channel::Scale];
-        let lists = (0..self.set.track_count()).flat_map(|track| {
-            let vectors = channels
-                .into_iter()
-                .filter_map(move |channel| self.set.vector_keys(channel, track));
-            let rotations = self.set.track(track).times;
-            std::iter::once(rotations).chain(vectors.map(|keys| keys.times))
-        });
         let mut all: Vec<Vec<f64>> = Vec::new();
-        for list in lists {
+        for list in self.key_lists() {
             // Tracks mostly have the times of the track before.
             if all.last().is_none_or(|last| last != list) {
                 all.push(list.to_vec());

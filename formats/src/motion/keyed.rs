@@ -24,6 +24,17 @@ pub enum KeyedError {
         /// Name of that track.
         name: String,
     },
+    /// A scalar has keys at other times than the others.
+    #[error(
+        "the scalar {scalar} (`{name}`) has keys at other times than those before it, or tangents; sample them \
+         together with `tumble eval --fps`"
+    )]
+    Scalar {
+        /// Index of the first such scalar, from 0.
+        scalar: usize,
+        /// Name of that scalar.
+        name: String,
+    },
     /// A channel is a cubic spline with tangents, which samples do not contain.
     #[error(
         "track {track} (`{name}`) is a cubic spline with tangents, which keys alone do not contain; \
@@ -97,6 +108,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
     };
     let all = (0..tracks).flat_map(lists);
     let times = all
+        .chain(clip.scalar_keys().map(|keys| keys.times))
         .max_by_key(|times| times.len())
         .unwrap_or_default()
         .to_vec();
@@ -108,6 +120,12 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
         let channels = clip.channel(track);
         if channels.has(ChannelInterpolation::Cubic) {
             return Err(KeyedError::Cubic { track, name });
+        }
+    }
+    for (scalar, keys) in clip.scalar_keys().enumerate() {
+        if keys.times.len() > 1 && keys.times != times || !keys.tangents.is_empty() {
+            let name = keys.name.to_owned();
+            return Err(KeyedError::Scalar { scalar, name });
         }
     }
     let mut samples = Samples {
@@ -139,6 +157,10 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
                 samples.scales.push(vector(Channel::Scale));
             }
         }
+    }
+    for sample in 0..samples.times.len() {
+        let values = clip.scalar_keys().filter_map(|keys| at(keys.keys, sample));
+        samples.scalars.extend(values);
     }
     continue_signs(&mut samples.rotations, tracks);
     Ok(samples)

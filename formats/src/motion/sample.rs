@@ -6,7 +6,7 @@ use std::str::FromStr;
 use glam::{Quat, Vec3, Vec4};
 use tumble::{
     Channel, Engine, Error, FrameRate, Interpolation, InterpolationOptions, Layout, METHODS,
-    Method, PerTrack, SampleTimes, UnknownNameError, VectorMethod, method,
+    Method, PerTrack, SampleTimes, ScalarQuantity, UnknownNameError, VectorMethod, method,
 };
 
 use crate::motion::signs::continue_signs;
@@ -85,6 +85,8 @@ pub struct Samples {
     pub translations: Vec<Vec3>,
     /// Empty where no track has scales.
     pub scales: Vec<Vec3>,
+    /// In the order `[sample][scalar]`.
+    pub scalars: Vec<f32>,
 }
 
 impl ChannelMethods {
@@ -183,7 +185,7 @@ impl ChannelMethods {
         }
     }
 
-    fn vector_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
+    pub(super) fn vector_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
         match (sampler, self.method.0) {
             (Some(ChannelInterpolation::Step), _) => VectorMethod::Step,
             (Some(ChannelInterpolation::Linear), None) => VectorMethod::Linear,
@@ -215,6 +217,7 @@ impl ChannelMethods {
         continue_signs(&mut samples.rotations, tracks);
         samples.translations = self.vectors(engine, clip, frames, Channel::Translation)?;
         samples.scales = self.vectors(engine, clip, frames, Channel::Scale)?;
+        samples.scalars = self.scalars(engine, clip, frames, ScalarQuantity::Value)?;
         Ok(samples)
     }
 
@@ -297,6 +300,7 @@ impl Samples {
             rotations: &self.rotations,
             translations: &self.translations,
             scales: &self.scales,
+            scalars: &self.scalars,
             notes,
             is_at_keys: false,
         }

@@ -5,7 +5,7 @@ use tumble::TrackError;
 use crate::motion::Motion;
 
 impl Motion {
-    /// The clip of these tracks, in this order. A joint whose parent is not among them becomes a root.
+    /// The clip of these tracks, in this order, and of all scalars. A joint whose parent is not among them becomes a root.
     ///
     /// # Errors
     /// When a track does not exist.
@@ -40,6 +40,7 @@ impl Motion {
             skeleton: skeleton.collect(),
             channels: channels.collect(),
             written_joints: written_joints.collect(),
+            scalars: self.scalars.clone(),
             ..self.without_tracks()
         })
     }

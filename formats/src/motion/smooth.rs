@@ -6,6 +6,7 @@ use tumble::{
 };
 
 use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::scalars;
 use crate::motion::{ChannelInterpolation, Motion};
 
 /// Why a clip cannot be smoothed.
@@ -93,7 +94,7 @@ impl SmoothJob {
         Ok(job)
     }
 
-    /// Samples the clip, and smooths rotations and translations. Scales are sampled only.
+    /// Samples the clip, and smooths rotations, translations and scalars. Scales are sampled only.
     ///
     /// # Errors
     /// As [`Engine::smooth`].
@@ -109,6 +110,16 @@ impl SmoothJob {
             let smoothed = engine.smooth_vectors(&translations, &self.smoothing)?;
             after.translations = smoothed.as_slice().iter().map(|v| v.truncate()).collect();
         }
+        after.scalars =
+            scalars::smoothed(clip, &after.scalars, |packed, packs| {
+                match Vectors::of(packed, packs, layout) {
+                    Ok(packed) => {
+                        let smoothed = engine.smooth_vectors(&packed, &self.smoothing)?;
+                        Ok(smoothed.as_slice().iter().map(|v| v.truncate()).collect())
+                    }
+                    Err(_) => Ok(packed.to_vec()),
+                }
+            })?;
         Ok(Smoothed { before, after })
     }
 
@@ -150,7 +161,8 @@ fn even_times(clip: &Motion) -> Option<Vec<f64>> {
     let vectors = (0..clip.set.track_count())
         .flat_map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
     let all = clip.set.tracks().all(|track| fits(track.times))
-        && vectors.flatten().all(|keys| fits(keys.times));
+        && vectors.flatten().all(|keys| fits(keys.times))
+        && clip.scalar_keys().all(|keys| fits(keys.times));
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let (least, largest) = (
         steps().fold(f64::INFINITY, f64::min),

@@ -36,6 +36,17 @@ pub enum TrimError {
         /// Time of the cut, in seconds.
         time: f64,
     },
+    /// A new key of a scalar at a cut would need the tangents that its other keys have.
+    #[error(
+        "the scalar `{name}` has tangents at its keys, and none lies at {time} s: cut at one of its keys, or sample it \
+         (`tumble eval --start --end`)"
+    )]
+    NoScalarKeyAtCut {
+        /// Name of the first such scalar.
+        name: String,
+        /// Time of the cut, in seconds.
+        time: f64,
+    },
     /// A key at the cut could not be evaluated.
     #[error(transparent)]
     Evaluating(#[from] Error),
@@ -127,11 +138,27 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         let times = trimmed.tracks().flat_map(|track| track.times);
         on_frames(times.copied(), rate, 0.0, Precision::F64)
     });
-    Ok(Motion {
+    let mut part = Motion {
         set: trimmed,
         rate,
         ..clip.without_tracks()
-    })
+    };
+    let scalars = set.scalar_count();
+    for (index, keys) in clip.scalar_keys().enumerate() {
+        let kept = TrimmedKeys::of(keys.times, start, end);
+        if let Some(time) = kept.made().filter(|_| !keys.tangents.is_empty()) {
+            let name = keys.name.to_owned();
+            return Err(TrimError::NoScalarKeyAtCut { name, time });
+        }
+        let values = [cuts.scalars[index], cuts.scalars[scalars + index]];
+        let (times, numbers) = kept.keys(keys.times, keys.keys, values);
+        let tangents = match keys.tangents.is_empty() {
+            true => &[],
+            false => &keys.tangents[kept.kept.clone()],
+        };
+        part.add_scalar(clip.scalar(index), keys.name, &times, &numbers, tangents)?;
+    }
+    Ok(part)
 }
 
 /// The keys of a channel between the cuts, and where new keys are needed.

@@ -176,6 +176,7 @@ mod tests {
             rotations: vec![Quat::IDENTITY, quarter],
             translations: vec![Vec3::X, Vec3::Z],
             scales: vec![Vec3::ONE, Vec3::splat(2.0)],
+            scalars: Vec::new(),
         };
         let found = world(&clip, &samples).unwrap();
         assert!(found[0].position.distance(DVec3::new(0.0, 2.0, 1.0)) < 1e-6);
@@ -193,6 +194,7 @@ mod tests {
             rotations: vec![Quat::IDENTITY, quarter, Quat::IDENTITY, Quat::IDENTITY],
             translations: vec![Vec3::ZERO, Vec3::ZERO, Vec3::X, Vec3::Y],
             scales: vec![Vec3::new(-1.0, 1.0, 1.0), Vec3::ONE, Vec3::ONE, Vec3::ONE],
+            scalars: Vec::new(),
         };
         let found = world(&clip, &samples).unwrap();
         for pose in &found[1..4] {

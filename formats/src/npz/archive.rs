@@ -195,11 +195,6 @@ impl Archive {
         &self.bytes
     }
 
-    /// Where the bytes of a member are in the file; `None` if they are packed.
-    pub(crate) fn stored(&self, member: &Member) -> Option<Range<usize>> {
-        (!member.is_deflated).then(|| member.data.clone())
-    }
-
     /// Takes memory for `count` elements of `bytes` each from the file's budget.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
         self.budget
@@ -336,15 +331,15 @@ impl Archive {
 }
 
 impl Member {
-    /// A value in some bytes. `place` says in messages where it is.
+    /// A value in some bytes. `location` says in messages where it is.
     pub(crate) fn of_value(
         name: String,
-        place: String,
+        location: String,
         header: ArrayHeader,
         data: Range<usize>,
     ) -> Self {
         Self {
-            path: place,
+            path: location,
             name,
             header: Ok(header),
             is_deflated: false,
@@ -352,6 +347,11 @@ impl Member {
             data,
             checksum: None,
         }
+    }
+
+    /// Where the bytes are in the file; `None` if they are packed.
+    pub(crate) fn stored(&self) -> Option<Range<usize>> {
+        (!self.is_deflated).then(|| self.data.clone())
     }
 
     /// Where the pickle of an array of objects begins in the member; `None` for others.

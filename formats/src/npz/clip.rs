@@ -127,6 +127,11 @@ pub(crate) fn read(
     for (track, origin) in origins {
         motion.set_origin(track, origin);
     }
+    let all = || (0..plan.frames).collect();
+    let frames = kept.clone().unwrap_or_else(all);
+    for part in &plan.scalars {
+        part.read(archive, (&times, &frames), &mut motion)?;
+    }
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
         for track in 0..plan.tracks {
             let parent = plan.parents.get(track).copied().flatten();

@@ -14,6 +14,7 @@ use crate::motion::end_frame::{EndFrame, RateFrames};
 use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
+use crate::npz::plan::scalars::{self, ScalarArray};
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, rate_of_frames, times};
 use crate::npz::{FORMAT, linear, smpl, tumble_layout};
@@ -39,6 +40,8 @@ impl fmt::Debug for NpzDocument {
 enum MemberOutcome<'a> {
     /// New keys are written.
     Keys(&'a KeyArray),
+    /// New numbers of scalars are written, from this one of the clip on.
+    Scalars(&'a ScalarArray, usize),
     Rate,
     Times,
     /// The same bytes are written.
@@ -118,7 +121,7 @@ impl NpzDocument {
 
     /// The use of each member.
     fn outcomes<'a>(
-        &self,
+        &'a self,
         parts: &'a [KeyArray],
         sampled: &SampledClip<'_>,
         options: &MotionOptions,
@@ -127,6 +130,13 @@ impl NpzDocument {
         let outcome = |(index, member): (usize, &Member)| {
             if let Some(part) = parts.iter().find(|part| part.member == index) {
                 return MemberOutcome::Keys(part);
+            }
+            let mut first = 0;
+            for part in &self.plan.scalars {
+                if part.member == index && !options.linear.contains(&member.name) {
+                    return MemberOutcome::Scalars(part, first);
+                }
+                first += part.scalars.len();
             }
             if self.plan.times.is_some_and(|list| list.member == index) {
                 return MemberOutcome::Times;
@@ -222,6 +232,18 @@ impl NpzDocument {
                         keys(part.kind, part.tracks.clone(), part.layout, sampled, put)
                     })?;
                 }
+                MemberOutcome::Scalars(part, first) => {
+                    let array = self.archive.array(index)?;
+                    let count = part.scalars.len();
+                    let shape = match part.layout {
+                        Layout::FrameMajor => [frames, count],
+                        Layout::TrackMajor => [count, frames],
+                    };
+                    let array = (&array.header.element, &shape[..]);
+                    members.numbers(path, array, deflated, |put| {
+                        scalars::put(sampled, (first, count), part.layout, put)
+                    })?;
+                }
                 MemberOutcome::Rate => {
                     let array = self.archive.array(index)?;
                     let shape = &*array.header.shape;
@@ -298,6 +320,7 @@ impl Document for NpzDocument {
                 .parts
                 .iter()
                 .any(|part| part.member == member_index)
+                || (self.plan.scalars.iter()).any(|part| part.member == member_index)
         };
         let is_time = |member_index: usize| {
             self.plan
@@ -354,6 +377,15 @@ impl Document for NpzDocument {
             ..sampled.clone()
         };
         check(sampled, &options.name)?;
+        let parts = self.plan.scalars.iter();
+        let scalars: usize = parts.map(|part| part.scalars.len()).sum();
+        if sampled.clip.set.scalar_count() != scalars {
+            let message = format!(
+                "{} scalars; the layout that was read is kept, of {scalars} scalars",
+                sampled.clip.set.scalar_count()
+            );
+            return Err(self.refuse(Code::Layout, message));
+        }
         let tracks = sampled.clip.set.track_count();
         if tracks != self.plan.tracks {
             let message = format!(

@@ -12,7 +12,7 @@ mod clip;
 mod document;
 mod linear;
 mod mapped;
-mod plan;
+pub(crate) mod plan;
 pub mod rotation_vector;
 mod smpl;
 mod tumble_layout;
@@ -24,6 +24,7 @@ use std::sync::Arc;
 
 pub use crate::array::NumberArray;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::dialect;
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
@@ -59,6 +60,7 @@ pub static FORMAT: Format = Format {
         Feature::RestRotations,
         Feature::Translations,
         Feature::Scales,
+        Feature::Scalars,
         Feature::Steps,
         Feature::Lines,
         Feature::Curves,
@@ -99,14 +101,14 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         None => read_known(&archive, options).map(|(plan, loaded)| (Some(plan), loaded)),
     };
     match read {
-        Ok((Some(plan), loaded)) => {
+        Ok((Some(plan), loaded)) if !plan.is_part => {
             let document = NpzDocument::new(archive, plan, &loaded.clips[0]);
             Ok(Loaded {
                 document: Some(Arc::new(document)),
                 ..loaded
             })
         }
-        Ok((None, loaded)) => Ok(loaded),
+        Ok((_, loaded)) => Ok(loaded),
         Err(error) => match error.code {
             // The keys may be in arrays of objects; others are not looked at.
             Code::Pickled | Code::UnknownArrays | Code::Map if archive.has_objects() => {
@@ -133,7 +135,7 @@ fn read_with_objects(mut archive: Archive, options: &ReadOptions) -> Result<Load
             let read = pickle::of_objects(&file, &name, bytes, pickle, options.limits);
             let path = &archive.members[index].path;
             let at_member = |error: Diagnostic| match &error.location {
-                Some(place) => error.clone().inside(format!("{path}:{place}")),
+                Some(location) => error.clone().inside(format!("{path}:{location}")),
                 None => error.inside(path),
             };
             let (values, mut found) = read.map_err(at_member)?.into_parts();
@@ -152,11 +154,14 @@ fn read_known(
     options: &ReadOptions,
 ) -> Result<(ArchivePlan, Loaded), Diagnostic> {
     let mut warnings = Warnings::new(&archive.file);
-    let plan = match tumble_layout::plan(archive)? {
+    let plan = match tumble_layout::plan(archive, &mut warnings)? {
         Some(plan) => Some(plan),
         None => match smpl::plan(archive, &mut warnings)? {
             Some(plan) => Some(plan),
-            None => world_bodies::plan(archive)?,
+            None => match world_bodies::plan(archive, &mut warnings)? {
+                Some(plan) => Some(plan),
+                None => dialect::plan(archive, &mut warnings)?,
+            },
         },
     };
     let mut plan = plan.ok_or_else(|| {
@@ -167,9 +172,20 @@ fn read_known(
         );
         Diagnostic::new(&archive.file, Code::UnknownArrays, message)
     })?;
-    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
+    let loaded = read_plan(archive, &mut plan, options, warnings)?;
+    Ok((plan, loaded))
+}
+
+/// Reads the arrays of a plan.
+pub(crate) fn read_plan(
+    archive: &Archive,
+    plan: &mut ArchivePlan,
+    options: &ReadOptions,
+    mut warnings: Warnings,
+) -> Result<Loaded, Diagnostic> {
+    let clip = clip::read(archive, plan, options, &mut warnings)?;
     plan.warn_of_others(archive, options, &mut warnings);
-    Ok((plan, Loaded::of(clip, warnings.into_list())))
+    Ok(Loaded::of(clip, warnings.into_list()))
 }
 
 /// Reads arrays as those of an NPZ file that is not written again.
@@ -185,11 +201,8 @@ pub(crate) fn of_values(archive: &Archive, options: &ReadOptions) -> Result<Load
 
 /// Reads arrays whose meaning a map specifies.
 fn read_mapped(archive: &Archive, map: &Map, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut warnings = Warnings::new(&archive.file);
     let mut plan = mapped::plan(archive, map)?;
-    let clip = clip::read(archive, &mut plan, options, &mut warnings)?;
-    plan.warn_of_others(archive, options, &mut warnings);
-    Ok(Loaded::of(clip, warnings.into_list()))
+    read_plan(archive, &mut plan, options, Warnings::new(&archive.file))
 }
 
 /// Reads the numbers of an NPY file.

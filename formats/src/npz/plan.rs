@@ -2,6 +2,7 @@
 //! layout becomes a plan, by which clips are read and files are written again.
 
 mod rate;
+pub(crate) mod scalars;
 mod unread;
 
 use std::ops::Range;
@@ -15,6 +16,7 @@ use crate::motion::WrittenJoint;
 use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
+use crate::npz::plan::scalars::ScalarArray;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
@@ -27,6 +29,8 @@ pub(crate) struct ArchivePlan {
     pub(crate) frames: usize,
     /// The arrays that contain keys. Those of rotations are first, in the order of their tracks.
     pub(crate) parts: Vec<KeyArray>,
+    /// The arrays that contain scalars.
+    pub(crate) scalars: Vec<ScalarArray>,
     /// The name of each track, or empty.
     pub(crate) names: Vec<String>,
     /// The parent of each track, or empty.
@@ -59,6 +63,8 @@ pub(crate) struct ArchivePlan {
     pub(crate) channels: Vec<Channels>,
     /// How a file of BVH wrote each track, or empty.
     pub(crate) written_joints: Vec<WrittenJoint>,
+    /// Whether keys are parts of arrays whose other parts are not read, so that the arrays cannot be written again.
+    pub(crate) is_part: bool,
     /// Whether the layout is Tumble's, with the notes on how the samples were made.
     pub(crate) is_tumble_layout: bool,
 }

@@ -9,9 +9,10 @@ use crate::motion::{ChannelInterpolation, Channels, Transform};
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, read_numbers};
 use crate::quaternion::ComponentOrder;
+use crate::warnings::Warnings;
 
 /// Arrays of the layout that do not contain keys: data of the clip that do not depend on frames.
-pub(crate) const CONSTANTS: [&str; 9] = [
+pub(crate) const CONSTANTS: [&str; 12] = [
     "name",
     "names",
     "parents",
@@ -21,7 +22,22 @@ pub(crate) const CONSTANTS: [&str; 9] = [
     SAMPLERS,
     BVH_CHANNELS,
     END_SITES,
+    SCALAR_NAMES,
+    SCALAR_KINDS,
+    SCALAR_LIMITS,
 ];
+
+/// The array of scalars: (scalars, frames).
+pub(crate) const SCALARS: &str = "scalars";
+
+/// The array with the name of each scalar.
+pub(crate) const SCALAR_NAMES: &str = "scalar_names";
+
+/// The array with the kind of each scalar: `angle`, `length`, `plain` or `contact`.
+pub(crate) const SCALAR_KINDS: &str = "scalar_kinds";
+
+/// The array with the limits of each scalar, the smallest and the largest value; NaN for a scalar without.
+pub(crate) const SCALAR_LIMITS: &str = "scalar_limits";
 
 /// The array with the interpolation of rotation, translation and scale of each track: `STEP`, `LINEAR`, or empty for
 /// a channel at rest.
@@ -37,7 +53,10 @@ pub(crate) const BVH_CHANNELS: &str = "bvh_channels";
 pub(crate) const END_SITES: &str = "end_sites";
 
 /// The plan of a file in this layout; `None` for other files.
-pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
+pub(crate) fn plan(
+    archive: &Archive,
+    warnings: &mut Warnings,
+) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::TrackMajor);
     let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
     let Some(rotations) = array("rotations", quaternions)? else {
@@ -66,6 +85,7 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
         plan.rest = read_rest(archive, member, plan.tracks)?;
         plan.constants.push(member);
     }
+    read_scalars(archive, &mut plan, warnings)?;
     read_samplers(archive, &mut plan)?;
     read_bvh(archive, &mut plan)?;
     if let Some(member) = archive.find("is_world") {
@@ -102,6 +122,40 @@ fn texts(
     }
     plan.constants.push(member);
     Ok(Some(texts))
+}
+
+fn read_scalars(
+    archive: &Archive,
+    plan: &mut ArchivePlan,
+    warnings: &mut Warnings,
+) -> Result<(), Diagnostic> {
+    let Some(member) = archive.find(SCALARS) else {
+        return Ok(());
+    };
+    let texts = |name| match archive.array_named(name)? {
+        Some(array) => Ok(Some(array.texts().map_err(|why| {
+            Diagnostic::new(&archive.file, Code::ElementType, why).inside(name)
+        })?)),
+        None => Ok(None),
+    };
+    let (names, kinds) = (
+        texts(SCALAR_NAMES)?,
+        texts(SCALAR_KINDS)?.unwrap_or_default(),
+    );
+    let kind = |index: usize| {
+        let kind = kinds.get(index).and_then(|kind| kind.parse().ok());
+        kind.unwrap_or_default()
+    };
+    let rows = (member, Layout::TrackMajor, 0);
+    plan.add_scalars(archive, rows, names, kind, warnings)?;
+    if let (Some(member), Some(array)) = (archive.find(SCALAR_LIMITS), plan.scalars.last_mut()) {
+        let limits = read_numbers(archive, member)?;
+        let limits = limits.as_chunks::<2>().0;
+        for ((_, scalar), limits) in array.scalars.iter_mut().zip(limits) {
+            scalar.limits = Some(*limits).filter(|limits| limits[0] <= limits[1]);
+        }
+    }
+    Ok(())
 }
 
 fn read_samplers(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic> {

@@ -1,25 +1,27 @@
 //! Motion of bodies in the world, in a layout of robot learning: `body_rotations` (frames, bodies, w x y z),
-//! `body_positions`, `body_names` and `fps`.
+//! `body_positions`, `body_names` and `fps`; and the joints between them, `dof_positions` (frames, joints), `dof_names`.
 
 use tumble::Layout;
 
 use crate::diagnostic::Diagnostic;
+use crate::motion::ScalarKind;
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::quaternion::ComponentOrder;
+use crate::warnings::Warnings;
 
-/// Arrays that these files usually have besides the bodies' poses: their rates, and the same motion as angles of
-/// joints.
-const BESIDE: [&str; 5] = [
+/// Arrays that these files usually have besides the poses: their rates.
+const BESIDE: [&str; 3] = [
     "body_angular_velocities",
     "body_linear_velocities",
-    "dof_names",
-    "dof_positions",
     "dof_velocities",
 ];
 
 /// The plan of a file in this layout; `None` for other files.
-pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
+pub(crate) fn plan(
+    archive: &Archive,
+    warnings: &mut Warnings,
+) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::FrameMajor);
     let quaternions = KeyKind::Quaternion(ComponentOrder::Wxyz);
     let Some(rotations) = array("body_rotations", quaternions)? else {
@@ -35,6 +37,13 @@ pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic>
         plan.add(archive, positions)?;
     }
     plan.read_names(archive, "body_names")?;
+    if let Some(member) = archive.find("dof_positions") {
+        let names = archive.array_named("dof_names")?;
+        let names = names.and_then(|array| array.texts().ok());
+        let columns = (member, Layout::FrameMajor, 0);
+        plan.add_scalars(archive, columns, names, |_| ScalarKind::Angle, warnings)?;
+        plan.constants.extend(archive.find("dof_names"));
+    }
     plan.read_rate(archive, &["fps"])?;
     Ok(Some(plan))
 }

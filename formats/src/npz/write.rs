@@ -13,8 +13,9 @@ use crate::array::{ArrayHeader, Element};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::WrittenJoint;
-use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip};
+use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip, Scalar};
 use crate::npz::plan::KeyKind;
+use crate::npz::plan::scalars;
 use crate::npz::{rotation_vector, tumble_layout};
 use crate::quaternion::ComponentOrder;
 use crate::rate::{Precision, RateSource, of};
@@ -236,6 +237,7 @@ pub fn write_npz(
             })?;
         }
     }
+    scalar_arrays(&mut members, sampled)?;
     times(&mut members, sampled)?;
     if let Some(rate) = rate_of_frames(sampled) {
         let scalar = (&Element::F64, &[][..]);
@@ -265,6 +267,40 @@ pub fn write_npz(
     notes(&mut members, sampled)?;
     members.finish(out)?;
     Ok(Vec::new())
+}
+
+/// Writes the scalars, their names, kinds and limits.
+fn scalar_arrays(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::Result<()> {
+    let clip = sampled.clip;
+    let count = clip.set.scalar_count();
+    if count == 0 {
+        return Ok(());
+    }
+    let all: Vec<Scalar> = (0..count).map(|index| clip.scalar(index)).collect();
+    let is_wide = all.iter().any(|scalar| scalar.origin != 0.0);
+    let element = if is_wide { Element::F64 } else { Element::F32 };
+    let path = |name: &str| format!("{name}.npy");
+    let shape = [count, sampled.times.len()];
+    members.numbers(
+        &path(tumble_layout::SCALARS),
+        (&element, &shape),
+        false,
+        |put| scalars::put(sampled, (0, count), Layout::TrackMajor, put),
+    )?;
+    let names: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
+    members.texts(&path(tumble_layout::SCALAR_NAMES), &names, &[count])?;
+    let kinds: Vec<&str> = all.iter().map(|scalar| scalar.kind.name()).collect();
+    members.texts(&path(tumble_layout::SCALAR_KINDS), &kinds, &[count])?;
+    if all.iter().all(|scalar| scalar.limits.is_none()) {
+        return Ok(());
+    }
+    let limits = (&Element::F64, &[count, 2][..]);
+    members.numbers(&path(tumble_layout::SCALAR_LIMITS), limits, false, |put| {
+        let mut limits = all
+            .iter()
+            .flat_map(|scalar| scalar.limits.unwrap_or([f64::NAN; 2]));
+        limits.try_for_each(put)
+    })
 }
 
 /// The rate of the samples, or of all but the last one, if the clip ends between two frames: programs that read no times

@@ -1,5 +1,7 @@
 //! The classes and functions whose names mean something here, and those whose files are refused.
 
+use crate::array::Element;
+
 /// A class or a function by its module and its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct ClassName {
@@ -40,7 +42,7 @@ pub(super) enum Global {
     Path,
 }
 
-/// The type of the numbers of a storage of PyTorch.
+/// The type of the numbers of a storage of `PyTorch`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StorageKind {
     Float,
@@ -55,7 +57,30 @@ pub(super) enum StorageKind {
     Bool,
 }
 
-/// The modules and the name of each. NumPy 2 renamed `numpy.core`, Python 3 `__builtin__` and `copy_reg`.
+impl StorageKind {
+    /// The type of the numbers; `None` for bfloat16, which `NumPy` lacks.
+    pub(super) fn element(self) -> Option<Element> {
+        Some(match self {
+            Self::Float => Element::F32,
+            Self::Double => Element::F64,
+            Self::Half => Element::F16,
+            Self::BFloat16 => return None,
+            Self::Long => Element::Signed(8),
+            Self::Int => Element::Signed(4),
+            Self::Short => Element::Signed(2),
+            Self::Char => Element::Signed(1),
+            Self::Byte | Self::Bool => Element::Unsigned(1),
+        })
+    }
+
+    pub(super) fn size(self) -> usize {
+        self.element()
+            .and_then(|element| element.size())
+            .unwrap_or(2)
+    }
+}
+
+/// The modules and the name of each. `NumPy` 2 renamed `numpy.core`, Python 3 `__builtin__` and `copy_reg`.
 const KNOWN: &[(&[&str], &str, Global)] = &[
     (NUMPY_MULTIARRAY, "_reconstruct", Global::Reconstruct),
     (NUMPY_MULTIARRAY, "scalar", Global::Scalar),

@@ -2,7 +2,11 @@
 //!
 //! Values are nodes of one list and refer to each other by index. So objects may share values and change after they
 //! are referred to, as in Python, and neither reading nor freeing them is recursive. What the names of a few classes
-//! mean stands in `globals`; the arrays of NumPy, joblib and PyTorch are made in the modules beside this one.
+//! mean stands in `globals`; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
+
+pub(super) mod arrays;
+pub(super) mod joblib;
+pub(super) mod torch;
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -11,9 +15,9 @@ use std::ops::Range;
 use crate::array::ArrayHeader;
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::pickle::arrays::{Dtype, Unbuilt};
 use crate::pickle::globals::{Class, ClassName, Global};
-use crate::pickle::torch::{Storage, Storages};
+use crate::pickle::machine::arrays::{Dtype, Unbuilt};
+use crate::pickle::machine::torch::{Storage, Storages};
 
 /// The deepest nesting of values.
 const MAX_DEPTH: u32 = 1000;
@@ -135,7 +139,7 @@ pub(super) struct Machine<'a> {
     /// Where the opcode is that is carried out.
     opcode: usize,
     budget: &'a Budget,
-    /// The storages of a file of PyTorch.
+    /// The storages of a file of `PyTorch`.
     pub(super) storages: Option<&'a Storages>,
     nodes: Vec<Node>,
     stack: Vec<NodeId>,
@@ -872,8 +876,8 @@ impl<'a> Machine<'a> {
     }
 
     pub(super) fn refuse(&self, code: Code, message: String) -> Diagnostic {
-        let place = format!("byte {}", self.opcode);
-        Diagnostic::new(self.file, code, message).inside(place)
+        let location = format!("byte {}", self.opcode);
+        Diagnostic::new(self.file, code, message).inside(location)
     }
 }
 

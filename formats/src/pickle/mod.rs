@@ -1,15 +1,12 @@
 //! Pickles of Python, files of joblib and of `torch.save`, as data. No code of a file is run: a machine of this crate
 //! rebuilds numbers, texts, lists, dicts and arrays, and keeps objects of other classes by their names alone.
 //!
-//! `machine` carries out the opcodes; `globals` has the names that mean something; `arrays`, `joblib` and `torch` make
-//! arrays. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
+//! `machine` carries out the opcodes, and its children `arrays`, `joblib` and `torch` make arrays; `globals` has the names that
+//! mean something. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
 //! names there is known here.
 
-mod arrays;
 mod globals;
-mod joblib;
 mod machine;
-mod torch;
 mod values;
 
 use std::ops::Range;
@@ -18,14 +15,15 @@ use std::path::Path;
 use crate::array::{Element, NumberArray};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::dialect;
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::limits::Limits;
 use crate::npz;
 use crate::npz::archive::Archive;
-use crate::pickle::machine::Machine;
-use crate::pickle::torch::Storages;
-use crate::pickle::values::Values;
+use crate::pickle::machine::torch::Storages;
+use crate::pickle::machine::{Machine, joblib, torch};
+use crate::pickle::values::{NamedValues, Values};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
@@ -49,8 +47,11 @@ pub static FORMAT: Format = Format {
         Feature::Quaternions,
         Feature::TrackNames,
         Feature::Skeleton,
+        Feature::ClipName,
+        Feature::SeveralClips,
         Feature::Translations,
         Feature::Scales,
+        Feature::Scalars,
         Feature::Curves,
         Feature::World,
         Feature::UnevenTimes,
@@ -69,6 +70,8 @@ pub static FORMAT: Format = Format {
 /// The values of a pickle.
 pub struct Contents {
     archive: Archive,
+    /// The dicts of a dict that holds nothing else, by their keys, and the number of values before each.
+    dicts: Vec<(String, usize)>,
     /// Warnings about the file.
     pub warnings: Vec<Diagnostic>,
 }
@@ -78,7 +81,7 @@ pub struct Contents {
 pub struct Entry {
     /// Its name: of the entry `b` of a dict that is the entry `a`, `a.b`.
     pub name: String,
-    /// Its shape and its type as in NumPy: `(31, 13) f8`; of an object that is not read, its class.
+    /// Its shape and its type as in `NumPy`: `(31, 13) f8`; of an object that is not read, its class.
     pub kind: String,
     /// A single number or text, of which 60 characters are kept.
     pub value: Option<String>,
@@ -134,11 +137,15 @@ impl Contents {
             let message = format!("{after} bytes after the end of the pickle are not read");
             warnings.warn(Code::TrailingBytes, || (None, message));
         }
-        let values = Values::of(file, &bytes, &tree, name, &budget, &mut warnings)?;
-        let (members, added) = values;
+        let NamedValues {
+            members,
+            dicts,
+            added,
+        } = Values::of(file, &bytes, &tree, name, &budget, &mut warnings)?;
         bytes.extend(added);
         Ok(Self {
             archive: Archive::of_values(file, bytes, budget, members),
+            dicts,
             warnings: warnings.into_list(),
         })
     }
@@ -212,10 +219,76 @@ pub fn read_pickle(
 }
 
 fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let (archive, warnings) = contents.into_parts();
-    let mut loaded = npz::of_values(&archive, options)?;
+    let dicts = contents.dicts.clone();
+    let (mut archive, mut warnings) = contents.into_parts();
+    if options.map.is_none()
+        && let Some((options, assumed)) = dialect::gvhmr::narrowed(&mut archive, options)
+    {
+        warnings.extend(assumed);
+        let mut loaded = npz::of_values(&archive, &options)?;
+        loaded.warnings.splice(0..0, warnings);
+        return Ok(loaded);
+    }
+    let mut loaded = match npz::of_values(&archive, options) {
+        // Each entry may be a clip.
+        Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {
+            clips_of_dicts(archive, &dicts, options).ok_or(error)?
+        }
+        read => read?,
+    };
     loaded.warnings.splice(0..0, warnings);
     Ok(loaded)
+}
+
+/// The clips that are the dicts of a dict; `None` if none of them is one.
+fn clips_of_dicts(
+    mut archive: Archive,
+    dicts: &[(String, usize)],
+    options: &ReadOptions,
+) -> Option<Loaded> {
+    let mut all = Loaded::default();
+    let mut members = std::mem::take(&mut archive.members);
+    let mut is_any = false;
+    for (index, (key, start)) in dicts.iter().enumerate().rev() {
+        archive.members = members.split_off(*start);
+        for member in &mut archive.members {
+            let name = member.name.strip_prefix(&**key);
+            let name = name.and_then(|name| name.strip_prefix('.'));
+            member.name = name.unwrap_or_default().to_owned();
+        }
+        match npz::of_values(&archive, options) {
+            Ok(mut loaded) => {
+                is_any = true;
+                for clip in &mut loaded.clips {
+                    clip.name = Some(key.clone());
+                    clip.index = index;
+                }
+                all.clips.append(&mut loaded.clips);
+                for warning in loaded.warnings {
+                    let known = all.warnings.iter_mut().find(|it| it.code == warning.code);
+                    match known {
+                        Some(known) => {
+                            let count = known.count + warning.count;
+                            *known = Diagnostic { count, ..warning };
+                        }
+                        None => all.warnings.push(warning),
+                    }
+                }
+            }
+            Err(mut error) => {
+                let location = error.location.map(|location| location.to_string());
+                let location = location.filter(|location| location.starts_with("['"));
+                error.location = None;
+                let location = location.unwrap_or_else(|| format!("['{key}']"));
+                let error = error.inside(location);
+                is_any |= error.code != Code::UnknownArrays;
+                all.refused.push(error);
+            }
+        }
+    }
+    all.clips.reverse();
+    all.refused.reverse();
+    is_any.then_some(all)
 }
 
 /// The values of an array of objects in a file, whose pickle is some of its bytes.

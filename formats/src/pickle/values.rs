@@ -26,21 +26,35 @@ pub(super) struct Values<'a> {
     /// Bytes that are not in the input; they are to follow it.
     added: Vec<u8>,
     members: Vec<Member>,
+    /// The dicts of a dict, by their keys, and the number of members before each.
+    entries: Vec<(String, usize)>,
     /// The objects of unknown classes, in words.
     inert: Vec<String>,
+}
+
+/// The values of a pickle as the members of an archive.
+pub(super) struct NamedValues {
+    pub(super) members: Vec<Member>,
+    /// The dicts of a dict that holds nothing else, by their keys, and the number of members before each.
+    pub(super) dicts: Vec<(String, usize)>,
+    /// Bytes that are to follow the input.
+    pub(super) added: Vec<u8>,
 }
 
 /// A value to be visited.
 struct Visit {
     name: String,
     /// The value as an expression of Python without the name of the whole.
-    place: String,
+    location: String,
     node: NodeId,
+    /// The value that it is part of.
+    parent: Option<NodeId>,
+    /// Its key there.
+    key: String,
 }
 
 impl<'a> Values<'a> {
-    /// The members of an archive with the values, and the bytes that are to follow the input. `name` is that of the
-    /// whole value, or empty.
+    /// Lists the values. `name` is that of the whole value, or empty.
     ///
     /// # Errors
     /// When they take more memory than the budget.
@@ -51,7 +65,7 @@ impl<'a> Values<'a> {
         name: &str,
         budget: &'a Budget,
         warnings: &mut Warnings,
-    ) -> Result<(Vec<Member>, Vec<u8>), Diagnostic> {
+    ) -> Result<NamedValues, Diagnostic> {
         let mut values = Self {
             file,
             input,
@@ -59,19 +73,33 @@ impl<'a> Values<'a> {
             budget,
             added: Vec::new(),
             members: Vec::new(),
+            entries: Vec::new(),
             inert: Vec::new(),
         };
         values.visit(Visit {
             name: name.to_owned(),
-            place: name.to_owned(),
+            location: name.to_owned(),
             node: tree.root,
+            parent: None,
+            key: String::new(),
         })?;
+        let is_dict_of_dicts = match &tree.nodes[tree.root.index()] {
+            Node::Dict(pairs) => pairs.len() == values.entries.len(),
+            _ => false,
+        };
+        if !is_dict_of_dicts {
+            values.entries.clear();
+        }
         let count = values.inert.len();
         if let Some(objects) = listed(values.inert) {
             let message = format!("objects of classes that are not read: {objects}");
             warnings.warn_of(count, Code::InertObjects, || (None, message));
         }
-        Ok((values.members, values.added))
+        Ok(NamedValues {
+            members: values.members,
+            dicts: values.entries,
+            added: values.added,
+        })
     }
 
     fn visit(&mut self, root: Visit) -> Result<(), Diagnostic> {
@@ -84,6 +112,9 @@ impl<'a> Values<'a> {
             match &tree.nodes[node.index()] {
                 Node::None => {}
                 Node::Dict(pairs) => {
+                    if visit.parent == Some(tree.root) {
+                        self.entries.push((visit.key.clone(), self.members.len()));
+                    }
                     let first = stack.len();
                     for (index, &(key, value)) in pairs.iter().enumerate() {
                         let key = self.key(key, index);
@@ -97,8 +128,8 @@ impl<'a> Values<'a> {
                     }
                     let first = stack.len();
                     for (index, &item) in items.iter().enumerate() {
-                        let place = format!("[{index}]");
-                        stack.push(self.child(&visit, &index.to_string(), &place, item)?);
+                        let location = format!("[{index}]");
+                        stack.push(self.child(&visit, &index.to_string(), &location, item)?);
                     }
                     stack[first..].reverse();
                 }
@@ -255,9 +286,9 @@ impl<'a> Values<'a> {
         } else {
             visit.name
         };
-        self.take(1, VALUE + name.len() + visit.place.len())?;
+        self.take(1, VALUE + name.len() + visit.location.len())?;
         self.members
-            .push(Member::of_value(name, visit.place, header, data));
+            .push(Member::of_value(name, visit.location, header, data));
         Ok(())
     }
 
@@ -265,16 +296,22 @@ impl<'a> Values<'a> {
         &self,
         parent: &Visit,
         key: &str,
-        place: &str,
+        location: &str,
         node: NodeId,
     ) -> Result<Visit, Diagnostic> {
         let name = match parent.name.is_empty() {
             true => key.to_owned(),
             false => format!("{}.{key}", parent.name),
         };
-        let place = format!("{}{place}", parent.place);
-        self.take(1, size_of::<Visit>() + name.len() + place.len())?;
-        Ok(Visit { name, place, node })
+        let location = format!("{}{location}", parent.location);
+        self.take(1, size_of::<Visit>() + name.len() + location.len())?;
+        Ok(Visit {
+            name,
+            location,
+            node,
+            parent: Some(parent.node),
+            key: key.to_owned(),
+        })
     }
 
     /// A key as a name: a text, or a whole number.
@@ -299,8 +336,8 @@ impl<'a> Values<'a> {
     }
 
     fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
-        let taken = self.budget.take(count, bytes);
-        taken.map_err(|error| Diagnostic::new(self.file, Code::PickleLimits, error.to_string()))
+        let budgeted = self.budget.take(count, bytes);
+        budgeted.map_err(|error| Diagnostic::new(self.file, Code::PickleLimits, error.to_string()))
     }
 }
 
@@ -308,8 +345,10 @@ impl Visit {
     fn again(&self) -> Self {
         Self {
             name: self.name.clone(),
-            place: self.place.clone(),
+            location: self.location.clone(),
             node: self.node,
+            parent: self.parent,
+            key: self.key.clone(),
         }
     }
 }

@@ -31,6 +31,7 @@ impl Clip {
             rotations: &self.rotations,
             translations: &self.translations,
             scales: &self.scales,
+            scalars: &[],
             notes: &[],
             is_at_keys: false,
         }

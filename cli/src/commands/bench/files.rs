@@ -73,6 +73,7 @@ fn library(
             rotations: frames.clone().flat_map(joints).collect(),
             translations: frames.flat_map(positions).collect(),
             scales: Vec::new(),
+            scalars: Vec::new(),
         };
         let mut bytes = Vec::new();
         let written = format

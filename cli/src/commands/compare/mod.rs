@@ -414,6 +414,11 @@ impl Arguments {
     /// The differences of two clips at the frames that are asked for.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
+        if pair.clips.iter().any(|clip| clip.set.scalar_count() > 0) {
+            words::warning(
+                "scalars, such as angles of joints, are not compared: the tracks alone are",
+            );
+        }
         for warning in common.warning.iter().chain(&pair.assumptions()) {
             words::warning(warning);
         }

@@ -28,7 +28,8 @@ impl Reduction<'_> {
         let mut reduced = Motion {
             channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
             ..self.clip.without_tracks()
-        };
+        }
+        .with_scalars_of(self.clip, 1.0)?;
         if self.options.together {
             self.push_together(&mut reduced, tolerances)?;
             return Ok(reduced);
@@ -58,7 +59,8 @@ impl Reduction<'_> {
         let mut all = Motion {
             channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
             ..self.clip.without_tracks()
-        };
+        }
+        .with_scalars_of(self.clip, 1.0)?;
         let every: Vec<usize> = (0..self.times.len()).collect();
         let is_step =
             |sampler: Option<ChannelInterpolation>| sampler == Some(ChannelInterpolation::Step);

@@ -381,7 +381,7 @@ impl MeasuredErrors {
 
 /// The clip that is read back after its rotations were written with a quantization.
 fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackError> {
-    let mut short = clip.without_tracks();
+    let mut short = clip.without_tracks().with_scalars_of(clip, 1.0)?;
     for (index, track) in clip.set.tracks().enumerate() {
         let keys: Vec<Quat> = match clip.channels.get(index).map(|channels| channels.rotation) {
             // A node's rest pose is f32, and tangents may be longer than 16 bits take.

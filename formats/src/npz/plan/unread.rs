@@ -16,6 +16,7 @@ impl ArchivePlan {
             let header = member.header.as_ref();
             let is_shape = self.is_body && options.has_body_model;
             self.parts.iter().any(|part| part.member == index)
+                || self.scalars.iter().any(|part| part.member == index)
                 || self.times.is_some_and(|list| list.member == index)
                 || self.rate_member == Some(index)
                 || self.compared.contains(&index)

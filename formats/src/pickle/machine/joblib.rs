@@ -24,7 +24,7 @@ const COMPRESSIONS: [(&[u8], &str, bool); 6] = [
 ///
 /// # Errors
 /// When the compression is not read, the bytes are damaged, or they are more than the limits and the budget allow.
-pub(super) fn unpacked(
+pub(in crate::pickle) fn unpacked(
     file: &str,
     bytes: Vec<u8>,
     limits: Limits,
@@ -71,7 +71,7 @@ pub(super) fn unpacked(
 
 impl Machine<'_> {
     /// An array whose bytes follow in the file, or, if it holds objects, a pickle of it.
-    pub(super) fn build_joblib_array(
+    pub(in crate::pickle) fn build_joblib_array(
         &mut self,
         target: NodeId,
         state: NodeId,

@@ -7,19 +7,19 @@ use half::bf16;
 
 use crate::array::{Element, shape_text};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::npz::archive::Archive;
-use crate::pickle::arrays::Dtype;
+use crate::npz::archive::{Archive, Member};
 use crate::pickle::globals::{Class, Global, StorageKind};
+use crate::pickle::machine::arrays::Dtype;
 use crate::pickle::machine::{Data, Machine, Node, NodeId};
 
 /// How the name of the pickle in an archive ends.
 const PICKLE: &str = "/data.pkl";
 
-/// How a file of PyTorch before 1.6 begins: with a pickle of a number.
+/// How a file of `PyTorch` before 1.6 begins: with a pickle of a number.
 const BEFORE_ARCHIVES: &[u8] = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19.";
 
 /// Whether a file that begins with these bytes is an archive of `torch.save`, whose first member is its pickle.
-pub(super) fn is_archive(start: &[u8]) -> bool {
+pub(in crate::pickle) fn is_archive(start: &[u8]) -> bool {
     // APPNOTE.TXT 4.3.7: at 26 the length of the name, which follows 30 bytes.
     let name = || {
         let length = start.get(26..28)?.try_into().ok()?;
@@ -28,8 +28,11 @@ pub(super) fn is_archive(start: &[u8]) -> bool {
     start.starts_with(b"PK\x03\x04") && name().is_some_and(|name| name.ends_with(PICKLE.as_bytes()))
 }
 
-/// Refuses a file of PyTorch before 1.6.
-pub(super) fn refuse_before_archives(file: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
+/// Refuses a file of `PyTorch` before 1.6.
+pub(in crate::pickle) fn refuse_before_archives(
+    file: &str,
+    bytes: &[u8],
+) -> Result<(), Diagnostic> {
     if !bytes.starts_with(BEFORE_ARCHIVES) {
         return Ok(());
     }
@@ -38,7 +41,7 @@ pub(super) fn refuse_before_archives(file: &str, bytes: &[u8]) -> Result<(), Dia
 }
 
 /// The members of an archive that are storages, by their keys, as ranges of the file.
-pub(super) struct Storages {
+pub(in crate::pickle) struct Storages {
     members: HashMap<String, Range<usize>>,
 }
 
@@ -47,7 +50,7 @@ impl Storages {
     ///
     /// # Errors
     /// When there is not one pickle, or when a member is not stored as it is in this machine's byte order.
-    pub(super) fn of(archive: &Archive) -> Result<(Range<usize>, Self), Diagnostic> {
+    pub(in crate::pickle) fn of(archive: &Archive) -> Result<(Range<usize>, Self), Diagnostic> {
         let refuse = |message: &str| Diagnostic::new(&archive.file, Code::PickleForm, message);
         let paths = archive.members.iter().map(|member| &*member.path);
         let mut pickles = paths.filter_map(|path| path.strip_suffix(PICKLE));
@@ -56,8 +59,8 @@ impl Storages {
                 "it has no pickle, or several; save it with torch.save",
             ));
         };
-        let stored = |member| {
-            let range = archive.stored(member);
+        let stored = |member: &Member| {
+            let range = member.stored();
             range.ok_or_else(|| refuse("a member is compressed; save it with torch.save"))
         };
         let mut pickle = None;
@@ -70,10 +73,8 @@ impl Storages {
                 pickle = Some(stored(member)?);
             } else if let Some(key) = name.strip_prefix("/data/") {
                 members.insert(key.to_owned(), stored(member)?);
-            } else if name == "/byteorder" {
-                if &archive.bytes()[stored(member)?] != b"little" {
-                    return Err(refuse("its numbers are big-endian, which is not read"));
-                }
+            } else if name == "/byteorder" && &archive.bytes()[stored(member)?] != b"little" {
+                return Err(refuse("its numbers are big-endian, which is not read"));
             }
         }
         let pickle = pickle.ok_or_else(|| refuse("it has no pickle"))?;
@@ -83,37 +84,14 @@ impl Storages {
 
 /// The numbers that tensors are views of.
 #[derive(Debug)]
-pub(super) struct Storage {
+pub(in crate::pickle) struct Storage {
     kind: StorageKind,
     data: Range<usize>,
 }
 
-impl StorageKind {
-    /// The type of the numbers; `None` for bfloat16, which NumPy lacks.
-    fn element(self) -> Option<Element> {
-        Some(match self {
-            Self::Float => Element::F32,
-            Self::Double => Element::F64,
-            Self::Half => Element::F16,
-            Self::BFloat16 => return None,
-            Self::Long => Element::Signed(8),
-            Self::Int => Element::Signed(4),
-            Self::Short => Element::Signed(2),
-            Self::Char => Element::Signed(1),
-            Self::Byte | Self::Bool => Element::Unsigned(1),
-        })
-    }
-
-    fn size(self) -> usize {
-        self.element()
-            .and_then(|element| element.size())
-            .unwrap_or(2)
-    }
-}
-
 impl Machine<'_> {
     /// The storage with an id: ("storage", type, key, device, count).
-    pub(super) fn storage(&mut self, id: NodeId) -> Result<(), Diagnostic> {
+    pub(in crate::pickle) fn storage(&mut self, id: NodeId) -> Result<(), Diagnostic> {
         let (kind, key, count) = match self.items(id) {
             Some(&[_, kind, key, _, count, ..]) => (kind, key, count),
             _ => return Err(self.damaged("the id of a storage has other parts")),
@@ -141,7 +119,7 @@ impl Machine<'_> {
     }
 
     /// A tensor: a view of a storage, with the distance of neighbours along each axis.
-    pub(super) fn tensor(
+    pub(in crate::pickle) fn tensor(
         &mut self,
         storage: NodeId,
         offset: NodeId,

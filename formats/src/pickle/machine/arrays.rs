@@ -1,4 +1,4 @@
-//! Arrays of NumPy, sparse matrices of SciPy and arrays of chumpy, as their pickles store them.
+//! Arrays of `NumPy`, sparse matrices of `SciPy` and arrays of chumpy, as their pickles store them.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use crate::pickle::machine::{Array, Data, Inert, Machine, Node, NodeId, shown};
 
 /// An object whose state follows.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Unbuilt {
+pub(in crate::pickle) enum Unbuilt {
     NumpyArray,
     JoblibArray,
     Sparse,
@@ -19,13 +19,13 @@ pub(super) enum Unbuilt {
 
 /// The type of an array's elements.
 #[derive(Debug, Clone)]
-pub(super) struct Dtype {
+pub(in crate::pickle) struct Dtype {
     element: Element,
     is_big_endian: bool,
 }
 
 impl Machine<'_> {
-    pub(super) fn numpy_dtype(&self, name: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn numpy_dtype(&self, name: NodeId) -> Result<Node, Diagnostic> {
         let name = self.text(name);
         let name = name.ok_or_else(|| self.damaged("the type of an array has no name"))?;
         let (element, is_big_endian) = match element(&name) {
@@ -39,7 +39,11 @@ impl Machine<'_> {
     }
 
     /// The state of a type: (3, byte order, subtype, names, fields, size, alignment, flags).
-    pub(super) fn build_dtype(&mut self, target: NodeId, state: NodeId) -> Result<(), Diagnostic> {
+    pub(in crate::pickle) fn build_dtype(
+        &mut self,
+        target: NodeId,
+        state: NodeId,
+    ) -> Result<(), Diagnostic> {
         let (order, subtype, names) = match self.items(state) {
             Some(&[_, order, subtype, names, ..]) => (order, subtype, names),
             _ => return Err(self.damaged("the type of an array has another state")),
@@ -56,7 +60,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    pub(super) fn dtype(&self, node: NodeId) -> Result<Dtype, Diagnostic> {
+    pub(in crate::pickle) fn dtype(&self, node: NodeId) -> Result<Dtype, Diagnostic> {
         match self.value(node) {
             Some(Node::Dtype(dtype)) => Ok(Dtype::clone(dtype)),
             _ => Err(self.damaged("an array has no type")),
@@ -64,7 +68,11 @@ impl Machine<'_> {
     }
 
     /// `numpy.core.multiarray.scalar`: a number with a type.
-    pub(super) fn numpy_scalar(&self, dtype: NodeId, value: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn numpy_scalar(
+        &self,
+        dtype: NodeId,
+        value: NodeId,
+    ) -> Result<Node, Diagnostic> {
         let dtype = self.dtype(dtype)?;
         if dtype.is_object() {
             return Ok(Node::Same(value));
@@ -74,7 +82,7 @@ impl Machine<'_> {
     }
 
     /// `numpy.core.numeric._frombuffer`: how protocol 5 stores arrays.
-    pub(super) fn numpy_from_buffer(
+    pub(in crate::pickle) fn numpy_from_buffer(
         &self,
         buffer: NodeId,
         dtype: NodeId,
@@ -88,7 +96,7 @@ impl Machine<'_> {
     }
 
     /// The state of an array: (version, shape, type, whether in Fortran's order, bytes or a list of objects).
-    pub(super) fn build_numpy_array(&self, state: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn build_numpy_array(&self, state: NodeId) -> Result<Node, Diagnostic> {
         let (shape, dtype, order, data) = match self.items(state) {
             Some(&[_, shape, dtype, order, data]) | Some(&[shape, dtype, order, data]) => {
                 (shape, dtype, order, data)
@@ -127,7 +135,7 @@ impl Machine<'_> {
     }
 
     /// An array, whose bytes must be as many as its shape and its type say.
-    pub(super) fn new_array(
+    pub(in crate::pickle) fn new_array(
         &self,
         dtype: Dtype,
         shape: Vec<usize>,
@@ -144,7 +152,7 @@ impl Machine<'_> {
     }
 
     /// The header of an array of numbers or texts.
-    pub(super) fn array_header(
+    pub(in crate::pickle) fn array_header(
         &self,
         dtype: Dtype,
         shape: Vec<usize>,
@@ -185,7 +193,7 @@ impl Machine<'_> {
 
     /// A matrix by columns: for each column, where its entries begin; of each entry, its row and its value. It becomes
     /// a full matrix.
-    pub(super) fn build_sparse(&self, state: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn build_sparse(&self, state: NodeId) -> Result<Node, Diagnostic> {
         let numbers = |name: &str| match self.value(self.get(state, name)?)? {
             Node::Array(array) => self.numbers(array).ok(),
             _ => None,
@@ -204,7 +212,7 @@ impl Machine<'_> {
         let &[height, width] = &*shape else {
             return Err(wrong());
         };
-        let count = height.checked_mul(width).unwrap_or(usize::MAX);
+        let count = height.saturating_mul(width);
         self.charge(count, size_of::<f64>())?;
         if width.checked_add(1) != Some(starts.len()) || rows.len() != values.len() {
             return Err(wrong());
@@ -246,7 +254,7 @@ impl Machine<'_> {
     }
 
     /// The state of an array of chumpy, whose values are `x`.
-    pub(super) fn build_chumpy(&self, state: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn build_chumpy(&self, state: NodeId) -> Result<Node, Diagnostic> {
         Ok(match self.get(state, "x") {
             Some(values) => Node::Same(values),
             // A formula.
@@ -263,11 +271,11 @@ impl Machine<'_> {
 }
 
 impl Dtype {
-    pub(super) fn is_object(&self) -> bool {
+    pub(in crate::pickle) fn is_object(&self) -> bool {
         self.element == Element::Object
     }
 
-    pub(super) fn of(element: Element) -> Self {
+    pub(in crate::pickle) fn of(element: Element) -> Self {
         Self {
             element,
             is_big_endian: false,

@@ -1,0 +1,159 @@
+//! Dialects: layouts of named arrays by which programs for robots store motion, in NPZ files and pickles.
+//! [`DIALECTS`] lists them. A file is in a dialect if it has all of its arrays, with their shapes.
+//!
+//! The root is one track with rotations and translations, and the joints are scalars. Velocities and other bodies, which
+//! follow from these, are not read.
+
+mod gmr;
+pub(crate) mod gvhmr;
+mod mimickit;
+mod mjlab;
+mod motion_lib;
+mod protomotions;
+pub(crate) mod text;
+
+use tumble::Layout;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::ScalarKind;
+use crate::npz::archive::Archive;
+use crate::npz::array::Strides;
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, check_float};
+use crate::warnings::Warnings;
+
+/// A layout of named arrays.
+pub struct Dialect {
+    /// Its name in messages.
+    pub name: &'static str,
+    /// A short description: its arrays, and programs that write them.
+    pub summary: &'static str,
+    /// The arrays that a file has.
+    arrays: &'static [(&'static str, &'static [Axis])],
+    /// The first track is `body` of these arrays, whose joints are the columns of another.
+    plan: fn(&Archive, &mut Warnings) -> Result<ArchivePlan, Diagnostic>,
+}
+
+/// An axis of an array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    /// As long as the first axis of the first array.
+    Frames,
+    /// Of any length.
+    Any,
+    /// Of this length.
+    Is(usize),
+    /// Longer than this.
+    Over(usize),
+}
+
+/// All dialects. To add one, write a module with a `DIALECT`, and add a line here.
+pub static DIALECTS: &[&Dialect] = &[
+    &gmr::DIALECT,
+    &mjlab::DIALECT,
+    &mimickit::DIALECT,
+    &motion_lib::DIALECT,
+    &protomotions::DIALECT,
+];
+
+/// The plan of a file that is in a dialect; `None` for other files.
+///
+/// # Errors
+/// When the file is in two dialects, or when its arrays are invalid.
+pub(crate) fn plan(
+    archive: &Archive,
+    warnings: &mut Warnings,
+) -> Result<Option<ArchivePlan>, Diagnostic> {
+    let mut fitting = DIALECTS.iter().filter(|dialect| dialect.fits(archive));
+    let Some(first) = fitting.next() else {
+        return Ok(None);
+    };
+    if let Some(second) = fitting.next() {
+        let message = format!(
+            "the arrays are those of two dialects, {} and {}; say which are meant with --map, or save one of them",
+            first.name, second.name
+        );
+        return Err(Diagnostic::new(&archive.file, Code::TwoDialects, message));
+    }
+    (first.plan)(archive, warnings).map(Some)
+}
+
+impl Dialect {
+    /// Whether a file has all arrays.
+    fn fits(&self, archive: &Archive) -> bool {
+        let mut frames = None;
+        self.arrays.iter().all(|(name, axes)| {
+            let Some(shape) = archive.shape(name) else {
+                return false;
+            };
+            let first = shape.first().copied().unwrap_or(0);
+            let frames = *frames.get_or_insert(first);
+            let is_axis = |(axis, &length): (&Axis, &usize)| match axis {
+                Axis::Frames => length == frames && length > 0,
+                Axis::Any => length > 0,
+                Axis::Is(expected) => length == *expected,
+                Axis::Over(least) => length > *least,
+            };
+            shape.len() == axes.len() && axes.iter().zip(shape).all(is_axis)
+        })
+    }
+}
+
+/// The number of the member with a name that was recognised.
+fn member(archive: &Archive, name: &str) -> Result<usize, Diagnostic> {
+    archive.find(name).ok_or_else(|| {
+        let message = format!("there is no array `{name}`");
+        Diagnostic::new(&archive.file, Code::UnknownArrays, message)
+    })
+}
+
+/// The keys of the root: of an array (frames, numbers) from a column on, or of the first body of one (frames, bodies,
+/// numbers).
+fn root(
+    archive: &Archive,
+    name: &str,
+    kind: KeyKind,
+    column: usize,
+) -> Result<(KeyArray, usize), Diagnostic> {
+    let member = member(archive, name)?;
+    check_float(archive, member)?;
+    let header = archive.header(member)?;
+    let (strides, frames) = (header.strides(), header.shape[0]);
+    let component = strides[strides.len() - 1];
+    let part = KeyArray {
+        member,
+        kind,
+        tracks: 0..1,
+        layout: Layout::FrameMajor,
+        at: Strides {
+            first: column * component,
+            track: 0,
+            frame: strides[0],
+            component,
+        },
+    };
+    Ok((part, frames))
+}
+
+/// The plan of a root and of joints without names, all of them hinges or slides, which the file does not tell apart.
+fn root_and_joints(
+    archive: &Archive,
+    rotation: (&str, KeyKind),
+    position: &str,
+    joints: &str,
+    companions: &'static [&'static str],
+    warnings: &mut Warnings,
+) -> Result<ArchivePlan, Diagnostic> {
+    let mut plan = ArchivePlan {
+        is_world: true,
+        is_part: true,
+        names: vec!["root".to_owned()],
+        companions,
+        ..ArchivePlan::default()
+    };
+    plan.add(archive, root(archive, rotation.0, rotation.1, 0)?)?;
+    plan.add(archive, root(archive, position, KeyKind::Translation, 0)?)?;
+    let columns = (member(archive, joints)?, Layout::FrameMajor, 0);
+    plan.add_scalars(archive, columns, None, |_| ScalarKind::Angle, warnings)?;
+    plan.read_rate(archive, &["fps"])?;
+    Ok(plan)
+}

@@ -1,0 +1,228 @@
+//! The scalars of a clip: numbers over time beside its tracks, such as the angles of a robot's joints.
+
+use glam::Vec3;
+use tumble::{
+    Engine, Error, Layout, SampleTimes, ScalarKeys, ScalarQuantity, TrackError, TrackSet,
+    VectorMethod, method,
+};
+
+use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::{ChannelInterpolation, Motion};
+
+/// What a scalar of a clip is; its name and its keys are in the clip's set.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Scalar {
+    /// The quantity.
+    pub kind: ScalarKind,
+    /// The number to add to each key: whole turns of an angle that was unwrapped.
+    pub origin: f64,
+    /// The smallest and the largest value that the joint allows.
+    pub limits: Option<[f64; 2]>,
+    /// How its keys are joined; `None` if the file does not say it.
+    pub interpolation: Option<ChannelInterpolation>,
+}
+
+/// The quantity of a scalar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ScalarKind {
+    /// An angle in radians.
+    Angle,
+    /// A length in the clip's unit.
+    Length,
+    /// A number without a unit, or with one that is not known.
+    #[default]
+    Plain,
+    /// Whether something touches something, 0 or 1.
+    Contact,
+}
+
+tumble::names! {
+    ScalarKind, "kind of scalar",
+    Angle => "angle",
+    Length => "length",
+    Plain => "plain",
+    Contact => "contact",
+}
+
+impl Scalar {
+    /// A scalar of a kind; contacts are steps.
+    #[must_use]
+    pub fn of(kind: ScalarKind) -> Self {
+        let is_contact = kind == ScalarKind::Contact;
+        Self {
+            kind,
+            interpolation: is_contact.then_some(ChannelInterpolation::Step),
+            ..Self::default()
+        }
+    }
+
+    fn is_step(self) -> bool {
+        self.interpolation == Some(ChannelInterpolation::Step)
+    }
+}
+
+impl Motion {
+    /// What a scalar of the set is.
+    #[must_use]
+    pub fn scalar(&self, index: usize) -> Scalar {
+        self.scalars.get(index).copied().unwrap_or_default()
+    }
+
+    /// Adds a scalar.
+    ///
+    /// # Errors
+    /// As [`TrackSet::push_scalar`].
+    pub fn push_scalar(&mut self, scalar: Scalar, keys: ScalarKeys<'_>) -> Result<(), TrackError> {
+        self.add_scalar(scalar, keys.name, keys.times, keys.keys, keys.tangents)
+    }
+
+    pub(crate) fn add_scalar(
+        &mut self,
+        scalar: Scalar,
+        name: &str,
+        times: &[f64],
+        keys: &[f32],
+        tangents: &[[f32; 2]],
+    ) -> Result<(), TrackError> {
+        let index = self.set.push_scalar(name, times, keys, tangents)?;
+        self.scalars.resize(index, Scalar::default());
+        self.scalars.push(scalar);
+        Ok(())
+    }
+
+    /// The keys of all scalars.
+    pub(crate) fn scalar_keys(&self) -> impl Iterator<Item = ScalarKeys<'_>> {
+        (0..self.set.scalar_count()).filter_map(|index| self.set.scalar(index))
+    }
+
+    /// The clip with the scalars of another clip; those that are lengths are multiplied by `scale`.
+    ///
+    /// # Errors
+    /// When a key exceeds the largest number of a scalar.
+    pub(crate) fn with_scalars_of(mut self, clip: &Self, scale: f64) -> Result<Self, TrackError> {
+        for (index, keys) in clip.scalar_keys().enumerate() {
+            let mut scalar = clip.scalar(index);
+            if scalar.kind != ScalarKind::Length || scale == 1.0 {
+                self.push_scalar(scalar, keys)?;
+                continue;
+            }
+            let scaled = |number: f32| (f64::from(number) * scale) as f32;
+            scalar.origin *= scale;
+            scalar.limits = scalar
+                .limits
+                .map(|limits| limits.map(|limit| limit * scale));
+            let numbers: Vec<f32> = keys.keys.iter().copied().map(scaled).collect();
+            let tangents: Vec<[f32; 2]> = keys.tangents.iter().map(|two| two.map(scaled)).collect();
+            self.add_scalar(scalar, keys.name, keys.times, &numbers, &tangents)?;
+        }
+        Ok(self)
+    }
+
+    /// The clip with samples as the keys of the scalars of another clip.
+    ///
+    /// # Errors
+    /// When a sample is not a valid key.
+    pub(crate) fn with_sampled_scalars_of(
+        mut self,
+        clip: &Self,
+        samples: &Samples,
+    ) -> Result<Self, TrackError> {
+        let count = clip.set.scalar_count();
+        for (index, keys) in clip.scalar_keys().enumerate() {
+            let mut scalar = clip.scalar(index);
+            if scalar.interpolation == Some(ChannelInterpolation::Cubic) {
+                scalar.interpolation = Some(ChannelInterpolation::Linear);
+            }
+            let values = samples.scalars.iter().skip(index).step_by(count);
+            let values: Vec<f32> = values.copied().collect();
+            self.add_scalar(scalar, keys.name, &samples.times, &values, &[])?;
+        }
+        Ok(self)
+    }
+}
+
+impl ChannelMethods {
+    /// The method of a scalar.
+    fn scalar_method(&self, scalar: Scalar) -> VectorMethod {
+        self.vector_method(scalar.interpolation)
+    }
+
+    /// Evaluates the scalars of a clip, or how fast they change, each by its own sampler, in the order
+    /// `[sample][scalar]`. [Origins](Scalar::origin) are not added.
+    ///
+    /// # Errors
+    /// As [`Engine::scalars`].
+    pub fn scalars(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &SampleTimes,
+        quantity: ScalarQuantity,
+    ) -> Result<Vec<f32>, Error> {
+        let count = clip.set.scalar_count();
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span())?;
+        let times: Vec<f64> = timeline.times(0).collect();
+        let frames = SampleTimes::at(times.clone());
+        let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
+        let methods: Vec<VectorMethod> = (0..count)
+            .map(|index| self.scalar_method(clip.scalar(index)))
+            .collect();
+        let mut all = vec![0.0; times.len() * count];
+        for (first, &method) in methods.iter().enumerate() {
+            if methods[..first].contains(&method) {
+                continue;
+            }
+            // Those that have this method, as a set of their own.
+            let of_method: Vec<usize> = (first..count)
+                .filter(|&index| methods[index] == method)
+                .collect();
+            let mut set = TrackSet::new();
+            for keys in of_method.iter().filter_map(|&index| clip.set.scalar(index)) {
+                set.push_scalar("", keys.times, keys.keys, keys.tangents)?;
+            }
+            let found = engine.scalars(&set, quantity, method, how, &frames, layout)?;
+            let rows = found.as_slice().chunks_exact(of_method.len());
+            for (row, found) in all.chunks_exact_mut(count).zip(rows) {
+                for (&index, &value) in of_method.iter().zip(found) {
+                    row[index] = value;
+                }
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// Smooths scalars, which are in the order `[sample][scalar]`; steps stay.
+pub(crate) fn smoothed(
+    clip: &Motion,
+    scalars: &[f32],
+    smooth: impl Fn(&[Vec3], usize) -> Result<Vec<Vec3>, Error>,
+) -> Result<Vec<f32>, Error> {
+    let count = clip.set.scalar_count();
+    if count == 0 || scalars.is_empty() {
+        return Ok(scalars.to_vec());
+    }
+    // Three at a time as the components of a vector, which do not meet.
+    let packs = count.div_ceil(3);
+    let packed: Vec<Vec3> = scalars
+        .chunks_exact(count)
+        .flat_map(|row| row.chunks(3))
+        .map(|three| {
+            let component = |index: usize| three.get(index).copied().unwrap_or(0.0);
+            Vec3::new(component(0), component(1), component(2))
+        })
+        .collect();
+    let found = smooth(&packed, packs)?;
+    let mut all = scalars.to_vec();
+    for (row, found) in all.chunks_exact_mut(count).zip(found.chunks_exact(packs)) {
+        for (index, value) in row.iter_mut().enumerate() {
+            if !clip.scalar(index).is_step() {
+                *value = found[index / 3][index % 3];
+            }
+        }
+    }
+    Ok(all)
+}
