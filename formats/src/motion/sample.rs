@@ -6,7 +6,8 @@ use std::str::FromStr;
 use glam::{Quat, Vec3, Vec4};
 use tumble::{
     Channel, Engine, Error, FrameRate, Interpolation, InterpolationOptions, Layout, METHODS,
-    Method, PerTrack, SampleTimes, ScalarQuantity, UnknownNameError, VectorMethod, method,
+    Method, PerTrack, SampleTimes, ScalarQuantity, TrackSet, UnknownNameError, VectorMethod,
+    method,
 };
 
 use crate::motion::signs::continue_signs;
@@ -193,6 +194,53 @@ impl ChannelMethods {
             (None, None) => VectorMethod::BesselOverhauser,
             (_, Some(method)) => method.vector_method,
         }
+    }
+
+    /// Evaluates the scalars of a clip, or how fast they change, each by its own sampler, in the order
+    /// `[sample][scalar]`. [Origins](Scalar::origin) are not added.
+    ///
+    /// # Errors
+    /// As [`Engine::scalars`].
+    pub fn scalars(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        frames: &SampleTimes,
+        quantity: ScalarQuantity,
+    ) -> Result<Vec<f32>, Error> {
+        let count = clip.set.scalar_count();
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span())?;
+        let times: Vec<f64> = timeline.times(0).collect();
+        let frames = SampleTimes::at(times.clone());
+        let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
+        let methods: Vec<VectorMethod> = (0..count)
+            .map(|index| self.vector_method(clip.scalar(index).interpolation))
+            .collect();
+        let mut all = vec![0.0; times.len() * count];
+        for (first, &method) in methods.iter().enumerate() {
+            if methods[..first].contains(&method) {
+                continue;
+            }
+            // Those that have this method, as a set of their own.
+            let of_method: Vec<usize> = (first..count)
+                .filter(|&index| methods[index] == method)
+                .collect();
+            let mut set = TrackSet::new();
+            for keys in of_method.iter().filter_map(|&index| clip.set.scalar(index)) {
+                set.push_scalar("", keys.times, keys.keys, keys.tangents)?;
+            }
+            let found = engine.scalars(&set, quantity, method, how, &frames, layout)?;
+            let rows = found.as_slice().chunks_exact(of_method.len());
+            for (row, found) in all.chunks_exact_mut(count).zip(rows) {
+                for (&index, &value) in of_method.iter().zip(found) {
+                    row[index] = value;
+                }
+            }
+        }
+        Ok(all)
     }
 
     /// Evaluates all channels of a clip.

@@ -1,12 +1,9 @@
 //! The scalars of a clip: numbers over time beside its tracks, such as the angles of a robot's joints.
 
 use glam::Vec3;
-use tumble::{
-    Engine, Error, Layout, SampleTimes, ScalarKeys, ScalarQuantity, TrackError, TrackSet,
-    VectorMethod, method,
-};
+use tumble::{Error, ScalarKeys, TrackError};
 
-use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::sample::Samples;
 use crate::motion::{ChannelInterpolation, Motion};
 
 /// What a scalar of a clip is; its name and its keys are in the clip's set.
@@ -138,60 +135,6 @@ impl Motion {
             self.add_scalar(scalar, keys.name, &samples.times, &values, &[])?;
         }
         Ok(self)
-    }
-}
-
-impl ChannelMethods {
-    /// The method of a scalar.
-    fn scalar_method(&self, scalar: Scalar) -> VectorMethod {
-        self.vector_method(scalar.interpolation)
-    }
-
-    /// Evaluates the scalars of a clip, or how fast they change, each by its own sampler, in the order
-    /// `[sample][scalar]`. [Origins](Scalar::origin) are not added.
-    ///
-    /// # Errors
-    /// As [`Engine::scalars`].
-    pub fn scalars(
-        &self,
-        engine: &Engine,
-        clip: &Motion,
-        frames: &SampleTimes,
-        quantity: ScalarQuantity,
-    ) -> Result<Vec<f32>, Error> {
-        let count = clip.set.scalar_count();
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span())?;
-        let times: Vec<f64> = timeline.times(0).collect();
-        let frames = SampleTimes::at(times.clone());
-        let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
-        let methods: Vec<VectorMethod> = (0..count)
-            .map(|index| self.scalar_method(clip.scalar(index)))
-            .collect();
-        let mut all = vec![0.0; times.len() * count];
-        for (first, &method) in methods.iter().enumerate() {
-            if methods[..first].contains(&method) {
-                continue;
-            }
-            // Those that have this method, as a set of their own.
-            let of_method: Vec<usize> = (first..count)
-                .filter(|&index| methods[index] == method)
-                .collect();
-            let mut set = TrackSet::new();
-            for keys in of_method.iter().filter_map(|&index| clip.set.scalar(index)) {
-                set.push_scalar("", keys.times, keys.keys, keys.tangents)?;
-            }
-            let found = engine.scalars(&set, quantity, method, how, &frames, layout)?;
-            let rows = found.as_slice().chunks_exact(of_method.len());
-            for (row, found) in all.chunks_exact_mut(count).zip(rows) {
-                for (&index, &value) in of_method.iter().zip(found) {
-                    row[index] = value;
-                }
-            }
-        }
-        Ok(all)
     }
 }
 

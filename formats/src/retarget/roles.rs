@@ -217,11 +217,11 @@ pub fn recognise(
         return Err(fewest_missing);
     }
     let complete = || found.iter().filter(|roles| missing(roles).is_empty());
-    let most = complete().map(count).max().unwrap_or(0);
-    let mut best = complete().filter(|roles| count(roles) == most);
+    let largest = complete().map(count).max().unwrap_or(0);
+    let mut best = complete().filter(|roles| count(roles) == largest);
     match (
         best.next(),
-        best.any(|other| complete().any(|one| count(one) == most && one.joints != other.joints)),
+        best.any(|other| complete().any(|one| count(one) == largest && one.joints != other.joints)),
     ) {
         (Some(roles), false) => Ok(roles.clone()),
         _ => Err(Vec::new()),
