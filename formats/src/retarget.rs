@@ -233,7 +233,7 @@ pub fn retarget(
         HipsScale::Factor(factor) if factor.is_finite() && factor > 0.0 => factor,
         HipsScale::Factor(factor) => return Err(RetargetError::Scale(factor)),
         HipsScale::Hips => pairs.height_ratio(&from, &to, axes),
-        HipsScale::Legs => pairs.leg_ratio(&from, &to, [from_roles.as_ref(), to_roles.as_ref()]),
+        HipsScale::Legs => Pairs::leg_ratio(&from, &to, [from_roles.as_ref(), to_roles.as_ref()]),
     };
     let samples = keyed(source)?;
     let joints = from.names.len();
@@ -292,14 +292,12 @@ pub fn retarget(
     };
     for (joint, keys) in rotations.iter().enumerate() {
         let name = &*to.names[joint];
-        match keys.is_empty() {
-            true => {
-                motion
-                    .set
-                    .push(name, &samples.times[..1], &[to.local_rest(joint).as_quat()])?
-            }
-            false => motion.set.push(name, &samples.times, keys)?,
-        }
+        let rest = [to.local_rest(joint).as_quat()];
+        let (times, keys) = match keys.is_empty() {
+            true => (samples.times.get(..1).unwrap_or(&[0.0]), &rest[..]),
+            false => (&samples.times[..], &keys[..]),
+        };
+        motion.set.push(name, times, keys)?;
     }
     if let Some((joint, _)) = pairs.hips {
         motion.set_positions(joint, &samples.times, &hips)?;
@@ -509,7 +507,7 @@ impl Pairs {
         }
     }
 
-    fn leg_ratio(&self, from: &Rig<'_>, to: &Rig<'_>, roles: [Option<&Roles>; 2]) -> f64 {
+    fn leg_ratio(from: &Rig<'_>, to: &Rig<'_>, roles: [Option<&Roles>; 2]) -> f64 {
         let length = |rig: &Rig<'_>, roles: &Roles| {
             let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
             let leg = [Role::LeftUpperLeg, Role::LeftLowerLeg, Role::LeftFoot].map(at);

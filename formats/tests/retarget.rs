@@ -202,7 +202,7 @@ fn a_motion_on_its_skeleton_stays_as_it_is() {
     let mut source = mixamo(bent, 12);
     let times: Vec<f64> = source.set.track(0).times.to_vec();
     let moved: Vec<DVec3> = (0..12)
-        .map(|k| DVec3::new(k as f64, 100.0, 0.5 * k as f64))
+        .map(|k| DVec3::new(f64::from(k), 100.0, 0.5 * f64::from(k)))
         .collect();
     source.set_positions(0, &times, &moved).unwrap();
     let (found, report) = retarget(&source, &source, &RetargetOptions::default()).unwrap();

@@ -218,12 +218,11 @@ pub fn recognise(
     }
     let complete = || found.iter().filter(|roles| missing(roles).is_empty());
     let largest = complete().map(count).max().unwrap_or(0);
-    let mut best = complete().filter(|roles| count(roles) == largest);
-    match (
-        best.next(),
-        best.any(|other| complete().any(|one| count(one) == largest && one.joints != other.joints)),
-    ) {
-        (Some(roles), false) => Ok(roles.clone()),
+    let best: Vec<&Roles> = complete().filter(|roles| count(roles) == largest).collect();
+    match &best[..] {
+        [first, others @ ..] if others.iter().all(|other| other.joints == first.joints) => {
+            Ok((*first).clone())
+        }
         _ => Err(Vec::new()),
     }
 }
