@@ -102,9 +102,9 @@ const ALL: [Foreign; 21] = [
         description: "a table with tabs; replace them by commas, and name it .csv",
     },
     Foreign {
-        extensions: &["pkl", "pickle", "pt", "pth", "joblib"],
+        extensions: &[],
         begins: &[b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"],
-        description: "a pickle of Python, which may run any program when it is loaded; load it in Python if you trust it, and save its arrays by numpy.savez",
+        description: "a pickle of Python; name it .pkl, and its numbers and arrays are read (nothing in it is run)",
     },
     Foreign {
         extensions: &["mat", "h5", "hdf5"],
@@ -209,7 +209,6 @@ mod tests {
                 "delete",
             ),
             ("x.c3d", b"\x02\x50\x01\x00", "C3D", "export BVH"),
-            ("x.pkl", b"\x80\x04\x95\x00", "pickle", "numpy.savez"),
             ("x.bag", b"#ROSBAG V2.0\n", "ROS 1", "mcap convert"),
             ("x.db3", b"SQLite format 3\0", "ROS 2", "mcap convert"),
             ("x.usda", b"#usda 1.0\n", "OpenUSD", "GLB"),

@@ -94,7 +94,7 @@ pub static FORMATS: &[&Format] = &[
     #[cfg(feature = "fbx")]
     &fbx::FORMAT,
     // Before NPZ: files of PyTorch are ZIP archives too.
-    &pickle::FORMAT,
+    &pickle::format::FORMAT,
     &npz::FORMAT,
     &npy::FORMAT,
     #[cfg(feature = "parquet")]

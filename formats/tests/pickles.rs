@@ -11,7 +11,8 @@ use serde_json::Value;
 use tumble::glam::Quat;
 use tumble_formats::motion::{Body, Motion};
 use tumble_formats::npz::{body_offsets, read_npy, read_npz};
-use tumble_formats::pickle::{Contents, read_pickle};
+use tumble_formats::pickle::Contents;
+use tumble_formats::pickle::format::read_pickle;
 use tumble_formats::{Code, Diagnostic, Limits, ReadOptions};
 
 use crate::support::shared_data;

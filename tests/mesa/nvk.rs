@@ -162,6 +162,8 @@ fn is_exact(instruction: &str) -> bool {
         "fadd" | "fmul" => rest.is_empty(),
         // The product with a power of two is exact, and the sum is rounded once.
         "ffma" => rest.is_empty() && operands.split_whitespace().take(2).any(is_power_of_two),
+        // To half precision, to the nearest; with `.ftz` subnormal inputs count as 0.
+        "f2f" => rest == ["f16", "f32", "re"],
         // Of whole numbers below 2^24.
         "i2f" | "i2f32" => rest
             .iter()
@@ -274,6 +276,7 @@ fn what_rounds_otherwise_is_refused() {
         "i2f.f32.i32.re r3",
         "i2f32 r3",
         "ffma.ftz r1 0x40000000 r3",
+        "f2f.f16.f32.re r1",
         "imad r1 r2 r3",
         "ldc.b32 c[0x0][0x4]",
         "shf.l.w.u32 r1 rZ 0x5",
@@ -287,7 +290,7 @@ fn what_rounds_otherwise_is_refused() {
         "fadd.rz r1 r2",
         "fmul.ftz.sat r1 r2",
         "mufu.rsq r1",
-        "f2f.f16.f32.re r1",
+        "f2f.f16.f32.rz r1",
         "f2i.u32.f32.rz.ftz r1",
         "i2f.f32.u32.rz r1",
         "hfma2 r1 r2 r3",

@@ -239,6 +239,16 @@ impl Class {
 impl std::fmt::Display for ClassName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = format!("{}.{}", self.module, self.name);
-        f.write_str(&super::machine::shown(&name))
+        f.write_str(&shown(&name))
     }
+}
+
+/// At most 60 characters of a text, for messages.
+pub(super) fn shown(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut shown: String = text.chars().take(LONGEST).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    shown
 }

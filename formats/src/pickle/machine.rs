@@ -15,7 +15,7 @@ use std::ops::Range;
 use crate::array::ArrayHeader;
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::pickle::globals::{Class, ClassName, Global};
+use crate::pickle::globals::{Class, ClassName, Global, shown};
 use crate::pickle::machine::arrays::{Dtype, Unbuilt};
 use crate::pickle::machine::torch::{Storage, Storages};
 
@@ -916,16 +916,6 @@ pub(super) fn text<'a>(node: &'a Node, input: &'a [u8]) -> Option<Cow<'a, str>> 
         }
         _ => None,
     }
-}
-
-/// At most 60 characters of a text, for messages.
-pub(super) fn shown(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let mut shown: String = text.chars().take(LONGEST).collect();
-    if shown.len() < text.len() {
-        shown.push('…');
-    }
-    shown
 }
 
 /// A whole number in two's complement, the least significant byte first.

@@ -3,8 +3,9 @@
 //!
 //! `machine` carries out the opcodes, and its children `arrays`, `joblib` and `torch` make arrays; `globals` has the names that
 //! mean something. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
-//! names there is known here.
+//! names there is known here. `format` makes clips of them.
 
+pub mod format;
 mod globals;
 mod machine;
 mod values;
@@ -15,57 +16,18 @@ use std::path::Path;
 use crate::array::{Element, NumberArray};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dialect;
-use crate::feature::Feature;
-use crate::format::{Format, FormatOption, Loaded, ReadOptions};
+use crate::format::ReadOptions;
 use crate::limits::Limits;
-use crate::npz;
-use crate::npz::archive::Archive;
+use crate::npz::archive::{Archive, Member};
+use crate::pickle::globals::shown;
 use crate::pickle::machine::torch::Storages;
 use crate::pickle::machine::{Machine, joblib, torch};
 use crate::pickle::values::{NamedValues, Values};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
-/// The format of pickles.
-pub static FORMAT: Format = Format {
-    name: "pickle",
-    summary: "a pickle of Python, joblib or PyTorch, read as data: nothing in it is run",
-    extensions: &["pkl", "p", "joblib", "pt", "pth", "motion", "ckpt"],
-    // Protocols 0 and 1, and compressed files, are known by their extension alone.
-    probe: |start| matches!(start, [0x80, 2..=5, ..]) || torch::is_archive(start),
-    numbers_in_line: None,
-    is_text: false,
-    numbers_repeated_names: false,
-    guesses_time_unit: false,
-    read: open_pickle,
-    read_bytes: read_pickle,
-    write: None,
-    write_motion: None,
-    features: &[
-        Feature::SeveralTracks,
-        Feature::Quaternions,
-        Feature::TrackNames,
-        Feature::Skeleton,
-        Feature::ClipName,
-        Feature::SeveralClips,
-        Feature::Translations,
-        Feature::Scales,
-        Feature::Scalars,
-        Feature::Curves,
-        Feature::World,
-        Feature::UnevenTimes,
-        Feature::Start,
-    ],
-    options: &[
-        FormatOption::RawTimes,
-        FormatOption::Duplicates,
-        FormatOption::SourceRate,
-        FormatOption::OverrideRate,
-        FormatOption::Map,
-        FormatOption::TimeUnit,
-    ],
-};
+/// The name of the format.
+pub(crate) const NAME: &str = "pickle";
 
 /// The values of a pickle.
 pub struct Contents {
@@ -154,7 +116,7 @@ impl Contents {
     #[must_use]
     pub fn entries(&self) -> Vec<Entry> {
         let members = self.archive.members.iter().enumerate();
-        let entry = |(index, member): (usize, &npz::archive::Member)| {
+        let entry = |(index, member): (usize, &Member)| {
             let header = member.header.as_ref().ok()?;
             let kind = match &header.element {
                 Element::Class(class) => format!("object of {class}"),
@@ -165,7 +127,7 @@ impl Contents {
                 let number = array.numbers().and_then(|numbers| numbers.first().copied());
                 let text = || array.texts().ok()?.into_iter().next();
                 let value = number.map(|number| number.to_string()).or_else(text)?;
-                Some(machine::shown(&value))
+                Some(shown(&value))
             };
             Some(Entry {
                 name: member.name.clone(),
@@ -196,99 +158,6 @@ impl Contents {
     pub(crate) fn into_parts(self) -> (Archive, Vec<Diagnostic>) {
         (self.archive, self.warnings)
     }
-}
-
-/// Reads a pickle.
-///
-/// # Errors
-/// When the file cannot be opened or is invalid; the first error is returned.
-fn open_pickle(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    loaded(Contents::open(path, options)?, options)
-}
-
-/// Reads the bytes of a pickle; `file` is the input's name in messages.
-///
-/// # Errors
-/// When the input is invalid; the first error is returned.
-pub fn read_pickle(
-    file: &str,
-    bytes: Vec<u8>,
-    options: &ReadOptions,
-) -> Result<Loaded, Diagnostic> {
-    loaded(Contents::read(file, bytes, options.limits)?, options)
-}
-
-fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let dicts = contents.dicts.clone();
-    let (mut archive, mut warnings) = contents.into_parts();
-    if options.map.is_none()
-        && let Some((options, assumed)) = dialect::gvhmr::narrowed(&mut archive, options)
-    {
-        warnings.extend(assumed);
-        let mut loaded = npz::of_values(&archive, &options)?;
-        loaded.warnings.splice(0..0, warnings);
-        return Ok(loaded);
-    }
-    let mut loaded = match npz::of_values(&archive, options) {
-        // Each entry may be a clip.
-        Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {
-            clips_of_dicts(archive, &dicts, options).ok_or(error)?
-        }
-        read => read?,
-    };
-    loaded.warnings.splice(0..0, warnings);
-    Ok(loaded)
-}
-
-/// The clips that are the dicts of a dict; `None` if none of them is one.
-fn clips_of_dicts(
-    mut archive: Archive,
-    dicts: &[(String, usize)],
-    options: &ReadOptions,
-) -> Option<Loaded> {
-    let mut all = Loaded::default();
-    let mut members = std::mem::take(&mut archive.members);
-    let mut is_any = false;
-    for (index, (key, start)) in dicts.iter().enumerate().rev() {
-        archive.members = members.split_off(*start);
-        for member in &mut archive.members {
-            let name = member.name.strip_prefix(&**key);
-            let name = name.and_then(|name| name.strip_prefix('.'));
-            member.name = name.unwrap_or_default().to_owned();
-        }
-        match npz::of_values(&archive, options) {
-            Ok(mut loaded) => {
-                is_any = true;
-                for clip in &mut loaded.clips {
-                    clip.name = Some(key.clone());
-                    clip.index = index;
-                }
-                all.clips.append(&mut loaded.clips);
-                for warning in loaded.warnings {
-                    let known = all.warnings.iter_mut().find(|it| it.code == warning.code);
-                    match known {
-                        Some(known) => {
-                            let count = known.count + warning.count;
-                            *known = Diagnostic { count, ..warning };
-                        }
-                        None => all.warnings.push(warning),
-                    }
-                }
-            }
-            Err(mut error) => {
-                let location = error.location.map(|location| location.to_string());
-                let location = location.filter(|location| location.starts_with("['"));
-                error.location = None;
-                let location = location.unwrap_or_else(|| format!("['{key}']"));
-                let error = error.inside(location);
-                is_any |= error.code != Code::UnknownArrays;
-                all.refused.push(error);
-            }
-        }
-    }
-    all.clips.reverse();
-    all.refused.reverse();
-    is_any.then_some(all)
 }
 
 /// The values of an array of objects in a file, whose pickle is some of its bytes.

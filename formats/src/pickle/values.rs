@@ -7,8 +7,8 @@ use crate::array::{ArrayHeader, Element};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::npz::archive::{Member, ONLY_ARRAY};
-use crate::pickle::globals::Class;
-use crate::pickle::machine::{Array, Data, Node, NodeId, Tree, resolve, shown, text};
+use crate::pickle::globals::{Class, shown};
+use crate::pickle::machine::{Array, Data, Node, NodeId, Tree, resolve, text};
 use crate::warnings::{Warnings, listed};
 
 /// The largest number of axes of an array that lists in lists become.

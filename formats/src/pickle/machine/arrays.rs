@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use crate::array::{ArrayHeader, Element, element, shape_text};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::npz::array as stored;
-use crate::pickle::globals::ClassName;
-use crate::pickle::machine::{Array, Data, Inert, Machine, Node, NodeId, shown};
+use crate::pickle::globals::{ClassName, shown};
+use crate::pickle::machine::{Array, Data, Inert, Machine, Node, NodeId};
 
 /// An object whose state follows.
 #[derive(Debug, Clone, Copy)]
