@@ -197,7 +197,7 @@ impl ChannelMethods {
     }
 
     /// Evaluates the scalars of a clip, or how fast they change, each by its own sampler, in the order
-    /// `[sample][scalar]`. [Origins](Scalar::origin) are not added.
+    /// `[sample][scalar]`. [Origins](crate::motion::Scalar::origin) are not added.
     ///
     /// # Errors
     /// As [`Engine::scalars`].

@@ -68,7 +68,7 @@ impl Motion {
     /// Adds a scalar.
     ///
     /// # Errors
-    /// As [`TrackSet::push_scalar`].
+    /// As [`TrackSet::push_scalar`](tumble::TrackSet::push_scalar).
     pub fn push_scalar(&mut self, scalar: Scalar, keys: ScalarKeys<'_>) -> Result<(), TrackError> {
         self.add_scalar(scalar, keys.name, keys.times, keys.keys, keys.tangents)
     }
