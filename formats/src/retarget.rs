@@ -216,11 +216,11 @@ pub fn retarget(
 ) -> Result<(Motion, RetargetReport), RetargetError> {
     let from = Rig::new(source, "source")?;
     let to = Rig::new(target, "target")?;
-    let roles = [(&from, "source"), (&to, "target")].map(|(rig, which)| {
-        recognise(&rig.names, &rig.parents)
-            .map_err(|missing| RetargetError::NotRecognised { which, missing })
-    });
-    let pairs = Pairs::new(&from, &to, &options.bones, &roles)?;
+    let roles = [&from, &to].map(|rig| recognise(&rig.names, &rig.parents));
+    let pairs = match &options.bones[..] {
+        [] => Pairs::by_roles(&to, &roles)?,
+        bones => Pairs::by_names(&from, &to, bones)?,
+    };
     let [from_roles, to_roles] = roles.map(Result::ok);
     let found = || {
         Some(axes_of(&to, to_roles.as_ref()?)? * axes_of(&from, from_roles.as_ref()?)?.inverse())
@@ -364,24 +364,44 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn new(
+    fn new(to: &Rig<'_>, source_of: Vec<Option<usize>>) -> Self {
+        // The first joint from the root on that has a partner.
+        let first = to.order.iter();
+        let hips = { first }.find_map(|&joint| Some((joint, source_of[joint]?)));
+        Self { source_of, hips }
+    }
+
+    /// The joints of both skeletons that have one role.
+    fn by_roles(
+        to: &Rig<'_>,
+        [from_roles, to_roles]: &[Result<Roles, Vec<&'static str>>; 2],
+    ) -> Result<Self, RetargetError> {
+        let refused = |which, missing: &Vec<&'static str>| RetargetError::NotRecognised {
+            which,
+            missing: missing.clone(),
+        };
+        let from_roles = from_roles
+            .as_ref()
+            .map_err(|missing| refused("source", missing))?;
+        let to_roles = to_roles
+            .as_ref()
+            .map_err(|missing| refused("target", missing))?;
+        let mut source_of = vec![None; to.names.len()];
+        for role in Role::ALL {
+            if let Some(joint) = to_roles.joint(role) {
+                source_of[joint] = from_roles.joint(role);
+            }
+        }
+        Ok(Self::new(to, source_of))
+    }
+
+    /// The joints of `bones`: names of the target's and of the source's.
+    fn by_names(
         from: &Rig<'_>,
         to: &Rig<'_>,
         bones: &[(String, String)],
-        roles: &[Result<Roles, RetargetError>; 2],
     ) -> Result<Self, RetargetError> {
         let mut source_of = vec![None; to.names.len()];
-        if bones.is_empty() {
-            let [from_roles, to_roles] = match roles {
-                [Ok(from), Ok(to)] => [from, to],
-                [Err(error), _] | [_, Err(error)] => return Err(error.again()),
-            };
-            for role in Role::ALL {
-                if let (Some(joint), partner) = (to_roles.joint(role), from_roles.joint(role)) {
-                    source_of[joint] = partner;
-                }
-            }
-        }
         for (target, source) in bones {
             let unknown = |which, name: &String| RetargetError::Bone {
                 which,
@@ -395,15 +415,7 @@ impl Pairs {
                 return Err(unknown("target", target));
             }
         }
-        // The first joint from the root on that has a partner.
-        let first = to
-            .order
-            .iter()
-            .find_map(|&joint| Some((joint, source_of[joint]?)));
-        Ok(Self {
-            hips: first,
-            source_of,
-        })
+        Ok(Self::new(to, source_of))
     }
 
     fn named(&self, from: &Rig<'_>, to: &Rig<'_>) -> Vec<(String, String)> {
@@ -522,19 +534,6 @@ impl Pairs {
         match lengths {
             (Some(source), Some(target)) if source > 0.0 && target > 0.0 => target / source,
             _ => 1.0,
-        }
-    }
-}
-
-impl RetargetError {
-    /// The same of a skeleton that is not recognised.
-    fn again(&self) -> Self {
-        match self {
-            Self::NotRecognised { which, missing } => Self::NotRecognised {
-                which,
-                missing: missing.clone(),
-            },
-            _ => Self::NoSkeleton { which: "source" },
         }
     }
 }

@@ -1026,7 +1026,7 @@ fn quoted(line: &[u8]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// A text in raw-unicode-escape: Latin-1, with `\uXXXX` and `\UXXXXXXXX`; `None` if an escape is broken.
+/// A text in raw-unicode-escape: Latin-1, and `\u` with four digits or `\U` with eight; `None` if an escape is broken.
 fn unescaped(line: &[u8]) -> Option<String> {
     let mut text = String::with_capacity(line.len());
     let mut rest = line;

@@ -83,8 +83,10 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
                 List::Samples => scene.samples(random, first),
                 List::FramesCoalesced => scene.frame_by_frame(random, false),
                 List::TimesCoalesced => scene.frame_by_frame(random, true),
-                List::FramesSpread => scene.spread(random, false, first),
-                List::TimesSpread => scene.spread(random, true, first),
+                List::FramesSpread | List::TimesSpread => {
+                    let lanes_log2 = random.below(2) + if first { 2 } else { 4 };
+                    scene.spread(random, matches!(list, List::TimesSpread), lanes_log2)
+                }
             }
         })
         .collect()
@@ -268,11 +270,11 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &grid, groups)
     }
 
-    /// Runs of contiguous samples, between some of which there are samples of no run.
-    fn spread(mut self, random: &mut Random, is_listed: bool, is_narrow: bool) -> Trial {
+    /// Runs of contiguous samples, between some of which there are samples of no run; each run has a number of lanes.
+    fn spread(mut self, random: &mut Random, is_listed: bool, lanes_log2: u32) -> Trial {
         const RUNS: usize = 60;
         const FIRST: u32 = 3;
-        let lanes = SpreadLanes::new(random.below(2) + if is_narrow { 2 } else { 4 });
+        let lanes = SpreadLanes::new(lanes_log2);
         let mut chunk = WorkChunk::default();
         let mut output = 0;
         for _ in 0..RUNS {
