@@ -158,14 +158,10 @@ pub fn bodies(
     let (mut joint_values, mut joint_rates) = (Vec::new(), Vec::new());
     let mut excesses = Vec::new();
     for sample in 0..channels.samples {
-        let all = tree.scalar_joints().zip(&joints.scalars);
-        for (joint, scalar) in all {
-            let rest = [joint.reference, 0.0];
-            let [value, rate] = scalar.map_or(rest, |scalar| channels.scalar(scalar, sample));
-            note_excess(joint, value, sample, &mut excesses);
-            joint_values.push(value as f32);
-            joint_rates.push(rate as f32);
-        }
+        let (configuration, rates) = at(sample);
+        note_excesses(tree, &configuration.scalars, sample, &mut excesses);
+        joint_values.extend(configuration.scalars.iter().map(|&value| value as f32));
+        joint_rates.extend(rates.scalars.iter().map(|&rate| rate as f32));
     }
     Ok(Bodies {
         joint_values,
@@ -223,22 +219,24 @@ pub fn mass_centres(tree: &Tree, point: VelocityPoint) -> Result<Vec<DVec3>, Bod
     }
 }
 
-fn note_excess(joint: &TreeJoint, value: f64, sample: usize, excesses: &mut Vec<LimitExcess>) {
-    let Some([low, high]) = joint.limits else {
-        return;
-    };
-    let excess = (low - value).max(value - high);
-    // Limits and keys are rounded to f32 in most files.
-    if excess <= 1e-6 * value.abs().max(1.0) {
-        return;
-    }
-    match excesses.iter_mut().find(|known| known.joint == joint.name) {
-        Some(known) => known.excess = known.excess.max(excess),
-        None => excesses.push(LimitExcess {
-            joint: joint.name.clone(),
-            excess,
-            sample,
-        }),
+fn note_excesses(tree: &Tree, values: &[f64], sample: usize, excesses: &mut Vec<LimitExcess>) {
+    for (joint, &value) in tree.scalar_joints().zip(values) {
+        let Some([low, high]) = joint.limits else {
+            continue;
+        };
+        let excess = (low - value).max(value - high);
+        // Limits and keys are rounded to f32 in most files.
+        if excess <= 1e-6 * value.abs().max(1.0) {
+            continue;
+        }
+        match excesses.iter_mut().find(|known| known.joint == joint.name) {
+            Some(known) => known.excess = known.excess.max(excess),
+            None => excesses.push(LimitExcess {
+                joint: joint.name.clone(),
+                excess,
+                sample,
+            }),
+        }
     }
 }
 
