@@ -152,7 +152,7 @@ pub use crate::simd::dispatch::VectorWidth;
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};
 pub use crate::stream::Chunk;
 pub use crate::threads::stop::{Stop, StoppedError};
-pub use crate::threads::{OutOfThreadsError, on_threads};
+pub use crate::threads::{OutOfThreadsError, on_threads, set_thread_count};
 pub use crate::time::error::{MAX_FRAMES, SampleTimesError};
 pub use crate::time::frame_rate::FrameRate;
 pub use crate::time::frames::{SampleTimes, Timeline};

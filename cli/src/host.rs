@@ -50,6 +50,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let outcome = std::panic::catch_unwind(|| {
+        arguments.global.apply();
         signals::stop_on_signals();
         arguments.command.run()
     });

@@ -20,6 +20,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
+use crate::arguments::global::GlobalArguments;
 use crate::commands::Command;
 use crate::messages::exit::BUG;
 
@@ -30,7 +31,7 @@ const EXAMPLES: &str = "\
 Examples:
   tumble generate -o chain.dat                 make an example file
   tumble info chain.dat                        show what it contains
-  tumble eval chain.dat -o chain.npy           25 frames per second, Bessel-Overhauser
+  tumble eval chain.dat -o chain.npy           evaluate it: 25 fps, since its keys have no rate
   tumble eval chain.dat -m slerp -o chain.csv  slerp, as text
   tumble eval walks -o results --resume        a directory of files; skips results that are done
   tumble check results                         find results that changed since they were written
@@ -56,6 +57,8 @@ A result that is too large is 4 for the memory and 7 for the disk; of several in
 #[command(name = "tumble", version, about = ABOUT, after_help = EXAMPLES)]
 #[command(max_term_width = 100)]
 pub struct Arguments {
+    #[command(flatten)]
+    global: GlobalArguments,
     #[command(subcommand)]
     command: Command,
 }

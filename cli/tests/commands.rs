@@ -2,6 +2,7 @@
 //! every command. And the list of the tests' files. `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all
 //! commands::` writes the table and the list anew.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -106,6 +107,65 @@ fn the_table_of_commands_is_that_of_the_program() {
         file: here().join("../docs/program.md"),
         begin: "<!-- commands: written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli` -->\n",
         end: "<!-- end of commands -->\n",
+        expected: table,
+    };
+    part.check();
+}
+
+/// Each option with its value, its default, its meaning and the commands that have it.
+#[test]
+fn the_table_of_options_is_that_of_the_program() {
+    struct OptionRow {
+        names: String,
+        meaning: String,
+        commands: Vec<String>,
+    }
+    let plain = |text: String| text.replace('|', "\\|").replace('<', "&lt;");
+    let mut rows: BTreeMap<String, OptionRow> = BTreeMap::new();
+    let program = tumble_cli::Arguments::command();
+    let all = commands();
+    let each = all.iter().map(|command| (command.get_name(), command));
+    for (name, command) in each.chain([("every command", &program)]) {
+        for option in command.get_arguments() {
+            let Some(long) = option.get_long() else {
+                continue;
+            };
+            let row = rows.entry(long.to_owned()).or_insert_with(|| {
+                let short = option.get_short();
+                let short = short.map_or(String::new(), |letter| format!("`-{letter}` "));
+                let visible = option.get_visible_aliases().unwrap_or_default();
+                let aliases: String = visible
+                    .iter()
+                    .map(|alias| format!(" `--{alias}`"))
+                    .collect();
+                let takes_value = option.get_action().takes_values();
+                let value = option.get_value_names().filter(|_| takes_value);
+                let value = value.map_or(String::new(), |names| format!(" {}", names.join(" ")));
+                let defaults = option.get_default_values().iter().filter(|_| takes_value);
+                let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
+                let default = match defaults.is_empty() {
+                    true => String::new(),
+                    false => format!(" [default: {}]", defaults.join(",")),
+                };
+                let help = option.get_help().unwrap_or_default();
+                OptionRow {
+                    names: format!("{short}`--{long}{value}`{aliases}"),
+                    meaning: plain(format!("{help}{default}")),
+                    commands: Vec::new(),
+                }
+            });
+            row.commands.push(name.to_owned());
+        }
+    }
+    let mut table = String::from("| option | meaning | commands |\n|---|---|---|\n");
+    for row in rows.values() {
+        let commands = row.commands.join(", ");
+        writeln!(table, "| {} | {} | {commands} |", row.names, row.meaning).unwrap();
+    }
+    let part = WrittenPart {
+        file: here().join("../docs/options.md"),
+        begin: "<!-- options: written by `UPDATE_EXPECTED=1 cargo test -p tumble-cli` -->\n",
+        end: "<!-- end of options -->\n",
         expected: table,
     };
     part.check();

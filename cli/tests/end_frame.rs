@@ -260,3 +260,48 @@ fn rates_of_options_contradict_no_file_silently() {
         );
     }
 }
+
+/// Without `--fps` a result has the frames of its input, whose keys they are; where keys have no rate of frames, a line
+/// says which was assumed.
+#[test]
+fn frames_are_those_of_the_source() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    let keys = |count: u32, per_second: f64| {
+        let each = (0..count).map(|key| {
+            let (sine, cosine) = (f64::from(key) * 0.1).sin_cos();
+            format!(
+                "{} {key} 0 0 0 0 {sine} {cosine}\n",
+                f64::from(key) / per_second
+            )
+        });
+        each.collect::<String>()
+    };
+    write("fast.tum", keys(61, 120.0));
+    write("slow.tum", keys(5, 2.0));
+    let frames = |line: &str| {
+        let run = succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        let out = fs::read_to_string(folder.path().join("out.csv")).unwrap();
+        (out.lines().count() - 1, run.words)
+    };
+    let (count, words) = frames("eval fast.tum --output quaternion -o out.csv --overwrite");
+    assert_eq!(count, 61, "{words}");
+    assert!(!words.contains("fps"), "{words}");
+    let (count, words) = frames("eval slow.tum --output quaternion -o out.csv --overwrite");
+    assert_eq!(count, 51, "{words}");
+    assert!(
+        words.contains("51 frames (25 fps, because its keys have no rate), "),
+        "{words}"
+    );
+    let (again, words) = frames("eval slow.tum --output quaternion -f 25 -o out.csv --overwrite");
+    assert_eq!((again, words.contains("fps")), (51, false), "{words}");
+    // Device and reference are compared where no key is, too.
+    let run = succeed(
+        folder.path(),
+        &"verify fast.tum --device cpu -m slerp --json"
+            .split(' ')
+            .collect::<Vec<_>>(),
+    );
+    let lines: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    assert_eq!(lines[0]["rotations"], 121);
+}

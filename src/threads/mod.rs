@@ -12,6 +12,7 @@ pub(crate) mod stop;
 
 use std::cell::Cell;
 use std::io;
+use std::num::NonZeroUsize;
 use std::panic::resume_unwind;
 use std::process;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
@@ -267,9 +268,25 @@ fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
     Ok(())
 }
 
-/// The number that `RAYON_NUM_THREADS` says, or one for each core that this process may use.
+/// The number of the threads of the process, once something asked for it.
+static COUNT: OnceLock<usize> = OnceLock::new();
+
+/// Sets the number of threads that all engines of the process share, instead of that of the environment variable
+/// `RAYON_NUM_THREADS`. False if it is too late, because the number was used or set before.
+///
+/// ```
+/// use std::num::NonZeroUsize;
+/// if tumble::set_thread_count(NonZeroUsize::MIN) {
+///     assert_eq!(tumble::on_threads(rayon::current_num_threads)?, 1);
+/// }
+/// # Ok::<(), tumble::OutOfThreadsError>(())
+/// ```
+pub fn set_thread_count(count: NonZeroUsize) -> bool {
+    COUNT.set(count.get()).is_ok()
+}
+
+/// The number that was set, or that `RAYON_NUM_THREADS` says, or one for each core that this process may use.
 fn default_count() -> usize {
-    static COUNT: OnceLock<usize> = OnceLock::new();
     *COUNT.get_or_init(|| {
         let named = std::env::var("RAYON_NUM_THREADS").ok();
         let named = named.and_then(|count| count.parse().ok());

@@ -40,6 +40,14 @@ impl FrameRate {
         Ok(rate)
     }
 
+    /// The rate of `factor` times as many frames in the same seconds.
+    ///
+    /// # Errors
+    /// As [`FrameRate::new`].
+    pub fn times(self, factor: u64) -> Result<Self, SampleTimesError> {
+        Self::new(self.frames.saturating_mul(factor), self.seconds)
+    }
+
     /// A whole number of frames per second. 0 is refused later, in
     /// [`SampleTimes::resolve`](crate::SampleTimes::resolve).
     pub(crate) fn whole(frames: u32) -> Self {

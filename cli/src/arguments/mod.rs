@@ -1,6 +1,7 @@
 //! Options that several commands share, parsed into validated values.
 
 pub(crate) mod device;
+pub(crate) mod global;
 pub(crate) mod input;
 pub(crate) mod interpolation;
 pub(crate) mod options;

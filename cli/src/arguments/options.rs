@@ -13,6 +13,7 @@ use tumble::{Encoding, Layout};
 use tumble_formats::end_frame::{SampledKind, SampledResult};
 use tumble_formats::format::{Format, FormatOption};
 
+use crate::arguments::global::GLOBAL;
 use crate::arguments::interpolation::InterpolationArguments;
 use crate::arguments::output::OutputArguments;
 use crate::arguments::time::EndFrameArguments;
@@ -163,6 +164,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     silent("out"),
     silent("overwrite"),
     silent("resume"),
+    silent("dry_run"),
     silent("prune"),
     silent("names"),
     silent("verbose"),
@@ -503,7 +505,7 @@ impl clap::FromArgMatches for CommandLine {
         let mut command_line = Self::default();
         for id in matches.ids().map(clap::Id::as_str) {
             // Groups of options are called after their structs.
-            if id.starts_with(char::is_uppercase) {
+            if id.starts_with(char::is_uppercase) || GLOBAL.contains(&id) {
                 continue;
             }
             if matches.value_source(id) == Some(ValueSource::CommandLine) {

@@ -13,12 +13,13 @@ use tumble_formats::{Code, Diagnostic, Feature, Format};
 
 use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
 use crate::arguments::options::ResultOptions;
+use crate::batch::entry::InputEntry;
 use crate::batch::output_plan::{self, OutputOptions, OutputPlan};
 use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
 use crate::batch::result_names::ResultNaming;
 use crate::batch::target::{self, Destination, ResultTarget, WrittenFile};
-use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::names;
+use crate::messages::exit::{ALL_INPUTS, DONE, Failure, Outcomes};
+use crate::messages::{listing, names, words};
 
 const ONE_INPUT: &str = "--times-out needs a single input whose result is a single file";
 
@@ -33,6 +34,9 @@ pub(crate) struct ResultArguments {
     /// the same options
     #[arg(long)]
     resume: bool,
+    /// List the results that would be written, and write none
+    #[arg(short = 'n', long, conflicts_with = "prune")]
+    dry_run: bool,
     /// In a directory of results: remove those whose inputs are gone, and their lines in the manifest
     #[arg(long)]
     prune: bool,
@@ -132,6 +136,10 @@ impl ResultArguments {
 
     /// Refuses options for shards that need all results of a directory.
     pub(crate) fn check_shards(&self) -> Result<(), Failure> {
+        if self.dry_run {
+            let message = "--dry-run lists the results of all inputs; leave out --shard";
+            return Err(Failure::usage(message));
+        }
         match self.prune {
             true => Err(Failure::usage(
                 "--prune needs all inputs, and a shard has some of them; merge the shards, then run the command \
@@ -159,17 +167,18 @@ impl ResultArguments {
     /// The destination of each input's result. Everything that can be refused is refused here, before any work.
     pub(crate) fn plan(&self, inputs: GatheredInputs) -> Result<OutputPlan, Failure> {
         let inputs = &self.based(inputs)?;
-        let mut plan = output_plan::plan(
-            inputs,
-            OutputOptions {
-                out: self.out.as_deref(),
-                format: self.format,
-                overwrite: self.overwrite,
-                resume: self.resume,
-                prune: self.prune,
-                naming: self.names,
-            },
-        )?;
+        let options = OutputOptions {
+            out: self.out.as_deref(),
+            format: self.format,
+            overwrite: self.overwrite,
+            resume: self.resume,
+            prune: self.prune,
+            naming: self.names,
+        };
+        if self.dry_run {
+            return Err(self.list_plan(inputs, options)?);
+        }
+        let mut plan = output_plan::plan(inputs, options)?;
         if plan.manifest.is_none() {
             let options = [
                 ("--base", self.base.is_some()),
@@ -202,6 +211,35 @@ impl ResultArguments {
             plan.targets.push(target.with_times(destination)?);
         }
         Ok(plan)
+    }
+
+    /// `--dry-run`: lists the results, and ends the command.
+    fn list_plan(
+        &self,
+        inputs: &GatheredInputs,
+        options: OutputOptions<'_>,
+    ) -> Result<Failure, Failure> {
+        let (planned, refused) = output_plan::preview(inputs, options)?;
+        let mut outcomes = Outcomes::of(planned.len() + refused.len());
+        let failed = refused.iter();
+        let failed = failed.map(|input| InputEntry::failed(&input.path, None, &input.failure));
+        let failed: Vec<InputEntry> = failed.collect();
+        match self.json {
+            true => listing::records(&planned, &failed)?,
+            false => {
+                let lines = planned.iter().map(|result| format!("{result}\n"));
+                listing::text(&lines.collect::<String>())?;
+            }
+        }
+        words::note(&format!(
+            "{} would be made; nothing was written (--dry-run)",
+            words::count(planned.len(), "result")
+        ));
+        refused
+            .into_iter()
+            .for_each(|input| outcomes.add(Err(input.failure)));
+        outcomes.finish()?;
+        Ok(Failure::quiet(DONE))
     }
 
     /// Starts the work that `plan` has. `options` is everything that determines a result besides its input.

@@ -1,10 +1,12 @@
 //! `--fps`, `--times`, `--start`, `--end`: which samples to evaluate.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
-use tumble::{FrameRate, SampleTimes, Timeline};
+use tumble::{FrameRate, SampleTimes, SampleTimesError, Timeline};
 use tumble_formats::end_frame::{
     EndFrame, EndFrameError, EndSample, FramesToEnd, RateFrames, SampledResult,
 };
@@ -32,14 +34,16 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second: from the first key to the last, a number or a ratio, such as 30000/1001
+    /// Frames per second: from the first key to the last, a number, a ratio, such as 30000/1001, or `source`, the
+    /// rate of the input's keys (25 where they have none, or one below 10)
     #[arg(
+        short = 'f',
         long,
         value_name = "FPS",
-        default_value = "25",
+        default_value_t = RateChoice::Source,
         allow_hyphen_values = true
     )]
-    fps: FrameRate,
+    fps: RateChoice,
     /// Evaluate at the times in a text file instead: seconds, one per line (`-`: standard input)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "start", "end"])]
     times: Option<PathBuf>,
@@ -54,10 +58,78 @@ pub(crate) struct SamplingArguments {
     from_zero: bool,
 }
 
+/// `--fps`: how many frames a second has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RateChoice {
+    /// As many as the keys of each input.
+    Source,
+    /// Twice as many: the frames of the keys, and those halfway between them, where curves differ.
+    SourceAndHalves,
+    Number(FrameRate),
+}
+
+/// The lowest rate of keys that is one of frames. Keys that are further apart are those of a person, or of a slow log.
+const MIN_SOURCE_RATE: f64 = 10.0;
+
+/// The rate of frames where the keys have none.
+const DEFAULT_RATE: u64 = 25;
+
+const SOURCE: &str = "source";
+
+impl RateChoice {
+    /// The rate of a clip's frames.
+    pub(crate) fn of(self, clip: &Motion) -> FrameRate {
+        let found = match self {
+            Self::Number(rate) => Some(rate),
+            Self::Source => source_rate(clip),
+            Self::SourceAndHalves => source_rate(clip).and_then(|rate| rate.times(2).ok()),
+        };
+        let found = found.or_else(|| FrameRate::new(DEFAULT_RATE, 1).ok());
+        found.expect("25 frames a second are a rate")
+    }
+
+    /// The rate that was assumed, because the keys of the clip have none.
+    pub(crate) fn assumed(self, clip: &Motion) -> Option<FrameRate> {
+        let is_assumed = self == Self::Source && source_rate(clip).is_none();
+        is_assumed.then(|| self.of(clip))
+    }
+}
+
+/// The rate of a clip's keys, if they are dense enough to be frames.
+fn source_rate(clip: &Motion) -> Option<FrameRate> {
+    clip.rate
+        .filter(|rate| rate.per_second() >= MIN_SOURCE_RATE)
+}
+
+impl FromStr for RateChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            SOURCE => Ok(Self::Source),
+            _ => text
+                .parse()
+                .map(Self::Number)
+                .map_err(|error: SampleTimesError| {
+                    format!("{error}; or `{SOURCE}`, the rate of the input's keys")
+                }),
+        }
+    }
+}
+
+impl fmt::Display for RateChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source | Self::SourceAndHalves => f.write_str(SOURCE),
+            Self::Number(rate) => rate.fmt(f),
+        }
+    }
+}
+
 /// The requested samples, before the tracks are known.
 pub(crate) enum SampleChoice {
     Rate {
-        rate: FrameRate,
+        rate: RateChoice,
         start: Option<f64>,
         end: Option<f64>,
         /// Start at 0 where the first key is later.
@@ -266,10 +338,12 @@ impl SamplingArguments {
             return Ok(SampleChoice::Times(times(path)?));
         }
         check_range(self.start, self.end)?;
-        if let Some(meant) = broadcast_rate(self.fps) {
+        if let RateChoice::Number(rate) = self.fps
+            && let Some(meant) = broadcast_rate(rate)
+        {
             words::warning(&format!(
                 "{} frames per second is taken as written; the broadcast rate is {meant}",
-                self.fps.per_second()
+                rate.per_second()
             ));
         }
         Ok(SampleChoice::Rate {
@@ -282,6 +356,25 @@ impl SamplingArguments {
 }
 
 impl SampleChoice {
+    /// The same, with frames halfway between keys where `--fps` is that of the input: a curve is compared where it is
+    /// no key.
+    pub(crate) fn and_halves(mut self) -> Self {
+        if let Self::Rate { rate, .. } = &mut self
+            && *rate == RateChoice::Source
+        {
+            *rate = RateChoice::SourceAndHalves;
+        }
+        self
+    }
+
+    /// The rate that was assumed for a clip, because its keys have none.
+    pub(crate) fn assumed_rate(&self, clip: &Motion) -> Option<FrameRate> {
+        match self {
+            Self::Rate { rate, .. } => rate.assumed(clip),
+            Self::Times(_) | Self::Keys(_) => None,
+        }
+    }
+
     /// The hash of a list of times; empty for a rate.
     pub(crate) fn digest(&self) -> String {
         match self {
@@ -324,6 +417,7 @@ impl SampleChoice {
         let frames = self.of(clip, outside, name)?;
         let all = match *self {
             Self::Rate { rate, .. } => {
+                let rate = rate.of(clip);
                 let end = self.end_of(clip, outside).unwrap_or(0.0);
                 let frames = RateFrames { frames, rate, end };
                 ClipFrames::at_rate(clip, frames, end_frame, name)?
@@ -420,11 +514,11 @@ impl SampleChoice {
                 let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
                 let end = end.map_or(last, |end| clip.time_in_set(end));
                 warn_outside_keys(first, end, clip, outside, name);
-                SampleTimes::rate(*rate).between(first.min(0.0), end)
+                SampleTimes::rate(rate.of(clip)).between(first.min(0.0), end)
             }
             Self::Rate {
                 rate, start, end, ..
-            } => return in_frames(*rate, [*start, *end], clip, outside, name),
+            } => return in_frames(rate.of(clip), [*start, *end], clip, outside, name),
             Self::Times(times) => at(times.iter().map(|&time| clip.time_in_set(time)).collect()),
             Self::Keys(keys) => {
                 // Each clip has its own time offset, in whole seconds.
@@ -436,7 +530,7 @@ impl SampleChoice {
             }
         };
         let rate = match self {
-            Self::Rate { rate, .. } => Some(*rate),
+            Self::Rate { rate, .. } => Some(rate.of(clip)),
             Self::Times(_) | Self::Keys(_) => None,
         };
         kept(outside, frames, rate, clip, name)

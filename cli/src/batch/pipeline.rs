@@ -38,7 +38,7 @@ use crate::batch::output_plan::UnplannedInput;
 use crate::batch::summary::BatchSummary;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
-use crate::messages::progress::busy;
+use crate::messages::progress::{Progress, busy};
 use crate::messages::{listing, names, signals, words};
 
 /// An input and the target of its result.
@@ -195,6 +195,7 @@ struct CurrentInput {
 struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
+    progress: Progress,
     options: ResultOptions,
     inputs: usize,
     made: HashSet<String>,
@@ -264,6 +265,7 @@ impl<'a> Pipeline<'a> {
         let batch = BatchRecords {
             records,
             summary: BatchSummary::new(inputs, verbose),
+            progress: Progress::new("inputs", inputs as u64),
             options,
             inputs,
             made: HashSet::new(),
@@ -416,6 +418,7 @@ impl<'a> Pipeline<'a> {
         let Some((file, loaded)) = input else {
             if let Some(batch) = &mut self.batch {
                 batch.skipped += 1;
+                batch.progress.advance(1);
                 batch.records.skip(target.name());
             }
             if let Some(json) = &mut self.json {
@@ -536,6 +539,10 @@ impl<'a> Pipeline<'a> {
             }
             recorded = batch.records.refuse(entry);
         }
+        match outcome {
+            Ok(()) => batch.progress.advance(1),
+            Err(_) => batch.progress.fail(1),
+        }
         let summary = &mut batch.summary;
         self.outcomes
             .add_reporting(outcome, |failure| summary.fail(failure));
@@ -630,6 +637,7 @@ impl BatchRecords<'_> {
                  different directories"
             )));
         }
+        let bytes = result.written.bytes;
         let digest = result.written.digest.take().unwrap_or_default();
         let clips = work.input.loaded.clips.len();
         let entry = ManifestEntry {
@@ -650,6 +658,7 @@ impl BatchRecords<'_> {
         kept.inspect_err(|_| {
             self.made.remove(name);
         })?;
+        self.progress.add_bytes(bytes);
         if let Some(line) = self.summary.result(&result.message) {
             self.records.tell(line);
         }

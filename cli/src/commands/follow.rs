@@ -227,7 +227,7 @@ fn write(
         rest: Transform::default(),
     };
     let rate = match samples {
-        SampleChoice::Rate { rate, .. } => Some(*rate),
+        SampleChoice::Rate { rate, .. } => Some(rate.of(paths)),
         SampleChoice::Times(_) | SampleChoice::Keys(_) => None,
     };
     let clip = Motion {

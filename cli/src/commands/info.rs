@@ -222,7 +222,7 @@ fn summarise(
         summaries.push(Report::Clip(Box::new(summary)));
     }
     for refused in &loaded.refused {
-        words::note(&refused.to_string());
+        words::line(&refused.to_string());
     }
     input::check_complete(&name, &loaded)
 }

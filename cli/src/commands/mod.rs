@@ -12,6 +12,7 @@ pub(crate) mod explain;
 pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
+pub(crate) mod man;
 pub(crate) mod merge;
 pub(crate) mod methods;
 pub(crate) mod picture;
@@ -56,6 +57,7 @@ pub(crate) enum Command {
     Merge(merge::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
+    Man(man::Arguments),
     #[command(hide = true)]
     ProbeDrivers(probe::Arguments),
 }
@@ -84,6 +86,7 @@ impl Command {
             Self::Merge(arguments) => merge::run(&arguments),
             Self::Explain(arguments) => explain::run(&arguments),
             Self::Completions(arguments) => completions::run(&arguments),
+            Self::Man(arguments) => man::run(&arguments),
             Self::ProbeDrivers(arguments) => probe::run(&arguments),
         }
     }

@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments
         .inputs
         .distinct(arguments.sampling.reads_standard_input())?;
-    let samples = arguments.sampling.samples()?;
+    let samples = arguments.sampling.samples()?.and_halves();
     let methods = chosen(&arguments.methods);
     arguments
         .interpolation
@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (mut lines, mut failed) = (Vec::new(), Vec::new());
     let mut verify = |path: &Path| {
         let name = names::input(path);
-        let loaded = progress.suspend(|| arguments.inputs.load(path))?;
+        let loaded = arguments.inputs.load(path)?;
         for clip in &loaded.clips {
             let name = match loaded.clips.len() {
                 1 => name.clone(),
@@ -149,14 +149,14 @@ impl Arguments {
     ) -> Result<Vec<VerificationLine>, Failure> {
         let set = &clip.set;
         let outside = self.interpolation.outside();
-        let frames = progress.suspend(|| samples.of(clip, outside, name))?;
+        let frames = samples.of(clip, outside, name)?;
         // Two results are in memory at once.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();
         for &method in methods {
             let interpolation = self.interpolation.with(method);
             if let Some(warning) = curve_warning(name, set, &interpolation) {
-                progress.suspend(|| words::note(&warning.to_string()));
+                words::note(&warning.to_string());
             }
             let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;

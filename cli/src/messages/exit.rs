@@ -200,12 +200,12 @@ impl Failure {
     /// Says why, on standard error, and gives the exit code.
     pub(crate) fn report(&self) -> u8 {
         if self.plain {
-            words::note(&self.message);
+            words::line(&self.message);
         } else if !self.message.is_empty() {
             words::error(&self.message);
         }
         for line in &self.more {
-            words::note(line);
+            words::line(line);
         }
         self.code
     }

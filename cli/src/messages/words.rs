@@ -7,33 +7,68 @@
 use std::any::Any;
 use std::ffi::OsString;
 use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::error::{ContextKind, ContextValue};
 use tumble::names::by_meaning;
-use tumble_formats::Diagnostic;
 use tumble_formats::guarded::is_guarded;
 use tumble_formats::printable::printable;
+use tumble_formats::{Diagnostic, Severity};
+
+use crate::messages::progress;
+
+/// Whether notes and warnings are left out.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Leaves out notes and warnings from now on, or prints them again.
+pub(crate) fn set_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints a line that `--quiet` does not leave out: a part of an error.
+pub(crate) fn line(message: &str) {
+    let message = printable(message);
+    progress::beside_bar(|| {
+        let _ = writeln!(anstream::stderr(), "{message}");
+    });
+}
 
 pub(crate) fn error(message: &str) {
     let message = printable(message);
-    let _ = writeln!(anstream::stderr(), "\x1b[1;31merror:\x1b[0m {message}");
+    progress::beside_bar(|| {
+        let _ = writeln!(anstream::stderr(), "\x1b[1;31merror:\x1b[0m {message}");
+    });
 }
 
 pub(crate) fn warning(message: &str) {
+    if is_quiet() {
+        return;
+    }
     let message = printable(message);
-    let _ = writeln!(anstream::stderr(), "\x1b[1;33mwarning:\x1b[0m {message}");
+    progress::beside_bar(|| {
+        let _ = writeln!(anstream::stderr(), "\x1b[1;33mwarning:\x1b[0m {message}");
+    });
 }
 
 /// One line, whatever names are in it.
 pub(crate) fn note(message: &str) {
-    let _ = writeln!(anstream::stderr(), "{}", printable(message));
+    if !is_quiet() {
+        line(message);
+    }
 }
 
 /// Prints warnings about an input, or errors of parts of it.
 pub(crate) fn warnings<'a>(warnings: impl IntoIterator<Item = &'a Diagnostic>) {
     for warning in warnings {
-        note(&warning.to_string());
+        match warning.code.severity() {
+            Severity::Error => line(&warning.to_string()),
+            Severity::Warning => note(&warning.to_string()),
+        }
     }
 }
 
@@ -90,16 +125,16 @@ pub(crate) fn explain_panics() {
             return;
         }
         let location = info.location().map(ToString::to_string).unwrap_or_default();
-        let line: Vec<String> = std::env::args_os()
+        let words: Vec<String> = std::env::args_os()
             .map(|a| a.to_string_lossy().into_owned())
             .collect();
         error(&format!("internal error at {location}: {message}"));
-        note(&format!(
+        line(&format!(
             "  this is a bug in tumble {}; please report it with the command line and, if it can be \
              shared, the input:",
             env!("CARGO_PKG_VERSION"),
         ));
-        note(&format!("  {}", line.join(" ")));
+        line(&format!("  {}", words.join(" ")));
     }));
 }
 

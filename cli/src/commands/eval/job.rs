@@ -276,8 +276,15 @@ impl EvaluationJob<'_> {
             Some(seconds) => format!(" (the {seconds:.3} s after the last one are left out)"),
             None => String::new(),
         };
+        let assumed = work.clips();
+        let mut assumed = assumed
+            .iter()
+            .filter_map(|clip| self.samples.assumed_rate(clip));
+        let assumed = assumed.next().map_or(String::new(), |rate| {
+            format!(" ({rate} fps, because its keys have no rate)")
+        });
         let done = format!(
-            "{} × {}{in_gaps}{left_out}, {method}",
+            "{} × {}{assumed}{in_gaps}{left_out}, {method}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
         );
@@ -387,7 +394,7 @@ impl EvaluationJob<'_> {
         let end_frame =
             end_frame.map_err(|message| Failure::usage(format!("{name}: {message}")))?;
         let at = |clip: &&Motion| {
-            let frames = document.frames(clip.index, rate);
+            let frames = document.frames(clip.index, rate.of(clip));
             let frames = frames.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
             ClipFrames::at_rate(clip, frames, end_frame, name)
         };

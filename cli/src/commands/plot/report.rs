@@ -46,12 +46,12 @@ pub(crate) fn write(
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
     let outcome = for_each(&inputs, |path| {
-        let only = progress.suspend(|| arguments.inputs.load_one(path))?;
+        let only = arguments.inputs.load_one(path)?;
         let (clip, set) = (&only.clip, &only.clip.set);
         let name = names::input(path);
         let choices = arguments.choices(&name, clip)?;
-        progress.suspend(|| note_curves(&name, clip, &choices));
-        let mut boxes = progress.suspend(|| moving_boxes(set, &name));
+        note_curves(&name, clip, &choices);
+        let mut boxes = moving_boxes(set, &name);
         boxes.truncate(PANELS);
         let chapter = Chapter {
             title: names::title(path, clip),

@@ -91,7 +91,7 @@ impl<'a> PlotSource<'a> {
         let mut about = match samples.request {
             SampleChoice::Rate { rate, .. } => {
                 let count = words::count(timeline.len(), "frame");
-                format!("{count}, {rate} per second")
+                format!("{count}, {} per second", rate.of(clip))
             }
             SampleChoice::Times(_) | SampleChoice::Keys(_) => words::count(timeline.len(), "time"),
         };
