@@ -48,9 +48,10 @@ fn the_guide_has_every_method() {
             false => "no, near them",
         };
         let (name, smoothness, summary) = (method.name, method.smoothness(), method.summary);
-        format!("| `{name}` | {through} | {smoothness} | {summary} |")
+        let vectors = method.vector_method.name();
+        format!("| `{name}` | {through} | {smoothness} | `{vectors}` | {summary} |")
     });
-    let head = "| method | through its keys | continuity | use |\n|---|---|---|---|\n";
+    let head = "| method | through its keys | continuity | positions, scalars | use |\n|---|---|---|---|---|\n";
     assert_list(GUIDE, [head, "\n\n"], &rows.join("\n"));
 }
 

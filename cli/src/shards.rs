@@ -434,6 +434,8 @@ impl ShardRecord {
             code,
             message,
             result: None,
+            diagnostic: None,
+            causes: Vec::new(),
         });
     }
 

@@ -206,7 +206,7 @@ fn an_input_is_all_files_that_it_refers_to() {
     write(-0.8);
     let check = run(folder, &["check", "out"]);
     assert_eq!(check.code, 8, "{}", check.words);
-    let stale = "m.Run.npy: its input m.gltf has changed";
+    let stale = "m.Run.npy: its input m.gltf (or a file that belongs to it) has changed";
     assert!(check.words.contains(stale), "{}", check.words);
     let again = succeed(folder, &batch);
     let made = "2 results made of 1 input, 1 result skipped";
@@ -273,6 +273,8 @@ fn resuming_does_not_replace_the_result_of_another_input() {
             run(folder, &[&line[..], shard, more].concat())
         };
         fs::create_dir(folder.join(out)).unwrap();
+        fs::create_dir_all(folder.join("m4")).unwrap();
+        fs::copy(folder.join("m1/x.dat"), folder.join("m4/x.dat")).unwrap();
         assert_eq!(batch("m1/x.dat", &[]).code, 0);
         if !shard.is_empty() {
             succeed(folder, &["merge", out]);
@@ -284,6 +286,11 @@ fn resuming_does_not_replace_the_result_of_another_input() {
                 "give their directory, whose tree is kept, or --base",
             ),
             ("m3/x.txt", "give --names full"),
+            // Its bytes are those of m1/x.dat, which is still there, and whose result may have other options.
+            (
+                "m4/x.dat",
+                "give their directory, whose tree is kept, or --base",
+            ),
         ] {
             let refused = batch(input, &[]);
             let words = format!("{input}: {out}/x.npy is the result of m1/x.dat; {remedy}");
@@ -294,14 +301,9 @@ fn resuming_does_not_replace_the_result_of_another_input() {
             );
             assert_eq!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
         }
-        // The same bytes make the same result, and so does the same file by another path.
-        fs::copy(folder.join("m1/x.dat"), folder.join("m1/same.dat")).unwrap();
-        fs::create_dir_all(folder.join("m4")).unwrap();
-        fs::copy(folder.join("m1/x.dat"), folder.join("m4/x.dat")).unwrap();
-        for input in ["m4/x.dat", "./m1/x.dat"] {
-            let same = batch(input, &[]);
-            assert_eq!(same.code, 0, "{}", same.words);
-        }
+        // The same file by another path.
+        let same = batch("./m1/x.dat", &[]);
+        assert_eq!(same.code, 0, "{}", same.words);
         // What is asked for is done, and so is what replaces nothing.
         assert_eq!(batch("m2/x.dat", &["--overwrite"]).code, 0);
         assert_ne!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
@@ -551,7 +553,7 @@ fn a_long_batch_prints_at_most_a_screen() {
     assert!(lines <= 16, "{lines}: {}", made.words);
     let said = [
         "W012 30 files: neighbouring keys 180° apart (--verbose lists them)",
-        "E020 20 more files: the wrong number of columns (--verbose lists them)",
+        "E020 20 more files: the wrong number of columns; the first: ",
         "30 results made, 30 inputs failed; listed in out/manifest.jsonl",
     ];
     for line in said {

@@ -291,3 +291,30 @@ fn convert_keeps_cubics_and_times_of_channels() {
         refused.words
     );
 }
+
+/// Formats with one list of times take a joint that stands still beside one that moves.
+#[test]
+fn still_joints_have_the_times_of_the_others() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let keys = (0..31).map(|key| {
+        let angle = f64::from(key) * 0.1;
+        format!(
+            "{} {} 0 0 {} 1 0 0 0\n",
+            f64::from(key) / 30.0,
+            angle.cos(),
+            angle.sin()
+        )
+    });
+    let keys: String = keys.collect();
+    fs::write(folder.join("still.dat"), format!("# 2 1\n{keys}")).unwrap();
+    for format in ["npz", "csv", "parquet"] {
+        let out = format!("few.{format}");
+        succeed(folder, &["reduce", "still.dat", "-o", &out]);
+        let run = succeed(
+            folder,
+            &["compare", "still.dat", &out, "--tolerance", "0.11"],
+        );
+        assert!(run.words.is_empty(), "{}", run.words);
+    }
+}

@@ -40,7 +40,11 @@ fn supervisors_read_the_progress_as_json() {
     let last: serde_json::Value = serde_json::from_str(last).unwrap();
     let bytes: u64 = ["a.npy", "b.npy"]
         .iter()
-        .map(|name| fs::metadata(folder.path().join("out").join(name)).unwrap().len())
+        .map(|name| {
+            fs::metadata(folder.path().join("out").join(name))
+                .unwrap()
+                .len()
+        })
         .sum();
     assert_eq!(last["progress"], "inputs");
     assert_eq!(last["done"], 2);
@@ -56,7 +60,10 @@ fn a_dry_run_lists_results_and_writes_none() {
     let run_of = |line: &str| succeed(folder.path(), &words(line));
     let run = run_of("eval a.dat b.dat -o out --to csv --dry-run");
     assert_eq!(text(&run), "a.dat → out/a.csv\nb.dat → out/b.csv\n");
-    assert!(run.words.contains("2 results would be made; nothing was written"));
+    assert!(
+        run.words
+            .contains("2 results would be made; nothing was written")
+    );
     assert!(!folder.path().join("out").exists());
     run_of("eval a.dat -o out/ --to csv");
     let before = fs::read(folder.path().join("out/manifest.jsonl")).unwrap();
@@ -72,7 +79,10 @@ fn a_dry_run_lists_results_and_writes_none() {
         "{}",
         text(&run)
     );
-    assert_eq!(fs::read(folder.path().join("out/manifest.jsonl")).unwrap(), before);
+    assert_eq!(
+        fs::read(folder.path().join("out/manifest.jsonl")).unwrap(),
+        before
+    );
     assert!(!folder.path().join("out/b.csv").exists());
     // As without it: a file is not replaced.
     let run = crate::program::run(folder.path(), &words("eval a.dat b.dat -o out --to csv -n"));
@@ -92,7 +102,10 @@ fn colours_and_threads_are_chosen() {
     assert!(!coloured("auto") && !coloured("never"));
     let bits = |threads: &str| {
         let file = format!("{threads}.npy");
-        succeed(folder.path(), &["eval", "a.dat", "-o", &file, "-j", threads]);
+        succeed(
+            folder.path(),
+            &["eval", "a.dat", "-o", &file, "-j", threads],
+        );
         fs::read(folder.path().join(file)).unwrap()
     };
     assert_eq!(bits("1"), bits("3"));
@@ -103,7 +116,11 @@ fn colours_and_threads_are_chosen() {
 fn every_command_has_a_manual_page() {
     let folder = sample_folder();
     let page = |words: &[&str]| text(&succeed(folder.path(), words)).to_owned();
-    assert!(page(&["man"]).contains(".TH tumble 1"), "{}", page(&["man"]));
+    assert!(
+        page(&["man"]).contains(".TH tumble 1"),
+        "{}",
+        page(&["man"])
+    );
     for command in crate::commands::commands() {
         let name = command.get_name();
         let page = page(&["man", name]);
@@ -112,4 +129,151 @@ fn every_command_has_a_manual_page() {
     let run = run(folder.path(), &["man", "evil"]);
     assert_eq!(run.code, 2);
     assert!(run.words.contains("did you mean eval?"), "{}", run.words);
+}
+
+/// `latest -> shots` sorts before `shots`, and a link to the directory above leads back into it.
+#[cfg(unix)]
+#[test]
+fn results_are_named_by_paths_without_links() {
+    let folder = sample_folder();
+    let inputs = folder.path().join("inputs");
+    fs::create_dir_all(inputs.join("shots")).unwrap();
+    fs::copy(folder.path().join("a.dat"), inputs.join("shots/a.dat")).unwrap();
+    fs::write(inputs.join("shots/notes.txt"), "notes").unwrap();
+    std::os::unix::fs::symlink("shots", inputs.join("latest")).unwrap();
+    std::os::unix::fs::symlink("..", inputs.join("shots/above")).unwrap();
+    let run = succeed(folder.path(), &words("eval inputs -o out"));
+    assert!(
+        folder.path().join("out/shots/a.npy").exists(),
+        "{}",
+        run.words
+    );
+    assert!(!folder.path().join("out/latest").exists(), "{}", run.words);
+    let said =
+        "inputs/latest/a.dat: is the same file as inputs/shots/a.dat, which alone is processed";
+    assert!(run.words.contains(said), "{}", run.words);
+    assert!(run.words.contains("not read (.txt)"), "{}", run.words);
+}
+
+/// Equal files are different inputs as long as both exist.
+#[test]
+fn equal_inputs_have_results_of_their_own() {
+    let folder = sample_folder();
+    succeed(folder.path(), &words("eval a.dat -o out/ --fps 30"));
+    let run_of = |line: &str| run(folder.path(), &words(line));
+    let run = run_of("eval folder/a.dat -o out/ --fps 60 --resume");
+    assert_eq!(run.code, 2, "{}", run.words);
+    assert!(
+        run.words.contains("is the result of a.dat"),
+        "{}",
+        run.words
+    );
+    fs::remove_file(folder.path().join("a.dat")).unwrap();
+    assert_eq!(
+        run_of("eval folder/a.dat -o out/ --fps 60 --resume").code,
+        0
+    );
+}
+
+/// JSON names the animation of a result, and why the others of its input failed.
+#[test]
+fn json_tells_why_animations_failed() {
+    // Three keys at 0, 0.1 and 1.03 s, which are no frames, and the first two of them.
+    const KEYS: &str =
+        "AAAAAM3MzD0K14M/AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAmpkZP83MTD8AAAAAAAAAAAAAAAAAAIA/";
+    let folder = sample_folder();
+    let animation = |name: &str, input: u32| {
+        serde_json::json!({
+            "name": name,
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+            "samplers": [{"input": input, "output": input + 1}],
+        })
+    };
+    let accessor = |view: u32, count: u32, of: &str, max: f64| match of {
+        "SCALAR" => serde_json::json!({
+            "bufferView": view, "componentType": 5126, "count": count, "type": of, "min": [0.0], "max": [max],
+        }),
+        _ => {
+            serde_json::json!({"bufferView": view, "componentType": 5126, "count": count, "type": of})
+        }
+    };
+    let file = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": 60, "uri": format!("data:application/octet-stream;base64,{KEYS}")}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 12},
+            {"buffer": 0, "byteOffset": 12, "byteLength": 48},
+        ],
+        "accessors": [
+            accessor(0, 3, "SCALAR", f64::from(1.03f32)),
+            accessor(1, 3, "VEC4", 0.0),
+            accessor(0, 2, "SCALAR", f64::from(0.1f32)),
+            accessor(1, 2, "VEC4", 0.0),
+        ],
+        "nodes": [{"name": "a"}],
+        "animations": [animation("uneven", 0), animation("even", 2)],
+    });
+    fs::write(folder.path().join("two.gltf"), file.to_string()).unwrap();
+    let run = run(
+        folder.path(),
+        &words("convert two.gltf -o out/ --to bvh --json"),
+    );
+    let records: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let with_state = |state: &str| {
+        let mut records = records.as_array().unwrap().iter();
+        records.find(|record| record["state"] == state).unwrap()
+    };
+    let (failed, made) = (with_state("failed"), with_state("made"));
+    assert_eq!(failed["input"], "two.gltf");
+    assert!(
+        failed["causes"][0].as_str().unwrap().contains("uneven"),
+        "{failed}"
+    );
+    assert_eq!(made["input"], "two.gltf");
+    assert_eq!(made["animation"], "even");
+}
+
+/// A batch that is interrupted says so, what is done, and how to continue; its JSON is complete.
+#[cfg(unix)]
+#[test]
+fn interrupted_batches_say_what_is_done() {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+
+    let folder = sample_folder();
+    let inputs = folder.path().join("inputs");
+    fs::create_dir(&inputs).unwrap();
+    for index in 0..2000 {
+        let name = inputs.join(format!("{index:04}.dat"));
+        fs::copy(folder.path().join("a.dat"), name).unwrap();
+    }
+    let mut command = crate::program::with_signals(env!("CARGO_BIN_EXE_tumble"));
+    let child = command
+        .current_dir(folder.path())
+        .args(words("eval inputs -o out --fps 4000 --json --device cpu"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let first = folder.path().join("out/0000.npy");
+    let started = Instant::now();
+    while !first.exists() && started.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let process = child.id().to_string();
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &process])
+        .status();
+    assert!(killed.unwrap().success());
+    let run = crate::program::finish(child.wait_with_output().unwrap());
+    assert!(run.words.contains("interrupted by SIGINT"), "{}", run.words);
+    assert!(
+        run.words.contains("not reached (--resume makes them)"),
+        "{}",
+        run.words
+    );
+    let records: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+    let made = fs::read_dir(folder.path().join("out")).unwrap().count() - 1;
+    assert_eq!(records.as_array().unwrap().len(), made);
 }

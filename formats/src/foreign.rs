@@ -25,7 +25,7 @@ macro_rules! of_markers {
 }
 
 /// The first row whose signature or extension fits.
-const ALL: [Foreign; 21] = [
+const ALL: [Foreign; 22] = [
     Foreign {
         extensions: &["gz"],
         begins: &[b"\x1f\x8b"],
@@ -45,6 +45,11 @@ const ALL: [Foreign; 21] = [
         extensions: &[],
         begins: &[b"HIERARCHY"],
         description: "BVH motion capture; convert its rotations",
+    },
+    Foreign {
+        extensions: &["xml", "urdf", "mjcf", "xacro", "dae"],
+        begins: &[b"<?xml", b"<mujoco", b"<robot", b"<COLLADA"],
+        description: "XML, which has no motion that is read; of a robot (MJCF, URDF) `tumble info` lists bodies and joints, and its motion is in another file",
     },
     Foreign {
         extensions: &[],

@@ -13,7 +13,7 @@ use glam::{DVec3, Quat};
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
 use crate::decimal::LARGEST_SECONDS;
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 pub use crate::format::write_clips::left_behind;
 pub(crate) use crate::format::write_clips::{check_times, no_offsets};
@@ -296,7 +296,41 @@ pub struct Space {
     pub metres: f64,
 }
 
+impl Space {
+    /// The unit and the up axis of glTF.
+    const GLTF: Self = Self {
+        up: DVec3::Y,
+        metres: 1.0,
+    };
+}
+
 impl Loaded {
+    /// The warning that clips are written in `format` with another unit or up axis than the format defines. `name` is
+    /// the output's name in messages.
+    #[must_use]
+    pub fn space_warning(&self, format: &Format, name: &str) -> Option<Diagnostic> {
+        let space = self
+            .space
+            .filter(|_| self.adjustment != Some(Adjustment::Space))?;
+        if format.name != "glb" || space == Space::GLTF {
+            return None;
+        }
+        let axes = ["x", "y", "z"].into_iter().zip(space.up.to_array());
+        let axis = axes
+            .filter(|(_, part)| *part != 0.0)
+            .map(|(axis, part)| match part > 0.0 {
+                true => axis.to_owned(),
+                false => format!("-{axis}"),
+            });
+        let message = format!(
+            "glTF is in metres with y up, and the clip in units of {} m with {} up; --up-axis y --scale metres \
+             converts it",
+            space.metres,
+            axis.collect::<String>()
+        );
+        Some(Diagnostic::new(name, Code::OtherSpace, message))
+    }
+
     /// The file, if its meshes are in the unit and the axes of the clips.
     #[must_use]
     pub fn document_in_place(&self) -> Option<Arc<dyn Document>> {

@@ -10,7 +10,7 @@ use tumble_formats::fbx::read_fbx;
 use tumble_formats::motion::{ChannelInterpolation, Motion};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
-use tumble_formats::{Code, Limits, Loaded, ReadOptions};
+use tumble_formats::{Code, Format, Limits, Loaded, ReadOptions};
 
 use crate::support::shared_data;
 
@@ -200,6 +200,16 @@ fn nodes_become_a_skeleton_in_the_units_of_the_file() {
     let loaded = read(&fixture("walk"), &ReadOptions::default());
     let space = loaded.space.unwrap();
     assert_eq!((space.up, space.metres), (DVec3::Z, 0.01));
+    // glTF has a unit and an up axis of its own.
+    let warning = |format: &str| {
+        let format = Format::named(format).unwrap();
+        let warning = loaded.space_warning(format, "out");
+        warning.map(|warning| (warning.code, warning.message))
+    };
+    let (code, message) = warning("glb").unwrap();
+    assert_eq!(code, Code::OtherSpace);
+    assert!(message.contains("0.01 m with z up"), "{message}");
+    assert_eq!(warning("npz"), None);
     let [clip] = &loaded.clips[..] else {
         panic!("{:?}", loaded.clips);
     };

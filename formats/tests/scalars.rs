@@ -1,12 +1,15 @@
 //! Scalars of clips: stored with the clip, and changed or kept with it by every operation.
 
 use tumble::glam::{DQuat, Quat};
+use tumble::reduce::ReducedCurve;
 use tumble::{Device, Engine, SampleTimes, Smoothing, SmoothingKernel};
 use tumble_formats::adjust::adjust;
+use tumble_formats::compare::ClipPair;
 use tumble_formats::format::MotionOptions;
 use tumble_formats::keyed::{KeyedError, keyed};
 use tumble_formats::motion::{ChannelInterpolation, Motion, Scalar, ScalarKind};
 use tumble_formats::npz::read_npz;
+use tumble_formats::reduce::{ReduceOptions, reduce};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::smooth::SmoothJob;
 use tumble_formats::trim::trim;
@@ -151,5 +154,93 @@ fn scalars_at_other_times_are_named() {
             scalar: 3,
             name: "late".to_owned()
         }
+    );
+}
+
+/// Formats with one list of times get reduced scalars, which stay within the tolerance of their kind.
+#[test]
+fn scalars_are_reduced_with_the_tracks() {
+    let count = 31;
+    let times: Vec<f64> = (0..count).map(|key| f64::from(key) / 30.0).collect();
+    let mut clip = Motion::default();
+    let still = vec![Quat::IDENTITY; count as usize];
+    clip.set.push("root", &times, &still).unwrap();
+    let bent: Vec<f32> = (0..count)
+        .map(|key| (f64::from(key) * 0.1).sin() as f32)
+        .collect();
+    let linear = Some(ChannelInterpolation::Linear);
+    for (name, kind) in [("knee", ScalarKind::Angle), ("number", ScalarKind::Plain)] {
+        let scalar = Scalar {
+            interpolation: linear,
+            ..Scalar::of(kind)
+        };
+        let keys = match kind {
+            ScalarKind::Plain => &vec![0.5; count as usize],
+            _ => &bent,
+        };
+        clip.set.push_scalar(name, &times, keys, &[]).unwrap();
+        clip.scalars.push(scalar);
+    }
+    let options = ReduceOptions {
+        curve: ReducedCurve::Linear,
+        angle: 0.01,
+        distance: Some(0.01),
+        shell: 0.0,
+        together: true,
+        quantize: None,
+    };
+    let reduced = reduce(&clip, &engine(), &options).unwrap();
+    let samples = keyed(&reduced.clip).unwrap();
+    assert!(
+        (3..16).contains(&samples.times.len()),
+        "{} of {count}",
+        samples.times.len()
+    );
+    assert_eq!(samples.times.last(), times.last());
+    let frames = SampleTimes::at(times);
+    let found = ChannelMethods::AUTHORED
+        .sample(&engine(), &reduced.clip, &frames)
+        .unwrap();
+    for (sample, expected) in bent.iter().enumerate() {
+        let [knee, number] = [0, 1].map(|scalar| found.scalars[sample * 2 + scalar]);
+        assert!(
+            (knee - expected).abs() <= 0.01,
+            "{sample}: {knee} {expected}"
+        );
+        assert_eq!(number, 0.5);
+    }
+}
+
+/// Angles in degrees, other numbers as they are; by names, whatever their order.
+#[test]
+fn scalars_are_compared_by_name() {
+    let [first, mut second] = [clip(), Motion::default()];
+    second
+        .set
+        .push("root", &TIMES, &[Quat::IDENTITY; 4])
+        .unwrap();
+    for name in ["touch", "knee"] {
+        let index = first.set.scalar_named(name).unwrap();
+        let scalar = first.set.scalar(index).unwrap();
+        let keys: Vec<f32> = scalar.keys.iter().map(|key| key + 0.5).collect();
+        second.set.push_scalar(name, &TIMES, &keys, &[]).unwrap();
+        second.scalars.push(first.scalars[index]);
+    }
+    let pair = ClipPair {
+        inputs: ["first", "second"],
+        clips: [&first, &second],
+    };
+    let frames = SampleTimes::at(TIMES.to_vec());
+    let found = pair.differences(&engine(), &frames, false).unwrap();
+    assert_eq!(found.scalar_count, 2);
+    assert_eq!(found.missing_scalars, [vec!["lift".to_owned()], Vec::new()]);
+    let [angle, contact] = &found.scalars[..] else {
+        panic!("two kinds: {:?}", found.scalars);
+    };
+    assert_eq!((angle.kind, &*angle.difference.track), ("angle", "knee"));
+    assert!((angle.difference.spread.largest - 0.5f64.to_degrees()).abs() < 1e-12);
+    assert_eq!(
+        (contact.kind, contact.difference.spread.mean),
+        ("contact", 0.5)
     );
 }

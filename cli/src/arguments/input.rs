@@ -1,7 +1,7 @@
 //! Inputs: which files a command works on (those named, those in directories, those that a pattern matches,
 //! and those in a list), and how they are opened and read, and their warnings passed on.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap};
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use walkdir::WalkDir;
 use crate::arguments::reading::ReadingArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::arguments::wildcard::{self, PathPattern, is_pattern};
-use crate::batch::entry::InputEntry;
+use crate::batch::entry::{self, InputEntry};
 use crate::messages::exit::{self, Failure};
 use crate::messages::progress::busy;
 use crate::messages::{names, words};
@@ -310,6 +310,54 @@ pub(crate) struct GatheredInputs {
     pub(crate) many: bool,
     /// Skipped entries of directories that are named like inputs: pipes, sockets, links in a circle.
     pub(crate) skipped: Vec<InputEntry>,
+    /// Other files of directories.
+    unread: UnreadFiles,
+}
+
+/// The files of directories whose names are not those of inputs.
+#[derive(Default)]
+struct UnreadFiles {
+    count: usize,
+    /// The endings of their names, `""` for none.
+    endings: BTreeSet<String>,
+}
+
+impl UnreadFiles {
+    /// The most endings that are listed.
+    const MAX_LISTED: usize = 6;
+
+    fn add(&mut self, path: &Path) {
+        let name = path.file_name().unwrap_or_default();
+        // The manifest of a directory of results is a file of Tumble's.
+        if name == entry::NAME {
+            return;
+        }
+        self.count += 1;
+        let ending = path.extension().unwrap_or_default().to_string_lossy();
+        self.endings.insert(ending.into_owned());
+    }
+
+    /// `5 files with other endings are not read (.bak, .txt, none); name them to read them`.
+    fn note(&self) {
+        if self.count == 0 {
+            return;
+        }
+        let shown = |ending: &String| match &**ending {
+            "" => "none".to_owned(),
+            ending => format!(".{}", printable(ending)),
+        };
+        let listed = self.endings.iter().take(Self::MAX_LISTED).map(shown);
+        let mut listed: Vec<String> = listed.collect();
+        if self.endings.len() > listed.len() {
+            listed.push("…".to_owned());
+        }
+        let are = if self.count == 1 { "is" } else { "are" };
+        words::note(&format!(
+            "{} with other endings {are} not read ({}); a file that is named is read by its content",
+            words::count(self.count, "file"),
+            listed.join(", ")
+        ));
+    }
 }
 
 /// Which inputs are meant, besides those that are named.
@@ -398,6 +446,19 @@ impl FoundInput {
     }
 }
 
+impl FoundInput {
+    /// Whether it, or a directory above it in the directory that was named, is a symbolic link.
+    fn is_below_link(&self) -> bool {
+        let root = self.root.as_deref();
+        let mut above = self.path.ancestors();
+        let above = above
+            .by_ref()
+            .take_while(|path| root != Some(path) && *path != Path::new(""));
+        let mut above = above.map(std::fs::symlink_metadata);
+        above.any(|found| found.is_ok_and(|found| found.is_symlink()))
+    }
+}
+
 impl GatheredInputs {
     /// Files that were named.
     pub(crate) fn of(files: Vec<FoundInput>) -> Self {
@@ -405,6 +466,7 @@ impl GatheredInputs {
             files,
             many: true,
             skipped: Vec::new(),
+            unread: UnreadFiles::default(),
         }
     }
 
@@ -414,12 +476,15 @@ impl GatheredInputs {
             files: Vec::new(),
             many: selection.list.is_some(),
             skipped: Vec::new(),
+            unread: UnreadFiles::default(),
         };
         let listed = selection.list.map_or_else(
             || Ok(Vec::new()),
             |list| read_list(list, selection.is_null_separated),
         )?;
-        let mut seen = HashSet::new();
+        // The index in `files` of each file, by its path without links.
+        let mut seen: HashMap<PathBuf, usize> = HashMap::new();
+        let mut repeated: Vec<(usize, FoundInput)> = Vec::new();
         let mut excluded = 0;
         let named = paths.iter().map(|path| NamedPath {
             path,
@@ -439,17 +504,20 @@ impl GatheredInputs {
                 }
                 // A missing file is reported when it is opened.
                 let identity = found.path.canonicalize();
-                let is_new = seen.insert(identity.unwrap_or_else(|_| found.path.clone()));
+                let identity = identity.unwrap_or_else(|_| found.path.clone());
                 let may_repeat =
                     selection.repeats == Repeats::Keep && !names::is_standard(&found.path);
-                if is_new || may_repeat {
-                    gathered.files.push(found);
-                } else {
-                    let name = names::input(&found.path);
-                    words::warning(&format!("{name}: named twice; it is processed once"));
+                match seen.get(&identity) {
+                    Some(&first) if !may_repeat => repeated.push((first, found)),
+                    _ => {
+                        seen.entry(identity).or_insert(gathered.files.len());
+                        gathered.files.push(found);
+                    }
                 }
             }
         }
+        gathered.settle(repeated);
+        gathered.unread.note();
         for skipped in &gathered.skipped {
             let message = skipped.message.as_deref().unwrap_or_default();
             words::note(&format!("{}: {message}", printable(&skipped.input)));
@@ -467,6 +535,32 @@ impl GatheredInputs {
             }));
         }
         Ok(gathered)
+    }
+
+    /// Of files that were found several times, keeps the path without symbolic links, whatever the order in which they
+    /// were found, and says so.
+    fn settle(&mut self, repeated: Vec<(usize, FoundInput)>) {
+        const LISTED: usize = 3;
+        let count = repeated.len();
+        for (index, (first, mut found)) in repeated.into_iter().enumerate() {
+            let kept = &mut self.files[first];
+            if kept.is_below_link() && !found.is_below_link() {
+                std::mem::swap(kept, &mut found);
+            }
+            if index < LISTED {
+                let [name, kept] = [&found.path, &kept.path].map(|path| names::input(path));
+                words::warning(&match name == kept {
+                    true => format!("{name}: named twice; it is processed once"),
+                    false => {
+                        format!("{name}: is the same file as {kept}, which alone is processed")
+                    }
+                });
+            }
+        }
+        if count > LISTED {
+            let more = words::count(count - LISTED, "more path");
+            words::warning(&format!("{more} of files that are processed once"));
+        }
     }
 
     pub(crate) fn paths(&self) -> Vec<PathBuf> {
@@ -538,7 +632,10 @@ impl GatheredInputs {
         for entry in walk {
             let is_input = match &entry {
                 Ok(entry) if entry.file_type().is_dir() => continue,
-                Ok(entry) if Format::of(entry.path()).is_none() => continue,
+                Ok(entry) if Format::of(entry.path()).is_none() => {
+                    self.unread.add(entry.path());
+                    continue;
+                }
                 Ok(entry) if entry.file_type().is_file() => Ok(()),
                 Ok(entry) => {
                     let kind = entry

@@ -71,19 +71,14 @@ pub(crate) struct PathArguments {
 }
 
 fn frame() -> impl TypedValueParser<Value = PathFrame> {
-    let help = |frame| match frame {
-        PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",
-        PathFrame::Fixed => "the upward axis stays as close to --up as possible",
-        PathFrame::Frenet => "the path's normal (Frenet), without its flips",
-    };
-    one_of(PathFrame::ALL.map(|frame| (frame.name(), help(frame), frame)))
+    one_of(PathFrame::ALL.map(|frame| (frame.name(), frame_summary(frame), frame)))
 }
 
 /// What a frame is, in a few words.
 pub(crate) fn frame_summary(frame: PathFrame) -> &'static str {
     match frame {
         PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",
-        PathFrame::Fixed => "the upward axis stays as close to up as possible",
+        PathFrame::Fixed => "the upward axis stays as close to the upward direction as possible",
         PathFrame::Frenet => "the path's normal (Frenet), without its flips",
     }
 }

@@ -84,6 +84,12 @@ pub(crate) struct InputEntry {
     /// Why it failed or was skipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) message: Option<String>,
+    /// The code of the error in it, such as E021.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) diagnostic: Option<String>,
+    /// Why each of its animations failed, where some did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) causes: Vec<String>,
 }
 
 /// Why an input has no result.
@@ -107,6 +113,8 @@ impl InputEntry {
             result: Some(result.to_owned()),
             code: None,
             message: None,
+            diagnostic: None,
+            causes: Vec::new(),
         }
     }
 
@@ -118,6 +126,8 @@ impl InputEntry {
             result: result.map(str::to_owned),
             code: Some(failure.code),
             message: Some(failure.message().to_owned()),
+            diagnostic: failure.input_code().map(|code| code.name().to_owned()),
+            causes: failure.causes().to_vec(),
         }
     }
 
@@ -129,6 +139,8 @@ impl InputEntry {
             result: None,
             code: None,
             message: Some(why),
+            diagnostic: None,
+            causes: Vec::new(),
         }
     }
 
@@ -235,7 +247,8 @@ pub(crate) struct UnfinishedInputs<'a> {
 }
 
 impl ManifestLines {
-    /// A last line without its end was being written when the program was killed.
+    /// A last line without its end was being written when the program was killed: the batch has not come to its end,
+    /// and the inputs that it had yet to evaluate have lines before it.
     pub(crate) fn parse(bytes: &[u8]) -> Self {
         let mut lines = Self {
             entries: BTreeMap::new(),

@@ -25,7 +25,8 @@ impl From<&ManifestEntry> for Owner {
 }
 
 impl Owner {
-    /// Whether this is an input: by its path, or by its bytes, which make the same result.
+    /// Whether this is an input: by its path, or, where there is no file of that path any more, by its bytes, as of a
+    /// file that was moved. Another file with the same bytes is another input: its result may have other options.
     fn is(&self, found: &FoundInput) -> bool {
         let real = |path: &Path| path.canonicalize().ok();
         let input = Path::new(&self.input);
@@ -33,6 +34,9 @@ impl Owner {
             || real(input).is_some_and(|input| Some(input) == real(&found.path))
         {
             return true;
+        }
+        if input.exists() {
+            return false;
         }
         let file = InputFile::new(&found.path);
         self.sha256.is_some() && file.sha256() == self.sha256.as_deref()

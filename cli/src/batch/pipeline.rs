@@ -39,6 +39,7 @@ use crate::batch::summary::BatchSummary;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
 use crate::messages::progress::{Progress, busy};
+use crate::messages::signals::BatchGuard;
 use crate::messages::{listing, names, signals, words};
 
 /// An input and the target of its result.
@@ -115,6 +116,14 @@ impl ClipWork {
     /// The clips.
     pub(crate) fn clips(&self) -> Vec<&Motion> {
         self.input.loaded.clips[self.clips.clone()].iter().collect()
+    }
+
+    /// The name of the only animation of the file, where the input has several.
+    fn animation(&self) -> Option<String> {
+        match self.clips()[..] {
+            [clip] if self.input.loaded.clips.len() > 1 => Some(names::clip(clip)),
+            _ => None,
+        }
     }
 
     /// The path of the input.
@@ -196,6 +205,8 @@ struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
     progress: Progress,
+    /// A signal ends the batch at its next input, which then says what is done.
+    _until_end: BatchGuard,
     options: ResultOptions,
     inputs: usize,
     made: HashSet<String>,
@@ -266,6 +277,7 @@ impl<'a> Pipeline<'a> {
             records,
             summary: BatchSummary::new(inputs, verbose),
             progress: Progress::new("inputs", inputs as u64),
+            _until_end: BatchGuard::begin(),
             options,
             inputs,
             made: HashSet::new(),
@@ -354,7 +366,9 @@ impl<'a> Pipeline<'a> {
     ) -> bool {
         let mut warnings = work.warnings.borrow_mut();
         let kept = made.and_then(|(mut result, report)| {
-            let of_file = std::mem::take(&mut result.written.warnings);
+            let mut of_file = std::mem::take(&mut result.written.warnings);
+            let (target, loaded) = (&work.target, &work.input.loaded);
+            of_file.extend(loaded.space_warning(target.format(), &target.to_string()));
             if self.batch.is_none() {
                 words::warnings(&of_file);
             }
@@ -502,7 +516,9 @@ impl<'a> Pipeline<'a> {
                     report(&last);
                     let all = current.file_count;
                     let message = format!("{name}: {failed} of {all} animations failed");
-                    Err(Failure::new(SOME_INPUTS, message))
+                    let causes = current.failed.iter().chain([&last]);
+                    let causes = causes.map(|cause| cause.message().to_owned());
+                    Err(Failure::new(SOME_INPUTS, message).with_causes(causes.collect()))
                 }
             }
         };
@@ -561,7 +577,8 @@ fn records_of(
 ) -> Vec<Value> {
     let base = json!({
         "state": "made",
-        "input": work.name,
+        "input": names::input(work.path()),
+        "animation": work.animation(),
         "output": work.target.path().display().to_string(),
         "bytes_before": bytes_before,
         "bytes_after": bytes_after,
@@ -692,7 +709,8 @@ impl BatchRecords<'_> {
         }
         let left = self.inputs - (made_of + self.skipped + self.failed).min(self.inputs);
         if left > 0 {
-            parts.push(format!("{} not reached", words::count(left, "input")));
+            let inputs = words::count(left, "input");
+            parts.push(format!("{inputs} not reached (--resume makes them)"));
         }
         let mut summary = parts.join(", ");
         if list.exists() || results > 0 {

@@ -28,6 +28,8 @@ pub(crate) struct BatchSummary {
     warnings: BTreeMap<Code, WarnedInputs>,
     /// The failures that were not printed, by the code of the input's error.
     failures: BTreeMap<Option<Code>, FailedInputs>,
+    /// The codes of the failures that were printed.
+    printed: BTreeSet<Option<Code>>,
     /// How many lines were left out.
     left_out: usize,
 }
@@ -55,6 +57,7 @@ impl BatchSummary {
             failures_left: all(MAX_FAILURES),
             warnings: BTreeMap::new(),
             failures: BTreeMap::new(),
+            printed: BTreeSet::new(),
             left_out: 0,
         }
     }
@@ -96,6 +99,7 @@ impl BatchSummary {
     pub(crate) fn fail(&mut self, failure: &Failure) {
         if let Some(left) = self.failures_left.checked_sub(1) {
             self.failures_left = left;
+            self.printed.insert(failure.input_code());
             failure.report();
             return;
         }
@@ -128,10 +132,20 @@ impl BatchSummary {
         });
         let failed = self.failures.iter().map(|(code, of_code)| {
             let FailedInputs { count, first } = of_code;
-            let files = words::count(*count, "more file");
+            if *count == 1 {
+                return first.message().to_owned();
+            }
+            let files = match self.printed.contains(code) {
+                true => words::count(*count, "more file"),
+                false => words::count(*count, "file"),
+            };
+            let first = first.message();
             match code {
-                Some(code) => format!("{code} {files}: {} {MORE}", code.title()),
-                None => format!("{files} failed, the first: {} {MORE}", first.message()),
+                Some(code) => format!(
+                    "{code} {files}: {}; the first: {first} {MORE}",
+                    code.title()
+                ),
+                None => format!("{files} failed, the first: {first} {MORE}"),
             }
         });
         warned.chain(failed).collect()

@@ -76,6 +76,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         })?,
     };
     let mut lines = ManifestLines::parse(&bytes);
+    // The line that a killed batch was writing, or the rest of a file that was cut.
+    lines.damaged += usize::from(bytes.last().is_some_and(|&last| last != b'\n'));
     if shards.is_some() {
         lines.extend(record::lines(folder));
     } else if lines.entries.is_empty() && lines.inputs.is_empty() {
@@ -109,23 +111,38 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let total = words::count(entries.len(), "result");
     let mut missing: Vec<String> = Vec::new();
-    if faults.len() + lines.damaged > 0 {
+    if !faults.is_empty() {
         missing.push(format!("{} of {total} differ", faults.len()));
     }
+    if lines.damaged > 0 {
+        let damaged = words::count(lines.damaged, "line");
+        missing.push(format!("{damaged} of the manifest damaged"));
+    }
+    let is_made_again = !faults.is_empty() || !lines.unfinished_inputs().pending.is_empty();
     missing.extend(unfinished(&lines));
     if !missing.is_empty() {
         let missing = missing.join(", ");
         // Without its first line a manifest is no longer taken for one.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
         let remedy = match is_known {
-            true => "`tumble eval … --resume` makes them again",
+            true if lines.damaged > 0 => {
+                "a result whose line is damaged is a file of somebody else's for `--resume`: `tumble eval … \
+                 --overwrite` makes all results again"
+            }
+            true if is_made_again => "`tumble eval … --resume` makes them again",
+            true => "`tumble eval … --resume` tries them again",
             false => {
                 "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
             }
         };
         return Err(Failure::new(DIFFERENCE, format!("{missing}; {remedy}")));
     }
-    listing::text(&format!("{total}, unchanged since they were written\n"))?;
+    let were = if entries.len() == 1 {
+        "it was"
+    } else {
+        "they were"
+    };
+    listing::text(&format!("{total}, unchanged since {were} written\n"))?;
     match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
@@ -204,7 +221,10 @@ impl<'a> InputHashes<'a> {
     fn changed(&self, entry: &ManifestEntry) -> Option<String> {
         let now = self.inputs.get(&*entry.input).and_then(Option::as_ref);
         if now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now)) {
-            return Some(format!("input {}", entry.input));
+            return Some(format!(
+                "input {} (or a file that belongs to it)",
+                entry.input
+            ));
         }
         let differs = |file: &&OptionFile| {
             let now = self.of_options.get(&*file.path);

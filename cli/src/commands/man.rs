@@ -10,9 +10,8 @@ use crate::messages::{listing, words};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  tumble man > ~/.local/share/man/man1/tumble.1
-  tumble man eval > ~/.local/share/man/man1/tumble-eval.1
-  tumble man eval | man -l -                   read it")]
+  tumble man > tumble.1                        for ~/.local/share/man/man1
+  tumble man eval > tumble-eval.1")]
 pub(crate) struct Arguments {
     /// The command [default: the program]
     #[arg(value_name = "COMMAND")]

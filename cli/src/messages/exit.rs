@@ -35,6 +35,8 @@ pub(crate) struct Failure {
     is_of_one: bool,
     /// The code of the first error of an input.
     input_code: Option<Code>,
+    /// The messages of what failed in an input, which were printed before.
+    causes: Vec<String>,
 }
 
 impl Failure {
@@ -46,6 +48,7 @@ impl Failure {
             plain: false,
             is_of_one: false,
             input_code: None,
+            causes: Vec::new(),
         }
     }
 
@@ -190,6 +193,16 @@ impl Failure {
     /// Its message.
     pub(crate) fn message(&self) -> &str {
         &self.message
+    }
+
+    /// The same with the messages of what failed, for the manifest and for JSON: they were printed.
+    pub(crate) fn with_causes(self, causes: Vec<String>) -> Self {
+        Self { causes, ..self }
+    }
+
+    /// The messages of what failed in an input, where its own message is a summary of them.
+    pub(crate) fn causes(&self) -> &[String] {
+        &self.causes
     }
 
     /// Whether the next input would fail in the same way.

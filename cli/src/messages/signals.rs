@@ -1,50 +1,74 @@
 //! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT, on Windows Ctrl-C, Ctrl-Break and a closed window: stop soon, and
 //! leave no half-written file.
 //!
-//! A thread waits for the signal. While no output file is open it ends the program
-//! at once; while one is, it leaves a mark that the writer finds at its next
-//! chunk, and the writer's temporary file is removed on the way out. A second signal
-//! removes the file itself, and ends the program at once. What whoever started the
-//! program has it ignore, as `nohup` does SIGHUP, is ignored.
+//! A thread waits for the signal, and says that it came. While no output file is open and no batch runs, it ends the
+//! program at once. Otherwise it leaves a mark: the writer of a file finds it at its next chunk, and removes its
+//! temporary file on the way out; a batch finds it before its next input, and says what is done. A batch that does not
+//! find it for [`GRACE`] is ended without that, unless a file is open. A second signal removes the file itself, and
+//! ends the program at once. Signals that this process was started to ignore, as by `nohup`, are ignored.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tumble_formats::output::remove_unfinished;
 
 use crate::messages::exit::Failure;
+use crate::messages::words;
 
 struct SignalState {
     /// Output files that are being written.
     writing: usize,
+    /// Batches that run.
+    batches: usize,
     /// The signal that came.
     signal: Option<i32>,
 }
 
+/// How long a batch may take to find that a signal came.
+const GRACE: Duration = Duration::from_secs(2);
+
 static STATE: Mutex<SignalState> = Mutex::new(SignalState {
     writing: 0,
+    batches: 0,
     signal: None,
 });
 
-fn state() -> std::sync::MutexGuard<'static, SignalState> {
-    STATE
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
+fn state() -> MutexGuard<'static, SignalState> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// Ends the program, or leaves a mark for the writer of a file.
+/// Ends the program, or leaves a mark for the writer of a file and for the batch.
 fn handle_signal(signal: i32) {
+    // Printed without the lock, which the main thread needs while this one may have to wait for a reader.
+    if stopped().is_none() {
+        let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
+        words::line(&format!("interrupted by {name}"));
+    }
     let mut state = state();
     // A second signal means it: do not wait for the writer.
-    if state.writing == 0 || state.signal.is_some() {
-        // The locks are held: no file can be opened meanwhile.
-        let _no_more = remove_unfinished();
-        signal_hook::low_level::exit(i32::from(code(signal)));
+    if state.writing + state.batches == 0 || state.signal.is_some() {
+        end(&state, signal);
     }
     state.signal = Some(signal);
+    let wait = move || {
+        std::thread::sleep(GRACE);
+        let state = self::state();
+        if state.writing == 0 {
+            end(&state, signal);
+        }
+    };
+    // Without the thread, the batch ends at its next input, or with a second signal.
+    let _ = std::thread::Builder::new().spawn(wait);
+}
+
+/// Ends the program at once. The state is locked, so that no file is opened meanwhile.
+fn end(_locked: &MutexGuard<'_, SignalState>, signal: i32) -> ! {
+    let _no_more = remove_unfinished();
+    signal_hook::low_level::exit(i32::from(code(signal)))
 }
 
 /// Starts the waiting thread, once for the process. Without it (a system that refuses) they end the
@@ -116,6 +140,22 @@ impl WritingGuard {
 impl Drop for WritingGuard {
     fn drop(&mut self) {
         state().writing -= 1;
+    }
+}
+
+/// Held while a batch runs.
+pub(crate) struct BatchGuard(());
+
+impl BatchGuard {
+    pub(crate) fn begin() -> Self {
+        state().batches += 1;
+        Self(())
+    }
+}
+
+impl Drop for BatchGuard {
+    fn drop(&mut self) {
+        state().batches -= 1;
     }
 }
 

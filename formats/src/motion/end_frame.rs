@@ -59,7 +59,8 @@ impl EndSample {
     #[must_use]
     pub fn warning(self, rate: FrameRate, name: &str) -> Option<Diagnostic> {
         self.is_held().then(|| {
-            let Self { at, time } = self;
+            // To a microsecond: the digits behind it are those of f64.
+            let [at, time] = [self.at, self.time].map(|time| (time * 1e6).round() / 1e6);
             let message = format!(
                 "the clip ends at {at} s, between two frames of {rate} a second; one frame more, at {time} s, has \
                  the value of the end (--end-frame leave-out ends before it)"

@@ -15,8 +15,9 @@ use crate::motion::{ChannelInterpolation, Motion};
 pub enum KeyedError {
     /// Channels have keys at different times.
     #[error(
-        "track {track} (`{name}`) has keys at other times than those before it; sample them \
-         together with `tumble eval --fps`, or write Parquet or Arrow, in which each track may have its own times"
+        "track {track} (`{name}`) has keys at other times than other tracks or scalars, and the format has one list of \
+         times; sample them together with `tumble eval --fps`, or write Parquet or Arrow, in which each track may \
+         have its own times"
     )]
     TimesDiffer {
         /// Index of the first track whose times differ, from 0.
@@ -26,7 +27,7 @@ pub enum KeyedError {
     },
     /// A scalar has keys at other times than the others.
     #[error(
-        "the scalar {scalar} (`{name}`) has keys at other times than those before it, or tangents; sample them \
+        "the scalar {scalar} (`{name}`) has keys at other times than the tracks, or tangents; sample them \
          together with `tumble eval --fps`"
     )]
     Scalar {

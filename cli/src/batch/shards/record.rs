@@ -45,6 +45,12 @@ pub(crate) struct RefusedInput {
     /// The result that it would have, where it can have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) result: Option<String>,
+    /// As in [`InputEntry`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) diagnostic: Option<String>,
+    /// As in [`InputEntry`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) causes: Vec<String>,
 }
 
 impl RefusedInput {
@@ -56,6 +62,8 @@ impl RefusedInput {
             result: self.result.clone().filter(|result| is_beneath(result)),
             code: Some(self.code),
             message: Some(self.message.clone()),
+            diagnostic: self.diagnostic.clone(),
+            causes: self.causes.clone(),
         }
     }
 }

@@ -112,6 +112,8 @@ impl<'a> Shard<'a> {
             code: entry.code.unwrap_or_default(),
             message: entry.message.unwrap_or_default(),
             result: entry.result,
+            diagnostic: entry.diagnostic,
+            causes: entry.causes,
         });
     }
 

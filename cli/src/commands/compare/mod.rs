@@ -12,8 +12,9 @@ use serde::Serialize;
 use tumble::{Device, Engine, FrameRate};
 use tumble_formats::compare::{
     ArrayDifference, ClipDifference, ClipPair, CompareError, PathDifference, PathMeasure,
+    ScalarDifference,
 };
-use tumble_formats::motion::Motion;
+use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npz::open_numbers;
 use tumble_formats::trajectory::{Align, Associate, Step};
 use tumble_formats::{Diagnostic, Format};
@@ -414,11 +415,6 @@ impl Arguments {
     /// The differences of two clips at the frames that are asked for.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
-        if pair.clips.iter().any(|clip| clip.set.scalar_count() > 0) {
-            words::warning(
-                "scalars, such as angles of joints, are not compared: the tracks alone are",
-            );
-        }
         for warning in common.warning.iter().chain(&pair.assumptions()) {
             words::warning(warning);
         }
@@ -468,11 +464,29 @@ impl Arguments {
                         let distance = moved.spread.largest;
                         faults.extend(over("distance", distance, self.distance, ""));
                     }
+                    for ScalarDifference {
+                        kind, difference, ..
+                    } in &found.scalars
+                    {
+                        let (bound, unit) = match kind.parse() {
+                            Ok(ScalarKind::Angle) => (self.tolerance, "°"),
+                            Ok(ScalarKind::Length) => (self.distance, ""),
+                            // A number without a unit has no bound of its own: with one of 0, all numbers are equal.
+                            _ => (self.tolerance.filter(|&bound| bound == 0.0), ""),
+                        };
+                        let quantity = format!("{kind} {}", difference.track);
+                        faults.extend(over(&quantity, difference.spread.largest, bound, unit));
+                    }
+                    let has_bound = self.tolerance.is_some() || self.distance.is_some();
                     let missing: usize = found.missing.iter().map(Vec::len).sum();
-                    if missing > 0 && (self.tolerance.is_some() || self.distance.is_some()) {
+                    if missing > 0 && has_bound {
                         faults.push(
                             words::count(missing, "track") + " in only one of the files (--tracks)",
                         );
+                    }
+                    let missing: usize = found.missing_scalars.iter().map(Vec::len).sum();
+                    if missing > 0 && has_bound {
+                        faults.push(words::count(missing, "scalar") + " in only one of the files");
                     }
                 }
             }

@@ -2,8 +2,9 @@
 
 use tumble_formats::compare::{
     AlignmentSummary, ArrayDifference, ChannelDifference, ClipDifference, PathDifference,
-    PathStatistics, Spread,
+    PathStatistics, ScalarDifference, Spread,
 };
+use tumble_formats::motion::ScalarKind;
 use tumble_formats::printable::printable;
 
 use crate::commands::compare::table::{TableArguments, joints_text};
@@ -41,12 +42,25 @@ pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> St
             line(label, "", found);
         }
     }
+    for ScalarDifference {
+        kind, difference, ..
+    } in &difference.scalars
+    {
+        let unit = if *kind == ScalarKind::Angle.name() {
+            "°"
+        } else {
+            ""
+        };
+        line(&format!("scalar {kind}"), unit, difference);
+    }
     text += &format!(
         "  {} of {} rotations are the same, bit for bit\n",
         difference.identical,
         difference.tracks * difference.samples
     );
-    for (side, missing) in difference.missing.iter().enumerate() {
+    let lone = difference.missing.iter().zip(&difference.missing_scalars);
+    for (side, (tracks, scalars)) in lone.enumerate() {
+        let missing: Vec<&str> = tracks.iter().chain(scalars).map(String::as_str).collect();
         if !missing.is_empty() {
             text += &format!(
                 "  only in {}: {}\n",

@@ -126,6 +126,10 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
+        // Writers of clips say themselves what they have no room for.
+        if kind != ResultKind::Motion {
+            self.warn_of_lost_channels(clips);
+        }
         let end_frame = (self.arguments.end_frame)
             .for_result(self.arguments.result(kind, target.format()).sampled())
             .map_err(|message| refused(Failure::usage(message)))?;
@@ -163,6 +167,28 @@ impl EvaluationJob<'_> {
             self.work.warn(warning);
         }
         Ok(())
+    }
+
+    /// Says which channels of clips are not among the numbers that are written.
+    fn warn_of_lost_channels(&self, clips: &[&Motion]) {
+        let has = |says: fn(&Motion) -> bool| clips.iter().any(|clip| says(clip));
+        let mut lost = Vec::new();
+        if self.arguments.output.poses().is_none() && has(Motion::has_vectors) {
+            lost.push("the translations and scales");
+        }
+        if has(|clip| clip.set.scalar_count() > 0) {
+            lost.push("the scalars");
+        }
+        if !lost.is_empty() {
+            let message = format!(
+                "the numbers of --output {} have no room for this, left out: {}; -o FILE.npz has all channels",
+                self.arguments.output.name(),
+                lost.join(", ")
+            );
+            let target = self.work.target.to_string();
+            self.work
+                .warn(Diagnostic::new(target, Code::NoRoom, message));
+        }
     }
 
     /// Refuses options that have no effect on the methods of a clip's channels.
@@ -357,7 +383,7 @@ impl EvaluationJob<'_> {
             end.warning(rate, &target.to_string())
         });
         if let Some(warning) = warning {
-            words::note(&warning.to_string());
+            self.work.warn(warning);
         }
     }
 

@@ -412,13 +412,17 @@ impl Arguments {
 
 impl ReductionReport {
     fn line(&self, reduced: &Reduced) -> String {
+        let (before, after) = (self.keys_before, self.keys_after);
+        let keys = match before == after {
+            true => format!("{before} keys, of which none can be left out"),
+            false => {
+                let times = before as f64 / after.max(1) as f64;
+                format!("{before} → {after} keys ({times:.1} times fewer)")
+            }
+        };
         format!(
-            "{}: {} → {} keys ({:.1} times fewer), at most {:.4}° ({}, {:.3} s) and {:.3e} ({}, {:.3} \
-             s) from {}",
+            "{}: {keys}, at most {:.4}° ({}, {:.3} s) and {:.3e} ({}, {:.3} s) from {}",
             self.input,
-            self.keys_before,
-            self.keys_after,
-            self.keys_before as f64 / self.keys_after.max(1) as f64,
             self.angle.largest,
             self.angle.track,
             self.angle.time,

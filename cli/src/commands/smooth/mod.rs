@@ -222,6 +222,17 @@ fn smoothed(
         error => Failure::new(ALL_INPUTS, format!("{name}: {error}; give --fps")),
     })?;
     let timeline = room::in_memory(name, &clip.set, &job.frames, 7)?;
+    let last = timeline.len().checked_sub(1);
+    let last = last.and_then(|last| timeline.time(0, last));
+    if let (Some(last), Some((_, end))) = (last, clip.set.time_span())
+        && end - last > 1e-3 * fps.map_or(f64::INFINITY, |rate| rate.time_of(1))
+    {
+        // A kernel needs even samples, so that there can be no key at the end.
+        words::warning(&format!(
+            "{name}: the {} s after the last frame are left out; a rate of which the end is a frame keeps them",
+            words::seconds(end - last)
+        ));
+    }
     let rotations = clip.set.track_count() * timeline.len();
     let found = device
         .choose(rotations)

@@ -11,6 +11,7 @@ use crate::motion::Motion;
 use crate::motion::compare::CompareError;
 use crate::motion::compare::tally::{Spread, Tally};
 use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::scalars::ScalarKind;
 use crate::motion::world::world;
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
 
@@ -70,8 +71,26 @@ pub struct ClipDifference {
     pub translation: Option<ChannelDifference>,
     /// Lengths of the differences of the scales; `None` if neither clip has scales.
     pub scale: Option<ChannelDifference>,
+    /// Number of scalars that both clips have.
+    pub scalar_count: usize,
+    /// Names of the scalars that only the first clip has, and of those that only the second clip has.
+    pub missing_scalars: [Vec<String>; 2],
+    /// Differences of the scalars of each kind that both clips have: angles in degrees, lengths in the files' unit,
+    /// others as they are.
+    pub scalars: Vec<ScalarDifference>,
     /// The differences of each track that both clips have, in the order of the first clip.
     pub joints: Vec<JointDifference>,
+}
+
+/// The differences of all scalars of one kind.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct ScalarDifference {
+    /// The kind, by its name.
+    pub kind: &'static str,
+    /// The differences; their track is the scalar with the largest one.
+    #[serde(flatten)]
+    pub difference: ChannelDifference,
 }
 
 /// The differences of one track.
@@ -368,6 +387,47 @@ impl ClipPair<'_> {
         });
         let joints = joints.collect();
         let lengths = |tallies: &ChannelTallies| of_all(tallies, 1.0);
+        let (scalar_pairs, missing_scalars) = self.scalar_pairs();
+        let scalars = ScalarKind::ALL.iter().filter_map(|&kind| {
+            let of_kind = scalar_pairs
+                .iter()
+                .filter(|pair| motions[0].scalar(pair[0]).kind == kind);
+            let of_kind: Vec<[usize; 2]> = of_kind.copied().collect();
+            let mut tallies = ChannelTallies::new(of_kind.len());
+            let counts = motions.map(|clip| clip.set.scalar_count());
+            for sample in 0..times.len() {
+                for (index, pair) in of_kind.iter().enumerate() {
+                    let [a, b] = [0, 1].map(|side| {
+                        let value = sampled[side].scalars[sample * counts[side] + pair[side]];
+                        motions[side].scalar(pair[side]).origin + f64::from(value)
+                    });
+                    tallies.add(index, (a - b).abs());
+                }
+            }
+            let largest = tallies.all.largest_at as usize;
+            let count = of_kind.len().max(1);
+            let factor = if kind == ScalarKind::Angle {
+                degrees
+            } else {
+                1.0
+            };
+            let TimedSpread {
+                spread,
+                time,
+                frame,
+            } = timed(tallies.all, largest / count, factor);
+            let scalar = of_kind.get(largest % count)?[0];
+            let track = motions[0].set.scalar(scalar)?.name.to_owned();
+            let difference = ChannelDifference {
+                spread,
+                track,
+                time,
+                frame,
+            };
+            let kind = kind.name();
+            Some(ScalarDifference { kind, difference })
+        });
+        let scalars = scalars.collect();
         Ok(ClipDifference {
             inputs: inputs.map(str::to_owned),
             tracks: pairs.len(),
@@ -378,8 +438,29 @@ impl ClipPair<'_> {
             rotation: of_all(&angles, degrees),
             translation: translations.as_ref().map(lengths),
             scale: scales.as_ref().map(lengths),
+            scalar_count: scalar_pairs.len(),
+            missing_scalars,
+            scalars,
             joints,
         })
+    }
+
+    /// The scalars of one name in both clips, by their indices, and the names of those that only one clip has.
+    fn scalar_pairs(&self) -> (Vec<[usize; 2]>, [Vec<String>; 2]) {
+        let names = self
+            .clips
+            .map(|clip| -> Vec<&str> { clip.scalar_keys().map(|keys| keys.name).collect() });
+        let mut pairs = Vec::new();
+        let mut missing = [Vec::new(), Vec::new()];
+        for (first, name) in names[0].iter().enumerate() {
+            match names[1].iter().position(|other| other == name) {
+                Some(second) => pairs.push([first, second]),
+                None => missing[0].push((*name).to_owned()),
+            }
+        }
+        let lone = names[1].iter().filter(|name| !names[0].contains(name));
+        missing[1].extend(lone.map(|name| (*name).to_owned()));
+        (pairs, missing)
     }
 
     /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from

@@ -12,7 +12,7 @@ use crate::motion::world::HierarchyError;
 pub use crate::motion::compare::arrays::ArrayDifference;
 pub use crate::motion::compare::clips::{
     ChannelDifference, ClipDifference, ClipPair, CommonTimes, JointDifference, MatchedTracks,
-    TimedSpread,
+    ScalarDifference, TimedSpread,
 };
 pub use crate::motion::compare::paths::{
     AlignmentSummary, PathDifference, PathErrors, PathMeasure, PathStatistics,

@@ -8,6 +8,7 @@ use tumble::{Channel, Layout, SampleTimes, TrackError, TrackSet};
 
 use crate::motion::reduce::{ReduceMotionError, Reduction, Tolerances};
 use crate::motion::sample::ChannelMethods;
+use crate::motion::scalars::{Scalar, ScalarKind};
 use crate::motion::{ChannelInterpolation, Channels, Motion};
 
 /// The largest error in radians that an f32 evaluation adds to an angle.
@@ -28,12 +29,12 @@ impl Reduction<'_> {
         let mut reduced = Motion {
             channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
             ..self.clip.without_tracks()
-        }
-        .with_scalars_of(self.clip, 1.0)?;
+        };
         if self.options.together {
             self.push_together(&mut reduced, tolerances)?;
             return Ok(reduced);
         }
+        reduced = reduced.with_scalars_of(self.clip, 1.0)?;
         let rotations = self.rotations(tolerances)?;
         for (joint, keys) in rotations.into_iter().enumerate() {
             self.push(&mut reduced, joint, &keys)?;
@@ -147,7 +148,7 @@ impl Reduction<'_> {
         Ok(rotations)
     }
 
-    /// Adds all joints with keys at the same times.
+    /// Adds all joints, and the scalars, with keys at the same times.
     fn push_together(
         &self,
         reduced: &mut Motion,
@@ -179,11 +180,18 @@ impl Reduction<'_> {
                 }
             }
         }
+        let scalars = 0..self.clip.set.scalar_count();
+        vectors.extend(scalars.map(|scalar| self.scalar(scalar)));
         let curve = self.options.curve;
         let mut found = reduce_together(&self.times, &rotations, &vectors, curve)?;
         let last = self.times.len().saturating_sub(1);
-        for keys in &mut found.rotations {
-            lengthen(keys, last);
+        // Where nothing moves, a second key says how long the clip lasts. Elsewhere the channels that move say it.
+        let counts = found.rotations.iter().map(|keys| keys.indices.len());
+        let moving = counts.chain(found.vectors.iter().map(|keys| keys.indices.len()));
+        if moving.max() <= Some(1) {
+            for keys in &mut found.rotations {
+                lengthen(keys, last);
+            }
         }
         let mut keys = found.rotations.into_iter();
         for joint in 0..joints {
@@ -193,10 +201,41 @@ impl Reduction<'_> {
             };
             self.push(reduced, joint, &joint_keys)?;
         }
-        for ((joint, channel), keys) in moved.into_iter().zip(&found.vectors) {
+        let (of_vectors, of_scalars) = found.vectors.split_at(moved.len());
+        for ((joint, channel), keys) in moved.into_iter().zip(of_vectors) {
             self.push_vectors(reduced, joint, channel, keys)?;
         }
+        for (index, keys) in of_scalars.iter().enumerate() {
+            let name = self.clip.set.scalar(index).map_or("", |scalar| scalar.name);
+            let (times, vectors, tangents) = self.keys_of(keys);
+            let numbers: Vec<f32> = vectors.iter().map(|vector| vector.x).collect();
+            let tangents = tangents.iter().map(|pair| pair.map(|tangent| tangent.x));
+            let tangents: Vec<[f32; 2]> = tangents.collect();
+            let scalar = Scalar {
+                interpolation: self.reduced(Some(ChannelInterpolation::Linear)),
+                ..self.clip.scalar(index)
+            };
+            reduced.add_scalar(scalar, name, &times, &numbers, &tangents)?;
+        }
         Ok(())
+    }
+
+    /// The samples of a scalar as vectors along x, and the tolerance of its curve: that of the rotations for angles, that
+    /// of the positions for lengths, none for numbers of unknown meaning.
+    fn scalar(&self, index: usize) -> (Vec<DVec3>, f64) {
+        let count = self.clip.set.scalar_count().max(1);
+        let samples = self.samples.scalars.iter().skip(index).step_by(count);
+        let samples: Vec<DVec3> = samples.map(|&x| DVec3::X * f64::from(x)).collect();
+        let size = samples
+            .iter()
+            .map(|sample| sample.x.abs())
+            .fold(0.0, f64::max);
+        let tolerance = match self.clip.scalar(index).kind {
+            ScalarKind::Angle => self.options.angle,
+            ScalarKind::Length => self.distance,
+            ScalarKind::Plain | ScalarKind::Contact => 0.0,
+        };
+        (samples, (tolerance - size * VECTOR_ROUNDING).max(0.0))
     }
 
     /// A joint's rotations relative to its parent.
@@ -339,19 +378,20 @@ impl Reduction<'_> {
         channel: Channel,
         keys: &ReducedKeys<DVec3>,
     ) -> Result<(), TrackError> {
-        let times: Vec<f64> = keys
-            .indices
-            .iter()
-            .map(|&index| self.times[index])
-            .collect();
-        let values: Vec<Vec3> = keys.keys.iter().map(|vector| vector.as_vec3()).collect();
-        let tangents = keys.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
-        let tangents: Vec<[Vec3; 2]> = tangents.collect();
+        let (times, values, tangents) = self.keys_of(keys);
         let set = &mut reduced.set;
         match channel {
             Channel::Translation => set.set_translations(joint, &times, &values, &tangents),
             Channel::Scale => set.set_scales(joint, &times, &values, &tangents),
         }
+    }
+
+    /// The times, the values and the tangents of keys, as sets take them.
+    fn keys_of(&self, keys: &ReducedKeys<DVec3>) -> (Vec<f64>, Vec<Vec3>, Vec<[Vec3; 2]>) {
+        let times = keys.indices.iter().map(|&index| self.times[index]);
+        let values = keys.keys.iter().map(|vector| vector.as_vec3());
+        let tangents = keys.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
+        (times.collect(), values.collect(), tangents.collect())
     }
 }
 
