@@ -197,6 +197,45 @@ fn the_example_in_c_prints_the_engines_bits() {
     }
 }
 
+/// The header for C++, in the oldest standard that it is for and in that of engines today.
+#[test]
+fn handles_of_cpp_free_themselves_and_have_the_engines_bits() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let keys = [
+        [0.0, 0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.6, 0.8],
+        [0.0, 0.0, 0.8, 0.6],
+    ];
+    let mut set = TrackSet::new();
+    set.push("elbow", &[0.0, 0.5, 1.25], &keys).unwrap();
+    let times = SampleTimes::at(vec![0.0, 0.25, 0.5]);
+    let expected = engine.evaluate(&set, method::SLERP, &times).unwrap();
+    let expected: Vec<f32> = expected
+        .as_quats()
+        .iter()
+        .flat_map(Quat::to_array)
+        .collect();
+    let (libraries, out) = (libraries(), Path::new(env!("CARGO_TARGET_TMPDIR")));
+    for standard in ["c++11", "c++17"] {
+        let Some(mut command) = compiler("c++") else {
+            continue;
+        };
+        let program = out.join(format!("poses-{standard}"));
+        command.arg(format!("-std={standard}"));
+        command
+            .arg(package_path("examples/poses.cpp"))
+            .arg("-o")
+            .arg(&program);
+        command.arg("-L").arg(&libraries).arg("-ltumble_capi");
+        command.arg(format!("-Wl,-rpath,{}", libraries.display()));
+        succeed(&mut command);
+        let said = succeed(&mut Command::new(&program));
+        let numbers = said.lines().flat_map(|line| line.split(' ').skip(1));
+        let numbers: Vec<f32> = numbers.map(|number| number.parse().unwrap()).collect();
+        assert_eq!(numbers, expected, "{standard}: {said}");
+    }
+}
+
 /// A chain of three joints, for those who have no model at hand.
 const CHAIN: &str = "HIERARCHY\nROOT hip\n{\nOFFSET 0 1 0\nCHANNELS 6 Xposition Yposition Zposition \
     Zrotation Xrotation Yrotation\nJOINT knee\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation \

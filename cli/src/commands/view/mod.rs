@@ -30,7 +30,7 @@ use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::ghosts::{FoundGhosts, find_ghosts};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
-use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
+use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
 use tumble_formats::sample::MethodChoice;
@@ -122,11 +122,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut shown = Vec::new();
     let mut refused = 0;
-    for path in &inputs {
+    // An input that fails does not take the page of the others away.
+    let outcome = for_each(&inputs, |path| {
         if is_path_file(path) {
             let source = TravelSource::of_paths(path, &arguments.path, &arguments.inputs.tracks)?;
             shown.push(arguments.sampled(ShownClip::of_paths(path, source))?);
-            continue;
+            return Ok(());
         }
         let loaded = arguments.inputs.load(path)?;
         refused += loaded.refused.len();
@@ -151,6 +152,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
             shown.push(arguments.sampled(one)?);
         }
+        Ok(())
+    });
+    if shown.is_empty() {
+        outcome.clone()?;
     }
     arguments.check_effects(&shown)?;
     tell_apart(&mut shown);
@@ -184,7 +189,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         })?;
     }
     match refused {
-        0 => Ok(()),
+        0 => outcome,
         _ => {
             let all = words::count(refused + shown.len(), "animation");
             let message = format!("{refused} of {all} could not be read; the others are shown");

@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Installs what library.sh, deb.sh and wheel.sh have made into a bare Debian (by debootstrap, as root), and uses it
+# as a new user would: a C++ program by CMake and by pkg-config, shared and static; the Debian package installed, used and
+# removed; the wheel without a compiler. Not part of test.sh: it needs root, a mirror and minutes.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=${CARGO_TARGET_DIR:-target}
+suite=${SUITE:-$(. /etc/os-release && echo "$VERSION_CODENAME")}
+root=$(mktemp -d)
+trap 'rm -rf --one-file-system "$root"' EXIT
+debootstrap --variant=minbase "$suite" "$root" ${MIRROR:-} >"$target/debootstrap.log"
+cp /etc/apt/sources.list.d/* "$root/etc/apt/sources.list.d/" 2>/dev/null || true
+cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
+cp -r "$target"/library/*.tar.gz "$target"/deb/*.deb data/pendulum.dat "$root/root"
+cp "$target"/wheels/*.whl "$root/root" 2>/dev/null || echo "no wheel: scripts/wheel.sh makes it" >&2
+inside() { chroot "$root" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive bash -ec "$1"; }
+
+echo "the Debian package"
+inside 'cd /root && apt-get update -qq && apt-get install -y -qq --no-install-recommends ./tumble_*.deb >/dev/null
+    tumble --version && tumble eval pendulum.dat -o out.npy && test -s out.npy && test -s /usr/share/man/man1/tumble-eval.1.gz
+    apt-get remove -y -qq tumble >/dev/null && ! command -v tumble'
+
+if compgen -G "$root/root/*.whl" >/dev/null; then
+    echo "the wheel, without a compiler"
+    inside 'cd /root && apt-get install -y -qq --no-install-recommends python3-venv >/dev/null && ! command -v cc
+        python3 -m venv env && env/bin/pip install --quiet *.whl
+        env/bin/python -c "import tumble; clip = tumble.load(\"pendulum.dat\"); print(tumble.Engine().evaluate(clip, fps=25).shape)"'
+fi
+
+echo "the C library"
+inside 'cd /root && apt-get install -y -qq --no-install-recommends g++ cmake make pkg-config >/dev/null
+    mkdir -p /opt/tumble && tar -xzf libtumble-*.tar.gz -C /opt/tumble --strip-components 1
+    mkdir -p app && cp /opt/tumble/share/doc/tumble/examples/poses.cpp app && cd app
+    export PKG_CONFIG_PATH=/opt/tumble/lib/pkgconfig
+    g++ -std=c++17 -Wall -Wextra -Werror poses.cpp $(pkg-config --cflags --libs tumble) -Wl,-rpath,/opt/tumble/lib -o by-pkg-config
+    ./by-pkg-config >a.txt && cat a.txt
+    cat >CMakeLists.txt <<END
+cmake_minimum_required(VERSION 3.16)
+project(app CXX)
+set(CMAKE_CXX_STANDARD 17)
+find_package(tumble 0.1 REQUIRED)
+add_executable(shared poses.cpp)
+target_link_libraries(shared tumble::tumble)
+add_executable(static poses.cpp)
+target_link_libraries(static tumble::tumble_static)
+END
+    cmake -S . -B build -DCMAKE_PREFIX_PATH=/opt/tumble >/dev/null && cmake --build build >/dev/null
+    build/shared | cmp - a.txt && build/static | cmp - a.txt && ldd build/shared | grep -F libtumble.so.'
+echo "all of them work"
