@@ -52,7 +52,7 @@ pub(crate) struct ResultArguments {
     /// Print JSON: about the results and the inputs that failed
     #[arg(long)]
     json: bool,
-    /// The format of the results [default: by the name of the output; to standard output npy]
+    /// The format of the results [default: by the name of the output; npy in a directory and to standard output]
     #[arg(long, visible_alias = "to", value_parser = target::format())]
     format: Option<&'static Format>,
     /// KITTI, which stores no times: also write the times of the poses to this file, in seconds, one per

@@ -607,7 +607,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
 /// Creates a directory for results if there is none. Other processes may create it at the same time:
 /// shards start together.
 pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
-    match std::fs::create_dir(path) {
+    match std::fs::create_dir_all(path) {
         Err(error) if !path.is_dir() => {
             let path = path.display();
             let message = format!("{path}: the directory could not be made: {error}");

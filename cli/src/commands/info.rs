@@ -105,6 +105,9 @@ struct Summary {
     /// The rate on whose frames all key times lie: a number or a ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     rate: Option<String>,
+    /// The number of frames of this rate from the first key to the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frames: Option<u64>,
     /// How many channels each of glTF's samplers interpolates.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     samplers: BTreeMap<&'static str, usize>,
@@ -300,6 +303,9 @@ impl Summary {
             time_offset: clip.time_offset,
             origins: clip.origins.iter().map(DVec3::to_array).collect(),
             rate: clip.rate.map(|rate| rate.to_string()),
+            frames: clip.rate.zip(set.time_span()).map(|(rate, (first, last))| {
+                ((last - first) * rate.per_second()).round() as u64 + 1
+            }),
             samplers,
             box_length: loaded.box_length,
             metres: loaded.space.map(|space| space.metres),
@@ -359,7 +365,13 @@ impl Summary {
             line("positions", format!("about {x} {y} {z}, in f64"));
         }
         if let Some(rate) = &self.rate {
-            line("on frames of", format!("{rate} fps"));
+            let frames = self
+                .frames
+                .map(|count| format!(" ({count} from the first key to the last)"));
+            line(
+                "on frames of",
+                format!("{rate} fps{}", frames.unwrap_or_default()),
+            );
         }
         if !self.samplers.is_empty() {
             let samplers = self
