@@ -30,6 +30,7 @@ mod reduce;
 #[cfg(unix)]
 mod remedies;
 mod render;
+mod robots;
 mod route;
 mod shards;
 mod stubs;
