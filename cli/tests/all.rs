@@ -31,6 +31,7 @@ mod reduce;
 mod remedies;
 mod render;
 mod reporting;
+mod robots;
 mod route;
 mod shards;
 mod stubs;

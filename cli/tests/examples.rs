@@ -105,6 +105,8 @@ fn write_inputs(folder: &Path) {
         );
     }
     write("arm.xml", crate::cli_listings::ARM.as_bytes());
+    write("g1.xml", crate::robots::ROBOT.as_bytes());
+    write("lafan1/walk.csv", crate::robots::take().as_bytes());
     let generate = |line: &str| {
         succeed(folder, &line.split(' ').collect::<Vec<_>>());
     };

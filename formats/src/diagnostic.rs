@@ -281,6 +281,9 @@ codes! {
     RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
     RobotElement = "E903" elsewhere, "an element that is not read", "It would make or move bodies by rules that are not supported; the message says what to use instead.";
+    JointsDoNotFit = "E904" elsewhere, "joints that are not the robot's", "The file names joints that the robot of `--robot` does not have, or has more or fewer joints without naming them. Robots of one name exist in versions with different joints.";
+    NoMassCentre = "E905" elsewhere, "a body without a centre of mass", "Velocities of centres of mass (`--velocity-at mass`, BeyondMimic, IsaacLab) need them, and the robot's file has no `inertial` for this body. MuJoCo derives it from shapes, which are not read. Add it, or ask for velocities of origins.";
+    OrderContradicts = "E907" elsewhere, "an order that the bodies contradict", "A file with poses of bodies and the robot of `--robot` are compared: the joints put the bodies where the file has them in one order alone. Programs list joints and bodies depth first (MuJoCo, mjlab) or breadth first (PhysX, IsaacLab), and quaternions as w x y z or x y z w.";
     TwoDialects = "E908", "arrays of two dialects", "Layouts of robots' motion are recognised by the names and the shapes of their arrays, and the file has those of two. Save one of them, or name the arrays with `--map`.";
     PickleDamaged = "E910", "a pickle that cannot be read", "It is truncated or damaged, or not a pickle. The location is a position in the file, or in what it unpacks to.";
     PickleCalls = "E911", "a pickle that would run code", "It names a function or a class that Python would call when it reads the file. Such files may do anything to the computer of those who open them with Python. Only numbers, texts, lists, dicts and arrays are read.";
@@ -288,6 +291,8 @@ codes! {
     PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
+    Dialect = "E918" elsewhere, "a motion that a dialect cannot hold", "The layout of another program has no room for it: it has a number for each hinge and slide, one root, and frames of one rate. The message says what is too much.";
+    OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -349,11 +354,14 @@ codes! {
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
     AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` gives another.";
+    JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion leaves them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
     RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
     UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as of a robot that stands where w is first. The columns have no names that say it; `--source-order` does.";
     InertObjects = "W911", "objects of classes that are not read", "They are kept by the names of their classes alone; nothing is looked up or run. A value that the motion needs must not be one of them.";
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
+    RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
+    OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`, as of another version of the robot. Bodies are computed from the joints.";
 }
 
 impl Code {

@@ -274,6 +274,8 @@ pub enum Adjustment {
     Space,
     /// Their joints have other offsets ([`set_all_offsets`](crate::motion::adjust::set_all_offsets)).
     Offsets,
+    /// Their joints are those of a robot ([`Robot::assign`](crate::robot::Robot::assign)).
+    Robot,
 }
 
 impl Adjustment {
@@ -283,6 +285,7 @@ impl Adjustment {
         match self {
             Self::Space => "other units or axes make",
             Self::Offsets => "other offsets make",
+            Self::Robot => "the joints of a robot make",
         }
     }
 }

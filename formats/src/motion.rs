@@ -13,6 +13,7 @@ pub mod origin;
 pub mod outside;
 pub mod packed;
 pub mod poses;
+pub mod recorded;
 pub mod reduce;
 pub mod sample;
 pub mod scalars;
@@ -33,6 +34,7 @@ use tumble::{Channel, FrameRate, Joints, Track, TrackError, TrackSet};
 
 use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
 use crate::motion::origin::{coordinate, origin_at_rest, relative};
+pub use crate::motion::recorded::{RecordedBodies, RecordedRobot, RecordedSample};
 pub use crate::motion::scalars::{Scalar, ScalarKind};
 pub use crate::motion::written_joint::{WrittenChannel, WrittenJoint};
 use crate::names::same_named;
@@ -73,6 +75,8 @@ pub struct Motion {
     pub written_joints: Vec<WrittenJoint>,
     /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
+    /// What the file says of the robot that moves, if it is in a dialect.
+    pub robot: Option<RecordedRobot>,
 }
 
 /// The whole second from which times in f64 count, the [`time_offset`](Motion::time_offset) of a clip with them: 0 for
@@ -98,6 +102,7 @@ impl Motion {
             no_world: self.no_world.clone(),
             written_joints: self.written_joints.clone(),
             body: self.body.clone(),
+            robot: self.robot.clone(),
             scalars: Vec::new(),
             ..*self
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use tumble_formats::dialect::DIALECTS;
+use tumble_formats::dialect::write::WRITTEN;
 use tumble_formats::surface::SurfaceKind;
 use tumble_formats::{FORMATS, Feature, PATHS, SURFACES};
 
@@ -93,6 +94,23 @@ fn the_table_of_dialects_is_that_of_the_code() {
         writeln!(table, "| {} | {} |", dialect.name, dialect.summary).unwrap();
     }
     update("robots.md", "dialects", &table);
+    let mut table = String::from(
+        "| dialect | what is written | bodies and joints | rate |\n|---|---|---|---|\n",
+    );
+    for dialect in WRITTEN {
+        let rate = match dialect.assumed_rate {
+            Some(rate) => format!("none; readers take {rate}"),
+            None if dialect.has_whole_rate => "whole".to_owned(),
+            None => "any".to_owned(),
+        };
+        writeln!(
+            table,
+            "| {} | {} | {} | {rate} |",
+            dialect.name, dialect.summary, dialect.order
+        )
+        .unwrap();
+    }
+    update("robots.md", "written dialects", &table);
 }
 
 /// Compares a table of a page of `docs/` with the code's, or writes it.

@@ -367,6 +367,8 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
             pelvis: Vec3::from_array(pelvis),
             shape,
         }),
+        // It is for the check of orders when a file is read.
+        robot: None,
     })
 }
 

@@ -13,7 +13,8 @@ use tumble::trees::{
 use tumble::{Quantity, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::{
-    self, BodiesError, BodiesRequest, LimitExcess, VelocityPoint, unwrap_joint,
+    self, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
+    unwrap_joint,
 };
 
 use crate::arrays::{ArrayValues, Order, doubles, quaternions};
@@ -495,6 +496,9 @@ pub(crate) fn bodies<'py>(
         order: option_of(&text(names.body_order), "body_order")?,
         siblings: option_of(&text(names.siblings), "siblings")?,
         velocity_at: option_of(&text(names.velocity_at), "velocity_at")?,
+        velocities: VelocitySource::Curve,
+        limits: LimitRule::Report,
+        origins: Vec::new(),
     };
     let held = engine.engine_for(samples * motion.set.track_count().max(1))?;
     let tree = robot.clone().unbind();

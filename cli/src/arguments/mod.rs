@@ -9,6 +9,7 @@ pub(crate) mod output;
 pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;
+pub(crate) mod robot;
 pub(crate) mod time;
 pub(crate) mod tolerance;
 pub(crate) mod tracks;

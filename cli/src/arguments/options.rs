@@ -61,6 +61,8 @@ pub(crate) enum ResultKind {
     Motion,
     /// The input's file with other keys.
     Baked,
+    /// The motion of a robot in the layout of another program.
+    Robot,
 }
 
 impl ResultKind {
@@ -90,7 +92,9 @@ impl ResultDescription<'_> {
             kind: match self.kind {
                 ResultKind::Motion | ResultKind::Baked => SampledKind::Clips,
                 ResultKind::Rotations if self.output.is_rotations() => SampledKind::Rotations,
-                ResultKind::Rotations | ResultKind::Poses => SampledKind::Numbers,
+                ResultKind::Rotations | ResultKind::Poses | ResultKind::Robot => {
+                    SampledKind::Numbers
+                }
             },
         }
     }
@@ -160,6 +164,11 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     reading("source_order", FormatOption::SourceOrder),
     reading("bridge_gaps", FormatOption::BridgeGaps),
     reading("keyframes", FormatOption::Keyframes),
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..deciding("robot")
+    },
+    deciding("source_body_order"),
     // Results.
     silent("out"),
     silent("overwrite"),
@@ -218,6 +227,15 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
         bytes: Bytes::ByContent,
         ..of_results("body_model", |result| lengths(result, "body-model"))
     },
+    // Motion of robots.
+    deciding("dialect"),
+    deciding("body_order"),
+    deciding("joint_order"),
+    deciding("siblings"),
+    deciding("velocity_at"),
+    deciding("velocities"),
+    deciding("limits"),
+    deciding("describe"),
     // Paths.
     deciding("seconds"),
     deciding("rate"),
@@ -294,6 +312,9 @@ fn order(result: &ResultDescription<'_>) -> Option<String> {
             "{} has a fixed order of quaternion components; leave out --order",
             format.name
         )),
+        ResultKind::Robot => Some(
+            "--order is for other results: the layout of a robot's motion has an order; leave it out".to_owned(),
+        ),
         ResultKind::Rotations | ResultKind::Poses => None,
     }
 }
@@ -306,7 +327,7 @@ fn layout(result: &ResultDescription<'_>) -> Option<String> {
             (only, format!("rows of {name}"))
         }
         ResultKind::Poses => (Some(Layout::FrameMajor), "poses".to_owned()),
-        ResultKind::Motion | ResultKind::Baked => {
+        ResultKind::Motion | ResultKind::Baked | ResultKind::Robot => {
             return Some(format!(
                 "{name} has a fixed layout for clips; leave out --layout"
             ));
@@ -330,7 +351,7 @@ fn encoding(result: &ResultDescription<'_>) -> Option<String> {
             "--encoding is for quaternions, and --output {} is written as f32; leave it out",
             result.output.name()
         )),
-        ResultKind::Motion | ResultKind::Baked => Some(format!(
+        ResultKind::Motion | ResultKind::Baked | ResultKind::Robot => Some(format!(
             "--encoding is for rotations as they come (NPY); {} has its own; leave it out",
             format.name
         )),
@@ -343,6 +364,11 @@ fn linear(result: &ResultDescription<'_>) -> Option<String> {
 }
 
 fn end_frame(result: &ResultDescription<'_>) -> Option<String> {
+    if result.kind == ResultKind::Robot {
+        return Some(
+            "--end-frame: the motion of a robot ends with the last frame before its end; leave it out".to_owned(),
+        );
+    }
     result.end_frame.for_result(result.sampled()).err()
 }
 

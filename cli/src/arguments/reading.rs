@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use tumble::FrameRate;
+use tumble::trees::BodyOrder;
 use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
@@ -13,12 +14,14 @@ use tumble_formats::kitti::open_frame_times;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::quaternion::ComponentOrder;
+use tumble_formats::robot::Robot;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::options::{AppliesTo, OPTIONS};
 use crate::arguments::output::{component_order, one_of};
+use crate::arguments::robot::body_order;
 use crate::messages::exit::{self, Failure};
-use crate::messages::names;
+use crate::messages::{names, words};
 
 /// How files are read. All of these options change results.
 #[derive(Debug, Clone, Args)]
@@ -51,7 +54,8 @@ pub(crate) struct ReadingArguments {
     /// The unit of times that are whole numbers
     #[arg(long, value_name = "UNIT", value_parser = time_unit())]
     time_unit: Option<TimeUnit>,
-    /// The order of a quaternion's components in TUM and EuRoC files that have another one than these formats
+    /// The order of a quaternion's components in TUM and EuRoC files, and in files of robots' motion, that
+    /// have another one than these formats
     #[arg(long, value_name = "ORDER", value_parser = component_order())]
     source_order: Option<ComponentOrder>,
     /// Skip keys with missing numbers in tables, trajectories and logs (blank cells, nulls, NaN): the
@@ -62,6 +66,17 @@ pub(crate) struct ReadingArguments {
     /// curves [default: where `eval -m` names a method]
     #[arg(long)]
     keyframes: bool,
+    /// The robot that moves, MJCF or URDF: its joints' names and limits, and the order of bodies, are
+    /// taken from it, and checked with the bodies of the input
+    #[arg(long, value_name = "FILE")]
+    robot: Option<PathBuf>,
+    /// --robot: the order of joints and bodies in inputs that do not name them [default: the one in which
+    /// the bodies are where the joints put them]
+    #[arg(long, value_name = "ORDER", requires = "robot", value_parser = body_order())]
+    source_body_order: Option<BodyOrder>,
+    /// The robot, once it is read.
+    #[arg(skip)]
+    opened_robot: Arc<OnceLock<Arc<Robot>>>,
     /// The same, because the command line names a method.
     #[arg(skip)]
     names_method: OnceLock<()>,
@@ -164,6 +179,7 @@ impl ReadingArguments {
             || self.keyframes
             || self.offsets.is_some()
             || self.body_model.is_some()
+            || self.robot.is_some()
     }
 
     /// Whether the command line has any of these options.
@@ -181,6 +197,9 @@ impl ReadingArguments {
             source_order,
             bridge_gaps,
             keyframes,
+            robot,
+            source_body_order: _,
+            opened_robot: _,
             names_method: _,
             offsets,
             body_model,
@@ -201,8 +220,25 @@ impl ReadingArguments {
             || source_order.is_some()
             || offsets.is_some()
             || body_model.is_some()
+            || robot.is_some()
             || scale.is_some()
             || up_axis.is_some()
+    }
+
+    /// The robot that moves. It is read once, and its warnings are printed then.
+    pub(crate) fn robot(&self) -> Result<Option<Arc<Robot>>, Failure> {
+        let Some(file) = &self.robot else {
+            return Ok(None);
+        };
+        if let Some(robot) = self.opened_robot.get() {
+            return Ok(Some(robot.clone()));
+        }
+        let robot = Robot::open(file).map_err(|fault| Failure::input(&fault, ""))?;
+        let opened = self.opened_robot.get_or_init(|| {
+            words::warnings(&robot.warnings);
+            Arc::new(robot)
+        });
+        Ok(Some(opened.clone()))
     }
 
     pub(crate) fn options(&self, limits: Limits, pipes: bool) -> Result<ReadOptions, Diagnostic> {
@@ -273,6 +309,10 @@ impl ReadingArguments {
     pub(crate) fn apply(&self, loaded: &mut Loaded, path: &Path) -> Result<(), Failure> {
         if let Some(requested) = &self.animation {
             choose(loaded, requested, path)?;
+        }
+        if let Some(robot) = self.robot()? {
+            let assigned = robot.assign(loaded, &names::input(path), self.source_body_order);
+            assigned.map_err(|fault| Failure::input(&fault, ""))?;
         }
         if let Some(file) = &self.offsets {
             let offsets = JointOffsets::open(file);

@@ -149,6 +149,11 @@ impl ResultArguments {
         }
     }
 
+    /// Where results go.
+    pub(crate) fn out(&self) -> Option<&Path> {
+        self.out.as_deref()
+    }
+
     /// The format that was asked for.
     pub(crate) fn format(&self) -> Option<&'static Format> {
         self.format
@@ -166,10 +171,19 @@ impl ResultArguments {
 
     /// The destination of each input's result. Everything that can be refused is refused here, before any work.
     pub(crate) fn plan(&self, inputs: GatheredInputs) -> Result<OutputPlan, Failure> {
+        self.plan_in(inputs, self.format)
+    }
+
+    /// As [`ResultArguments::plan`], in a format that another option may say.
+    pub(crate) fn plan_in(
+        &self,
+        inputs: GatheredInputs,
+        format: Option<&'static Format>,
+    ) -> Result<OutputPlan, Failure> {
         let inputs = &self.based(inputs)?;
         let options = OutputOptions {
             out: self.out.as_deref(),
-            format: self.format,
+            format,
             overwrite: self.overwrite,
             resume: self.resume,
             prune: self.prune,

@@ -3,11 +3,13 @@
 use std::borrow::Cow;
 
 use clap::Args;
-use tumble::{Device, Engine, EulerSequence};
+use tumble::{Device, Engine, EulerSequence, SampleTimes};
 use tumble_formats::Feature;
+use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::motion::Motion;
 use tumble_formats::quaternion::ComponentOrder;
+use tumble_formats::sample::ChannelMethods;
 use tumble_formats::trim::{TrimError, trim};
 
 use crate::arguments::input::Inputs;
@@ -16,6 +18,7 @@ use crate::arguments::output::{component_order, sequence};
 use crate::arguments::results::{
     ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new, write_keys,
 };
+use crate::arguments::robot::{DialectArguments, RobotFrames};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::target::ResultTarget;
@@ -44,6 +47,8 @@ pub(crate) struct Arguments {
     inputs: Inputs,
     #[command(flatten)]
     results: ResultArguments,
+    #[command(flatten)]
+    dialect: DialectArguments,
     /// Where to start, seconds [default: the first key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     start: Option<f64>,
@@ -61,8 +66,23 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(files)?;
-    check_stores_keys(&plan)?;
+    let asked = arguments.dialect.format(&arguments.results)?;
+    arguments.inputs.reading.robot()?;
+    let plan = arguments.results.plan_in(files, asked)?;
+    match arguments.dialect.chosen() {
+        None => check_stores_keys(&plan)?,
+        Some(dialect) => {
+            let options = [
+                ("order", "--order"),
+                ("sequence", "--sequence"),
+                ("tracks", "--tracks"),
+            ];
+            let on = format!("--dialect {}", dialect.name);
+            arguments
+                .command_line
+                .refuse(&options, &on, "leave it out")?;
+        }
+    }
     let format = plan.targets.first().map(ResultTarget::format);
     if let Some(format) = format.filter(|format| !format.takes(FormatOption::Order))
         && arguments.order.is_some()
@@ -106,6 +126,9 @@ impl Arguments {
 
     fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
         let (name, clips, target) = (&*work.name, work.clips(), &work.target);
+        if let Some(dialect) = self.dialect.chosen() {
+            return self.convert_robot(dialect, work);
+        }
         let loaded = &work.input.loaded;
         let document = document_to_rewrite(work, self.makes_new(target));
         let parts = clips.iter().map(|&clip| self.part(name, clip));
@@ -125,6 +148,51 @@ impl Arguments {
             None => write_keys(name, &parts, document, &options, target)?,
         };
         let done = format!("{}, {}", words::count(parts.len(), "clip"), keys(&parts),);
+        Ok(work.result(written, &done, None))
+    }
+
+    /// The keys of a robot's motion in the layout of another program: a frame for each.
+    fn convert_robot(
+        &self,
+        dialect: &WrittenDialect,
+        work: &ClipWork,
+    ) -> Result<EvaluatedResult, Failure> {
+        let (name, clips) = (&*work.name, work.clips());
+        let ([clip], Some(robot)) = (&*clips, self.inputs.reading.robot()?) else {
+            let message = format!(
+                "{name}: {} has one clip; choose it with --animation",
+                dialect.name
+            );
+            return Err(Failure::usage(message));
+        };
+        let part = self.part(name, clip)?;
+        let times = part.key_times();
+        let rate = part.rate.or_else(|| part.rate_of_keys());
+        let spaced = rate.filter(|rate| {
+            let step = rate.time_of(1);
+            times
+                .windows(2)
+                .all(|pair| (pair[1] - pair[0] - step).abs() < 1e-3 * step)
+        });
+        let frames = SampleTimes::at(times);
+        let frames = RobotFrames {
+            frames: &frames,
+            rate: spaced,
+            methods: ChannelMethods::AUTHORED,
+        };
+        let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
+        let found = self
+            .dialect
+            .evaluate(dialect, &robot, (name, &part), &frames, |run| run(&engine))?;
+        let notes = vec![("input", name.to_owned())];
+        let (written, report) =
+            self.dialect
+                .write(dialect, &robot, (work, &part), (&found, frames.rate), notes)?;
+        let done = format!(
+            "{}, {}",
+            words::count(found.times.len(), "frame"),
+            report.text()
+        );
         Ok(work.result(written, &done, None))
     }
 

@@ -1,7 +1,6 @@
 //! GMR's motion of a robot: a pickle of a dict.
 
 use super::{Axis, Dialect, root_and_joints};
-use crate::npz::plan::KeyKind;
 use crate::quaternion::ComponentOrder;
 
 pub(super) static DIALECT: Dialect = Dialect {
@@ -13,8 +12,10 @@ pub(super) static DIALECT: Dialect = Dialect {
         ("dof_pos", &[Axis::Frames, Axis::Any]),
     ],
     plan: |archive, warnings| {
-        let rotation = ("root_rot", KeyKind::Quaternion(ComponentOrder::Xyzw));
+        let rotation = ("root_rot", ComponentOrder::Xyzw);
         let beside = &["local_body_pos", "link_body_list"];
-        root_and_joints(archive, rotation, "root_pos", "dof_pos", beside, warnings)
+        root_and_joints(
+            archive, "gmr", rotation, "root_pos", "dof_pos", beside, warnings,
+        )
     },
 };

@@ -4,7 +4,7 @@ use tumble::Layout;
 
 use super::{Axis, Dialect, member, root};
 use crate::motion::ScalarKind;
-use crate::npz::plan::{ArchivePlan, KeyKind};
+use crate::npz::plan::{ArchivePlan, KeyKind, RobotArrays};
 
 pub(super) static DIALECT: Dialect = Dialect {
     name: "mimickit",
@@ -20,6 +20,7 @@ pub(super) static DIALECT: Dialect = Dialect {
             is_part: true,
             names: vec!["root".to_owned()],
             companions: &["loop_mode"],
+            robot: Some(RobotArrays::of("mimickit", false)),
             ..ArchivePlan::default()
         };
         plan.add(

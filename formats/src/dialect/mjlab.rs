@@ -1,8 +1,7 @@
 //! The motion of mjlab and of `BeyondMimic`, whose files differ in the order of bodies and joints alone: depth first and
 //! breadth first. The first body is the root in both.
 
-use super::{Axis, Dialect, root_and_joints};
-use crate::npz::plan::KeyKind;
+use super::{Axis, BODY_NAMES, Dialect, JOINT_NAMES, root_and_joints};
 use crate::quaternion::ComponentOrder;
 
 pub(super) static DIALECT: Dialect = Dialect {
@@ -14,10 +13,20 @@ pub(super) static DIALECT: Dialect = Dialect {
         ("body_quat_w", &[Axis::Frames, Axis::Any, Axis::Is(4)]),
     ],
     plan: |archive, warnings| {
-        let rotation = ("body_quat_w", KeyKind::Quaternion(ComponentOrder::Wxyz));
-        let beside = &["joint_vel", "body_lin_vel_w", "body_ang_vel_w"];
+        let rotation = ("body_quat_w", ComponentOrder::Wxyz);
+        let beside = &[
+            "joint_vel",
+            "body_lin_vel_w",
+            "body_ang_vel_w",
+            JOINT_NAMES,
+            BODY_NAMES,
+            "order",
+            "quaternion",
+            "tumble",
+        ];
         root_and_joints(
             archive,
+            "mjlab",
             rotation,
             "body_pos_w",
             "joint_pos",

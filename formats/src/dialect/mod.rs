@@ -11,6 +11,7 @@ mod mjlab;
 mod motion_lib;
 mod protomotions;
 pub(crate) mod text;
+pub mod write;
 
 use tumble::Layout;
 
@@ -18,7 +19,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::ScalarKind;
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
-use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, check_float};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, RobotArrays, check_float};
+use crate::quaternion::ComponentOrder;
 use crate::warnings::Warnings;
 
 /// A layout of named arrays.
@@ -134,10 +136,15 @@ fn root(
     Ok((part, frames))
 }
 
-/// The plan of a root and of joints without names, all of them hinges or slides, which the file does not tell apart.
+/// The arrays with the names of joints and bodies that `tumble eval --describe` adds.
+const JOINT_NAMES: &str = "joint_names";
+const BODY_NAMES: &str = "body_names";
+
+/// The plan of a root and of joints, all of them hinges or slides, which the file does not tell apart.
 fn root_and_joints(
     archive: &Archive,
-    rotation: (&str, KeyKind),
+    dialect: &'static str,
+    rotation: (&str, ComponentOrder),
     position: &str,
     joints: &str,
     companions: &'static [&'static str],
@@ -150,10 +157,31 @@ fn root_and_joints(
         companions,
         ..ArchivePlan::default()
     };
-    plan.add(archive, root(archive, rotation.0, rotation.1, 0)?)?;
+    let quaternions = KeyKind::Quaternion(rotation.1);
+    plan.add(archive, root(archive, rotation.0, quaternions, 0)?)?;
     plan.add(archive, root(archive, position, KeyKind::Translation, 0)?)?;
+    let texts = |name| {
+        Ok(archive
+            .array_named(name)?
+            .and_then(|array| array.texts().ok()))
+    };
     let columns = (member(archive, joints)?, Layout::FrameMajor, 0);
-    plan.add_scalars(archive, columns, None, |_| ScalarKind::Angle, warnings)?;
+    let names: Option<Vec<String>> = texts(JOINT_NAMES)?;
+    let mut robot = RobotArrays::of(dialect, names.is_some());
+    plan.add_scalars(archive, columns, names, |_| ScalarKind::Angle, warnings)?;
+    let members = [member(archive, position)?, member(archive, rotation.0)?];
+    let [positions, rotations] =
+        members.map(|member| archive.header(member).map(|header| &header.shape));
+    if let (&[frames, bodies, _], &[of_frames, of_bodies, _]) = (&positions?[..], &rotations?[..])
+        && (frames, bodies) == (of_frames, of_bodies)
+    {
+        let names: Option<Vec<String>> = texts(BODY_NAMES)?;
+        robot.body_names = names
+            .filter(|names| names.len() == bodies)
+            .unwrap_or_default();
+        (robot.bodies, robot.order) = (Some(members), rotation.1);
+    }
+    plan.robot = Some(robot);
     plan.read_rate(archive, &["fps"])?;
     Ok(plan)
 }

@@ -1,7 +1,6 @@
 //! A clip of the motion libraries of PHC, ASAP and GR00T: joblib's file of a dict with a dict for each clip.
 
 use super::{Axis, Dialect, root_and_joints};
-use crate::npz::plan::KeyKind;
 use crate::quaternion::ComponentOrder;
 
 pub(super) static DIALECT: Dialect = Dialect {
@@ -13,10 +12,11 @@ pub(super) static DIALECT: Dialect = Dialect {
         ("dof", &[Axis::Frames, Axis::Any]),
     ],
     plan: |archive, warnings| {
-        let rotation = ("root_rot", KeyKind::Quaternion(ComponentOrder::Xyzw));
+        let rotation = ("root_rot", ComponentOrder::Xyzw);
         let beside = &["pose_aa", "smpl_joints", "action"];
         root_and_joints(
             archive,
+            "motion-lib",
             rotation,
             "root_trans_offset",
             "dof",

@@ -1,7 +1,6 @@
 //! A motion of `ProtoMotions`: a file of `torch.save` with the state of a simulation.
 
 use super::{Axis, Dialect, root_and_joints};
-use crate::npz::plan::KeyKind;
 use crate::quaternion::ComponentOrder;
 
 pub(super) static DIALECT: Dialect = Dialect {
@@ -13,7 +12,7 @@ pub(super) static DIALECT: Dialect = Dialect {
         ("rigid_body_rot", &[Axis::Frames, Axis::Any, Axis::Is(4)]),
     ],
     plan: |archive, warnings| {
-        let rotation = ("rigid_body_rot", KeyKind::Quaternion(ComponentOrder::Xyzw));
+        let rotation = ("rigid_body_rot", ComponentOrder::Xyzw);
         let beside = &[
             "dof_vel",
             "rigid_body_vel",
@@ -23,6 +22,7 @@ pub(super) static DIALECT: Dialect = Dialect {
         ];
         root_and_joints(
             archive,
+            "protomotions",
             rotation,
             "rigid_body_pos",
             "dof_pos",

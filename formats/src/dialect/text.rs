@@ -10,13 +10,13 @@ use crate::format::{Loaded, ReadOptions, TimeUnit};
 use crate::motion::ScalarKind;
 use crate::npz;
 use crate::npz::archive::{Archive, Member, ONLY_ARRAY};
-use crate::npz::plan::{ArchivePlan, KeyKind};
+use crate::npz::plan::{ArchivePlan, KeyKind, RobotArrays};
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 use crate::warnings::Warnings;
 
 /// The first columns of BONES-SEED's files: centimetres, and extrinsic angles about x, y, z in degrees.
-const BONES_SEED: [&str; 7] = [
+pub(super) const BONES_SEED: [&str; 7] = [
     "Frame",
     "root_translateX",
     "root_translateY",
@@ -27,7 +27,7 @@ const BONES_SEED: [&str; 7] = [
 ];
 
 /// How the columns of joints end in BONES-SEED's files.
-const JOINT: &str = "_dof";
+pub(super) const JOINT: &str = "_dof";
 
 /// The fewest columns of Unitree's files: position, quaternion, two joints.
 const FEWEST: usize = 9;
@@ -172,6 +172,10 @@ impl TextDialect {
             is_world: true,
             is_part: true,
             names: vec!["root".to_owned()],
+            robot: Some(match self {
+                Self::Unitree => RobotArrays::of("unitree-csv", false),
+                Self::BonesSeed(_) => RobotArrays::of("bones-seed", true),
+            }),
             ..ArchivePlan::default()
         };
         let (position, rotation, names) = match self {

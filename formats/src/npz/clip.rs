@@ -11,9 +11,11 @@ use crate::format::ReadOptions;
 use crate::motion::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::origin::relative;
 use crate::motion::signs::continue_signs;
-use crate::motion::{Body, Joint, Motion, Transform};
+use crate::motion::{
+    Body, Joint, Motion, RecordedBodies, RecordedRobot, RecordedSample, Transform,
+};
 use crate::npz::archive::Archive;
-use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, TOGETHER};
+use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, Strides, TOGETHER};
 use crate::npz::body_model::shape_of;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::rotation_vector;
@@ -132,6 +134,7 @@ pub(crate) fn read(
     for part in &plan.scalars {
         part.read(archive, (&times, &frames), &mut motion)?;
     }
+    motion.robot = recorded_robot(archive, plan, &frames)?;
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
         for track in 0..plan.tracks {
             let parent = plan.parents.get(track).copied().flatten();
@@ -146,6 +149,68 @@ pub(crate) fn read(
         }
     }
     Ok(motion)
+}
+
+/// At how many keys the bodies of a robot are read, for the check of their order.
+const CHECKED_KEYS: usize = 8;
+
+/// What the file says of the robot; `frames` are those of the keys.
+fn recorded_robot(
+    archive: &Archive,
+    plan: &ArchivePlan,
+    frames: &[usize],
+) -> Result<Option<RecordedRobot>, Diagnostic> {
+    let Some(robot) = &plan.robot else {
+        return Ok(None);
+    };
+    let mut recorded = RecordedRobot {
+        dialect: robot.dialect,
+        names_joints: robot.names_joints,
+        bodies: None,
+    };
+    let Some([positions, rotations]) = robot.bodies else {
+        return Ok(Some(recorded));
+    };
+    let arrays = [archive.array(positions)?, archive.array(rotations)?];
+    let count = arrays[0].header.shape[1];
+    archive.take(count * CHECKED_KEYS, KEY)?;
+    let at = |array: &Array<'_>, frame: usize| {
+        let strides = array.header.strides();
+        Strides {
+            first: frame * strides[0],
+            track: strides[1],
+            frame: strides[0],
+            component: strides[2],
+        }
+    };
+    let step = frames.len().div_ceil(CHECKED_KEYS).max(1);
+    let keys = (0..frames.len()).step_by(step);
+    let samples = keys.map(|key| {
+        let [positions, rotations] = &arrays;
+        let of_bodies =
+            positions
+                .tracks::<AsStored, 3, _>(at(positions, frames[key]), 0..count, 1, |list| list);
+        let root =
+            rotations.tracks::<AsStored, 4, _>(at(rotations, frames[key]), 0..1, 1, |list| list);
+        RecordedSample {
+            key,
+            positions: of_bodies
+                .concat()
+                .into_iter()
+                .map(DVec3::from_array)
+                .collect(),
+            root: root.concat().first().copied().unwrap_or_default(),
+        }
+    });
+    recorded.bodies = Some(RecordedBodies {
+        positions: archive.members[positions].name.clone(),
+        rotations: archive.members[rotations].name.clone(),
+        order: robot.order,
+        names: robot.body_names.clone(),
+        count,
+        samples: samples.collect(),
+    });
+    Ok(Some(recorded))
 }
 
 /// The frames that are kept if times repeat: see [`Origin::increasing`].

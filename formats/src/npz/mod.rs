@@ -76,6 +76,7 @@ pub static FORMAT: Format = Format {
         FormatOption::OverrideRate,
         FormatOption::Map,
         FormatOption::TimeUnit,
+        FormatOption::SourceOrder,
         FormatOption::Linear,
     ],
 };
@@ -172,6 +173,9 @@ fn read_known(
         );
         Diagnostic::new(&archive.file, Code::UnknownArrays, message)
     })?;
+    if let Some(order) = options.source_order {
+        plan.set_order(archive, order)?;
+    }
     let loaded = read_plan(archive, &mut plan, options, warnings)?;
     Ok((plan, loaded))
 }

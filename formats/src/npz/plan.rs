@@ -55,6 +55,8 @@ pub(crate) struct ArchivePlan {
     pub(crate) is_world: bool,
     /// Why poses in the world cannot be computed.
     pub(crate) no_world: Option<String>,
+    /// The robot that moves, if the file is in a dialect.
+    pub(crate) robot: Option<RobotArrays>,
     /// Whether the clip is the motion of an SMPL body.
     pub(crate) is_body: bool,
     /// Names of members that files of this layout usually have besides the motion. No warning names them.
@@ -67,6 +69,32 @@ pub(crate) struct ArchivePlan {
     pub(crate) is_part: bool,
     /// Whether the layout is Tumble's, with the notes on how the samples were made.
     pub(crate) is_tumble_layout: bool,
+}
+
+/// What a file says of a robot, besides the keys of its root and its joints.
+#[derive(Debug, Clone)]
+pub(crate) struct RobotArrays {
+    pub(crate) dialect: &'static str,
+    pub(crate) names_joints: bool,
+    /// The positions and the rotations of all bodies, (frames, bodies, numbers).
+    pub(crate) bodies: Option<[usize; 2]>,
+    /// The order of the rotations' components.
+    pub(crate) order: ComponentOrder,
+    /// The names of the bodies, or empty.
+    pub(crate) body_names: Vec<String>,
+}
+
+impl RobotArrays {
+    /// Of a dialect without bodies.
+    pub(crate) fn of(dialect: &'static str, names_joints: bool) -> Self {
+        Self {
+            dialect,
+            names_joints,
+            bodies: None,
+            order: ComponentOrder::Xyzw,
+            body_names: Vec::new(),
+        }
+    }
 }
 
 /// The location of the times of all frames.
@@ -247,6 +275,31 @@ impl ArchivePlan {
         }
         self.parts.push(part);
         Ok(())
+    }
+
+    /// Takes quaternions of a robot's motion for such in another order.
+    ///
+    /// # Errors
+    /// When the file is in no dialect, or has no quaternions.
+    pub(crate) fn set_order(
+        &mut self,
+        archive: &Archive,
+        order: ComponentOrder,
+    ) -> Result<(), Diagnostic> {
+        let mut is_any = false;
+        for part in &mut self.parts {
+            if let (KeyKind::Quaternion(known), Some(robot)) = (&mut part.kind, &mut self.robot) {
+                (*known, robot.order, is_any) = (order, order, true);
+            }
+        }
+        match is_any {
+            true => Ok(()),
+            false => {
+                let message = "--source-order is for files whose layout has quaternions in an order that programs \
+                               change, those of robots; leave it out, or say the order with --map";
+                Err(Diagnostic::new(&archive.file, Code::Map, message))
+            }
+        }
     }
 
     /// Reads the names of all tracks from an array of texts.

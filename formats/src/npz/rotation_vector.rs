@@ -54,7 +54,11 @@ pub(crate) fn exp(vector: [f64; 3]) -> DQuat {
 /// The rotation vector of a unit quaternion that is nearest to the one before it. Without one before it, the sign of
 /// the quaternion decides: the angle is above π if w < 0.
 pub(crate) fn log(rotation: Quat, before: Option<DVec3>) -> DVec3 {
-    let q = rotation.as_dquat();
+    log_of(rotation.as_dquat(), before)
+}
+
+/// As [`log`], of a quaternion in f64.
+pub(crate) fn log_of(q: DQuat, before: Option<DVec3>) -> DVec3 {
     let (axis, w) = (DVec3::new(q.x, q.y, q.z), q.w);
     let sin = libm::sqrt(axis.x * axis.x + axis.y * axis.y + axis.z * axis.z);
     let angle = 2.0 * libm::atan2(sin, w);

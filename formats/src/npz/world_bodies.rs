@@ -6,7 +6,7 @@ use tumble::Layout;
 use crate::diagnostic::Diagnostic;
 use crate::motion::ScalarKind;
 use crate::npz::archive::Archive;
-use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, RobotArrays};
 use crate::quaternion::ComponentOrder;
 use crate::warnings::Warnings;
 
@@ -32,15 +32,27 @@ pub(crate) fn plan(
         companions: &BESIDE,
         ..ArchivePlan::default()
     };
+    let rotation_member = rotations.0.member;
     plan.add(archive, rotations)?;
-    if let Some(positions) = array("body_positions", KeyKind::Translation)? {
+    let positions = array("body_positions", KeyKind::Translation)?;
+    let position_member = positions.as_ref().map(|positions| positions.0.member);
+    if let Some(positions) = positions {
         plan.add(archive, positions)?;
     }
     plan.read_names(archive, "body_names")?;
+    let members = position_member.map(|member| [member, rotation_member]);
     if let Some(member) = archive.find("dof_positions") {
         let names = archive.array_named("dof_names")?;
         let names = names.and_then(|array| array.texts().ok());
         let columns = (member, Layout::FrameMajor, 0);
+        let is_of_bodies =
+            |&member: &usize| (archive.header(member)).is_ok_and(|header| header.shape.len() == 3);
+        plan.robot = Some(RobotArrays {
+            bodies: members.filter(|members| members.iter().all(is_of_bodies)),
+            order: ComponentOrder::Wxyz,
+            body_names: plan.names.clone(),
+            ..RobotArrays::of("isaaclab", names.is_some())
+        });
         plan.add_scalars(archive, columns, names, |_| ScalarKind::Angle, warnings)?;
         plan.constants.extend(archive.find("dof_names"));
     }

@@ -22,7 +22,7 @@ use crate::rate::{Precision, RateSource, of};
 
 /// An archive that is being written. It grows in memory, because the length and the checksum of a member precede its
 /// bytes.
-pub(super) struct ArchiveWriter {
+pub(crate) struct ArchiveWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct ArchiveWriter {
 const PIECE: usize = 1 << 16;
 
 impl ArchiveWriter {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             zip: ZipWriter::new(Cursor::new(Vec::new())),
         }
@@ -56,7 +56,7 @@ impl ArchiveWriter {
     }
 
     /// Writes an array of numbers; `fill` supplies them in C order.
-    pub(super) fn numbers(
+    pub(crate) fn numbers(
         &mut self,
         path: &str,
         (element, shape): (&Element, &[usize]),
@@ -86,7 +86,7 @@ impl ArchiveWriter {
     }
 
     /// Writes texts as an array of UTF-32.
-    pub(super) fn texts(&mut self, path: &str, texts: &[&str], shape: &[usize]) -> io::Result<()> {
+    pub(crate) fn texts(&mut self, path: &str, texts: &[&str], shape: &[usize]) -> io::Result<()> {
         let longest = texts.iter().map(|text| text.chars().count()).max();
         let length = longest.unwrap_or(0).max(1);
         let mut bytes = ArrayHeader::write(&Element::Unicode(length), shape);
@@ -98,7 +98,7 @@ impl ArchiveWriter {
     }
 
     /// Ends the archive and writes it to `out`.
-    pub(super) fn finish(self, out: &mut dyn Write) -> io::Result<()> {
+    pub(crate) fn finish(self, out: &mut dyn Write) -> io::Result<()> {
         let archive = self.zip.finish().map_err(io::Error::other)?;
         out.write_all(archive.get_ref())
     }

@@ -48,6 +48,7 @@ pub static FORMAT: Format = Format {
         FormatOption::OverrideRate,
         FormatOption::Map,
         FormatOption::TimeUnit,
+        FormatOption::SourceOrder,
     ],
 };
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
 use tumble::trees::{
     BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
@@ -12,6 +12,9 @@ use tumble::{
     Axes, Channel, Engine, Error, Interpolation, Layout, Quantity, SampleTimes, ScalarQuantity,
     TrackSet, VectorMethod, names,
 };
+
+use crate::motion::signs::continue_signs;
+use crate::npz::rotation_vector;
 
 /// What is computed of a robot's motion.
 #[derive(Debug, Clone)]
@@ -28,6 +31,47 @@ pub struct BodiesRequest {
     pub siblings: Siblings,
     /// The point of a body whose velocity is computed.
     pub velocity_at: VelocityPoint,
+    /// How velocities follow from the curves.
+    pub velocities: VelocitySource,
+    /// What is done with values outside the limits of joints.
+    pub limits: LimitRule,
+    /// The vector to add to the translations of each track; empty if all are 0.
+    pub origins: Vec<DVec3>,
+}
+
+/// How velocities follow from the curves of the joints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum VelocitySource {
+    /// They are the derivatives of the curves.
+    #[default]
+    Curve,
+    /// They are differences of the samples on both sides, as other programs compute them.
+    Differences,
+}
+
+names! {
+    VelocitySource, "source of velocities",
+    Curve => "curve",
+    Differences => "differences",
+}
+
+/// What is done with values outside the limits of joints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum LimitRule {
+    /// They are reported, and kept.
+    #[default]
+    Report,
+    /// They become the limit, where the joint does not move.
+    Clamp,
+    /// They are an error.
+    Refuse,
+}
+
+names! {
+    LimitRule, "rule for limits",
+    Report => "report",
+    Clamp => "clamp",
+    Refuse => "refuse",
 }
 
 /// The point of a body whose linear velocity is meant.
@@ -53,6 +97,10 @@ pub struct Bodies {
     pub joint_values: Vec<f32>,
     /// The velocities of the same, per second.
     pub joint_rates: Vec<f32>,
+    /// The times of the samples, in seconds.
+    pub times: Vec<f64>,
+    /// The pose of the first body at each sample: the root.
+    pub roots: Vec<BodyPose>,
     /// The indices of the bodies in [`Tree::bodies`], in the requested order.
     pub order: Vec<usize>,
     /// Each body at each sample, `[sample][body]`, in the requested order. Linear velocities are those of the requested
@@ -107,6 +155,16 @@ pub enum BodiesError {
         /// The body.
         body: String,
     },
+    /// A joint leaves its limits, and this is refused.
+    #[error(
+        "joint `{}` leaves its limits by {:.3}, first at sample {}; --limits clamp keeps it inside, --limits report \
+         keeps its values",
+        excess.joint, excess.excess, excess.sample
+    )]
+    OutsideLimits {
+        /// The joint and by how much.
+        excess: LimitExcess,
+    },
 }
 
 /// Angles without jumps: each differs from the one before by at most half a `period`. A step of exactly half a period
@@ -137,9 +195,10 @@ pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
 
 /// The bodies of a robot at each sample of a motion. Scalars of `set` are hinges and slides with the same names. Its
 /// tracks are balls by their names, and free joints by their names or those of their bodies; translations of these
-/// tracks are positions. Joints without keys rest, which the result says.
+/// tracks are positions. A robot without a free joint may have a track with the name of its first body, which moves its
+/// base. Joints without keys rest, which the result says.
 ///
-/// Rates are derivatives of the curves, not differences of samples. The bodies are computed in f64.
+/// The bodies are computed in f64.
 ///
 /// # Errors
 /// A [`BodiesError`].
@@ -153,24 +212,109 @@ pub fn bodies(
     let channels = Sampled::new(engine, set, request)?;
     let order = tree.order(request.order, request.siblings);
     let centres = mass_centres(tree, request.velocity_at)?;
-    let at = |sample| joints.at(tree, &channels, sample);
-    let motions = motions(tree, channels.samples, &order, &centres, at)?;
-    let (mut joint_values, mut joint_rates) = (Vec::new(), Vec::new());
-    let mut excesses = Vec::new();
-    for sample in 0..channels.samples {
-        let (configuration, rates) = at(sample);
-        note_excesses(tree, &configuration.scalars, sample, &mut excesses);
-        joint_values.extend(configuration.scalars.iter().map(|&value| value as f32));
-        joint_rates.extend(rates.scalars.iter().map(|&rate| rate as f32));
+    let samples = 0..channels.times.len();
+    let at = |sample| joints.at(tree, &channels, &request.origins, sample);
+    let mut all: Vec<(Configuration, ConfigurationRates)> =
+        samples.into_par_iter().map(at).collect();
+    if request.velocities == VelocitySource::Differences {
+        set_differences(&mut all, &channels.times);
     }
+    let mut excesses = Vec::new();
+    for (sample, (configuration, _)) in all.iter().enumerate() {
+        note_excesses(tree, &configuration.scalars, sample, &mut excesses);
+    }
+    match (request.limits, excesses.first()) {
+        (LimitRule::Refuse, Some(excess)) => {
+            let excess = excess.clone();
+            return Err(BodiesError::OutsideLimits { excess });
+        }
+        (LimitRule::Clamp, Some(_)) => clamp(tree, &mut all),
+        _ => {}
+    }
+    let of_sample = |sample: usize| all[sample].clone();
+    let motions = motions(tree, all.len(), &order, &centres, of_sample)?;
+    let first = order.iter().position(|&body| body == 0);
+    let rows = motions.chunks(order.len().max(1));
+    let roots = rows.filter_map(|row| Some(row[first?].pose)).collect();
+    let scalars = |values: &[f64]| values.iter().map(|&value| value as f32).collect::<Vec<_>>();
     Ok(Bodies {
-        joint_values,
-        joint_rates,
+        joint_values: (all.iter().flat_map(|(at, _)| scalars(&at.scalars))).collect(),
+        joint_rates: (all.iter().flat_map(|(_, rates)| scalars(&rates.scalars))).collect(),
+        times: channels.times,
         order,
         motions,
+        roots,
         resting: joints.resting(tree),
         excesses,
     })
+}
+
+/// Replaces rates with differences of the samples on both sides, as `numpy.gradient` does: at the ends those of the end
+/// and its neighbour; angular velocities at the ends are those beside them.
+fn set_differences(all: &mut [(Configuration, ConfigurationRates)], times: &[f64]) {
+    let Some(last) = all.len().checked_sub(1).filter(|&last| last > 0) else {
+        for (_, rates) in all {
+            let still = |rate: &mut BodyVelocity| *rate = BodyVelocity::default();
+            rates.scalars.fill(0.0);
+            rates.balls.fill(DVec3::ZERO);
+            rates.free.iter_mut().for_each(still);
+            still(&mut rates.base);
+        }
+        return;
+    };
+    let values: Vec<Configuration> = all.iter().map(|(at, _)| at.clone()).collect();
+    for (sample, (at, rates)) in all.iter_mut().enumerate() {
+        let (before, after) = (sample.saturating_sub(1), (sample + 1).min(last));
+        let seconds = times[after] - times[before];
+        let (low, high) = (&values[before], &values[after]);
+        for (rate, (low, high)) in rates
+            .scalars
+            .iter_mut()
+            .zip(low.scalars.iter().zip(&high.scalars))
+        {
+            *rate = (high - low) / seconds;
+        }
+        // Two samples have none between them.
+        let centre = if last == 1 {
+            sample
+        } else {
+            sample.clamp(1, last - 1)
+        };
+        let turn = [centre.saturating_sub(1), (centre + 1).min(last)];
+        let turned = times[turn[1]] - times[turn[0]];
+        let angular = |rotation: &dyn Fn(&Configuration) -> DQuat| {
+            let [low, high] = turn.map(|sample| rotation(&values[sample]));
+            let step = high * low.inverse();
+            let step = if step.w < 0.0 { -step } else { step };
+            rotation_vector::log_of(step, None) / turned
+        };
+        for (ball, rate) in rates.balls.iter_mut().enumerate() {
+            // In the axes of the body.
+            *rate = at.balls[ball].inverse() * angular(&|at| at.balls[ball]);
+        }
+        for (free, rate) in rates.free.iter_mut().enumerate() {
+            rate.linear = (high.free[free].position - low.free[free].position) / seconds;
+            rate.angular = angular(&|at| at.free[free].rotation);
+        }
+        rates.base.linear = (high.base.position - low.base.position) / seconds;
+        rates.base.angular = angular(&|at| at.base.rotation);
+    }
+}
+
+/// Moves values outside the limits to them; the joint does not move there.
+fn clamp(tree: &Tree, all: &mut [(Configuration, ConfigurationRates)]) {
+    for (configuration, rates) in all {
+        for (index, joint) in tree.scalar_joints().enumerate() {
+            let Some([low, high]) = joint.limits else {
+                continue;
+            };
+            let value = &mut configuration.scalars[index];
+            if *value < low || *value > high {
+                *value = value.max(low).min(high);
+                rates.scalars[index] = 0.0;
+            }
+        }
+    }
 }
 
 /// The bodies of configurations, in an order of bodies, one configuration after the other; `at` has each. With
@@ -245,6 +389,8 @@ struct JointTracks {
     scalars: Vec<Option<usize>>,
     balls: Vec<Option<usize>>,
     free: Vec<Option<usize>>,
+    /// Of a robot without a free joint.
+    base: Option<usize>,
 }
 
 impl JointTracks {
@@ -262,10 +408,13 @@ impl JointTracks {
             .collect();
         let of_free = |[joint, body]: [&str; 2]| track_of(joint).or_else(|| track_of(body));
         let free: Vec<_> = named(JointKind::Free).map(of_free).collect();
+        let first = tree.bodies().first().filter(|_| free.is_empty());
+        let base = first.and_then(|body| track_of(&body.name));
         let is_used = |track: usize| {
             balls
                 .iter()
                 .chain(&free)
+                .chain([&base])
                 .flatten()
                 .any(|&used| used == track)
         };
@@ -293,6 +442,7 @@ impl JointTracks {
             scalars,
             balls,
             free,
+            base,
         })
     }
 
@@ -313,9 +463,18 @@ impl JointTracks {
         &self,
         tree: &Tree,
         channels: &Sampled,
+        origins: &[DVec3],
         sample: usize,
     ) -> (Configuration, ConfigurationRates) {
         let (mut configuration, mut rates) = (tree.rest(), tree.no_rates());
+        let pose = |track: usize, rest: DVec3| {
+            let (mut pose, rate) = channels.pose(track, sample);
+            match channels.positions {
+                None => pose.position = rest,
+                Some(_) => pose.position += origins.get(track).copied().unwrap_or_default(),
+            }
+            (pose, rate)
+        };
         for (joint, scalar) in self.scalars.iter().enumerate() {
             if let &Some(scalar) = scalar {
                 let [value, rate] = channels.scalar(scalar, sample);
@@ -332,12 +491,12 @@ impl JointTracks {
         }
         for (free, track) in self.free.iter().enumerate() {
             if let &Some(track) = track {
-                let (mut pose, rate) = channels.pose(track, sample);
-                if channels.positions.is_none() {
-                    pose.position = configuration.free[free].position;
-                }
-                (configuration.free[free], rates.free[free]) = (pose, rate);
+                let rest = configuration.free[free].position;
+                (configuration.free[free], rates.free[free]) = pose(track, rest);
             }
+        }
+        if let Some(track) = self.base {
+            (configuration.base, rates.base) = pose(track, configuration.base.position);
         }
         (configuration, rates)
     }
@@ -345,7 +504,8 @@ impl JointTracks {
 
 /// The samples of a set, `[sample][track]` and `[sample][scalar]`.
 struct Sampled {
-    samples: usize,
+    /// In seconds.
+    times: Vec<f64>,
     tracks: usize,
     scalar_count: usize,
     scalars: Vec<[f32; 2]>,
@@ -372,10 +532,12 @@ impl Sampled {
             scalars(ScalarQuantity::Value)?,
             scalars(ScalarQuantity::Velocity)?,
         ];
-        let samples = values.sample_count();
+        let timeline = frames
+            .resolve(tracks, set.time_span())
+            .map_err(Error::from)?;
         let pairs = values.as_slice().iter().zip(rates.as_slice());
         let mut sampled = Self {
-            samples,
+            times: timeline.times(0).collect(),
             tracks,
             scalar_count: set.scalar_count(),
             scalars: pairs.map(|(&value, &rate)| [value, rate]).collect(),
@@ -390,7 +552,9 @@ impl Sampled {
             .request(set, *rotations, frames)
             .layout(layout)
             .evaluate()?;
-        sampled.rotations = poses.as_arrays().to_vec();
+        let mut turns: Vec<Quat> = poses.as_quats().to_vec();
+        continue_signs(&mut turns, tracks);
+        sampled.rotations = turns.iter().map(Quat::to_array).collect();
         let rate = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
             ..*rotations

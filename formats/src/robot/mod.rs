@@ -4,6 +4,7 @@
 //! not read, and no file but those that an MJCF includes is opened. The rules were compared with `MuJoCo` and pinocchio;
 //! [docs/robots.md](https://github.com/tumble-rs/tumble/blob/main/docs/robots.md) has them.
 
+mod assign;
 mod bodies;
 mod mjcf;
 mod urdf;
@@ -14,9 +15,10 @@ use std::path::Path;
 use tumble::names;
 use tumble::trees::{Configuration, Tree};
 
+pub(crate) use assign::joints_of;
 pub use bodies::{
-    Bodies, BodiesError, BodiesRequest, LimitExcess, VelocityPoint, bodies, mass_centres, motions,
-    unwrap_angles, unwrap_joint,
+    Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
+    bodies, mass_centres, motions, unwrap_angles, unwrap_joint,
 };
 
 use crate::diagnostic::{Code, Diagnostic};

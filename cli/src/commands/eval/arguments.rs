@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use clap::builder::TypedValueParser;
 use tumble::{Encoding, Layout};
+use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::Format;
 use tumble_formats::quaternion::ComponentOrder;
 
@@ -17,6 +18,7 @@ use crate::arguments::options::{
 };
 use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
+use crate::arguments::robot::DialectArguments;
 use crate::arguments::time::{
     AtKeysArguments, EndFrameArguments, GapArguments, SampleChoice, SamplingArguments,
 };
@@ -42,6 +44,7 @@ Examples:
   find . -name '*.dat' | tumble eval --files-from - -o results
   tumble eval walk.glb --fps 60 -o walk60.glb  meshes and all else are kept
   tumble eval clips -o out --to bvh --resume   formats may be mixed
+  tumble eval lafan1 -o out --fps 50 --robot g1.xml --dialect mjlab --resume
   seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out
   tumble eval - -o - < data/pendulum.dat | python3 -c \\
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
@@ -86,6 +89,8 @@ pub(crate) struct Arguments {
     pub(super) encoding: Encoding,
     #[command(flatten)]
     pub(super) output: OutputArguments,
+    #[command(flatten)]
+    pub(super) dialect: DialectArguments,
     /// NPZ to NPZ: interpolate these arrays, which have a number for each frame, linearly instead of
     /// leaving them out
     #[arg(long, value_name = "ARRAYS", value_delimiter = ',')]
@@ -152,7 +157,10 @@ impl Arguments {
     /// Refuses, before any work, options that have no effect on any kind that the results may have.
     pub(super) fn check_before(&self, format: &'static Format) -> Result<(), Failure> {
         let mut kinds = Vec::new();
-        if self.output.is_rotations() {
+        if let Some(dialect) = self.dialect.chosen() {
+            self.check_dialect(dialect)?;
+            kinds.push(ResultKind::Robot);
+        } else if self.output.is_rotations() {
             if format.write.is_some() {
                 kinds.push(ResultKind::Rotations);
             }
@@ -171,6 +179,22 @@ impl Arguments {
             Some(first) if refusals.all(|other| other.is_some()) => Err(Failure::usage(first)),
             _ => Ok(()),
         }
+    }
+
+    /// Refuses options that have no effect on the layout of another program.
+    fn check_dialect(&self, dialect: &WrittenDialect) -> Result<(), Failure> {
+        let options = [
+            ("output", "--output"),
+            ("tracks", "--tracks"),
+            ("max_gap", "--max-gap"),
+            ("times", "--times"),
+            ("at", "--at"),
+            ("explain_route", "--explain-route"),
+            ("times_out", "--times-out"),
+        ];
+        let on = format!("--dialect {}", dialect.name);
+        let remedy = "it has all joints of the robot at frames of one rate; leave it out";
+        self.command_line.refuse(&options, &on, remedy)
     }
 
     /// Refuses options that have no effect on a result of this kind.
@@ -197,7 +221,7 @@ impl Arguments {
     }
 
     fn refusal(&self, kind: ResultKind, format: &'static Format) -> Option<String> {
-        if !kind.is_clip() && format.write.is_none() {
+        if !kind.is_clip() && kind != ResultKind::Robot && format.write.is_none() {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             return Some(format!(

@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::{Engine, Error, Layout, Quantity, SampleTimes, Timeline};
+use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
@@ -21,6 +22,7 @@ use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
+use crate::arguments::robot::{RobotFrames, RobotReport, or_engine_error};
 use crate::arguments::time::{ClipFrames, SampleChoice};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
 use crate::batch::room;
@@ -56,6 +58,9 @@ pub(crate) struct EvaluationReport {
     order: Option<&'static str>,
     method: String,
     device: String,
+    /// Of a robot's motion in the layout of another program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robot: Option<RobotReport>,
 }
 
 impl EvaluationReport {
@@ -108,6 +113,9 @@ impl EvaluationJob<'_> {
     fn evaluate(&mut self) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let work = self.work;
         let (name, clips, target) = (&*work.name, &*work.clips(), &work.target);
+        if let Some(dialect) = self.arguments.dialect.chosen() {
+            return self.robot(dialect, name, clips);
+        }
         for clip in clips {
             self.check_interpolation(name, clip)?;
             self.note_curves(name, clip)?;
@@ -293,6 +301,19 @@ impl EvaluationJob<'_> {
         written: WrittenFile,
         order: Option<ComponentOrder>,
     ) -> (EvaluatedResult, EvaluationReport) {
+        let counted = words::count(tracks, "track");
+        self.evaluated_as(&counted, (tracks, frames, span), method, written, order)
+    }
+
+    /// As [`Self::evaluated`], with other words for what was evaluated.
+    fn evaluated_as(
+        &self,
+        counted: &str,
+        (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
+        method: &str,
+        written: WrittenFile,
+        order: Option<ComponentOrder>,
+    ) -> (EvaluatedResult, EvaluationReport) {
         let (work, device) = (self.work, &self.device.label);
         let in_gaps = match self.in_gaps {
             0 => String::new(),
@@ -310,8 +331,7 @@ impl EvaluationJob<'_> {
             format!(" ({rate} fps, because its keys have no rate)")
         });
         let done = format!(
-            "{} × {}{assumed}{in_gaps}{left_out}, {method}",
-            words::count(tracks, "track"),
+            "{counted} × {}{assumed}{in_gaps}{left_out}, {method}",
             words::count(frames, "frame"),
         );
         let report = EvaluationReport {
@@ -329,6 +349,7 @@ impl EvaluationJob<'_> {
             order: order.map(ComponentOrder::name),
             method: method.to_owned(),
             device: device.clone(),
+            robot: None,
         };
         (work.result(written, &done, Some(device)), report)
     }
@@ -369,6 +390,64 @@ impl EvaluationJob<'_> {
             .map(|clip| self.clip_frames(clip, end_frame, name))
             .collect::<Result<_, _>>()?;
         self.written(name, clips, &times, target, None)
+    }
+
+    /// The motion of a robot in the layout of another program.
+    fn robot(
+        &mut self,
+        dialect: &WrittenDialect,
+        name: &str,
+        clips: &[&Motion],
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let [clip] = clips else {
+            let message = format!(
+                "{name}: {} has one clip; choose it with --animation",
+                dialect.name
+            );
+            return Err(Failure::usage(message));
+        };
+        let Some(robot) = self.arguments.inputs.reading.robot()? else {
+            return Err(Failure::usage("--dialect needs --robot"));
+        };
+        self.check_interpolation(name, clip)?;
+        self.check_scale(name, clip, false)?;
+        let samples = self.clip_frames(clip, EndFrame::LeaveOut, name)?;
+        self.left_out = samples.left_out;
+        // Each body has a pose, a velocity, and both in the memory of the result.
+        let bodies = robot.tree.bodies().len();
+        let timeline = room::in_memory(name, &clip.set, &samples.frames, 12 * bodies.max(1))?;
+        let methods = self.curve().channel_methods();
+        let frames = RobotFrames {
+            frames: &samples.frames,
+            rate: samples.rate,
+            methods,
+        };
+        let arguments = &self.arguments.dialect;
+        let scalars = clip.set.scalar_count();
+        let device = &mut *self.device;
+        let found = arguments.evaluate(dialect, &robot, (name, clip), &frames, |run| {
+            device.choose(scalars * timeline.len())?;
+            device.work(|engine| or_engine_error(run(engine)))?
+        })?;
+        let notes = self.notes(name)?;
+        let (written, report) = arguments.write(
+            dialect,
+            &robot,
+            (self.work, clip),
+            (&found, frames.rate),
+            notes,
+        )?;
+        let extent = (report.body_count(), found.times.len(), span(&timeline));
+        let method = self.arguments.method.to_string();
+        let counted = report.text();
+        let (result, evaluated) = self.evaluated_as(&counted, extent, &method, written, None);
+        let robot = EvaluationReport {
+            order: report.quaternion(),
+            output_kind: "robot",
+            robot: Some(report),
+            ..evaluated
+        };
+        Ok((result, robot))
     }
 
     /// Counts the times in gaps, and tells of ends between two frames.

@@ -17,7 +17,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;
     let samples = arguments.checked_samples()?;
-    let plan = arguments.results.plan(inputs)?;
+    let format = arguments.dialect.format(&arguments.results)?;
+    arguments.inputs.reading.robot()?;
+    let plan = arguments.results.plan_in(inputs, format)?;
     // All targets have one format.
     if let Some(target) = plan.targets.first() {
         arguments.check_before(target.format())?;

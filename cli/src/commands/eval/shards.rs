@@ -115,7 +115,7 @@ impl EvaluationOptions {
     ) -> Result<ShardPlan, Failure> {
         let results = &arguments.results;
         let request = ShardOptions {
-            format: results.format(),
+            format: arguments.dialect.format(results)?,
             naming: results.naming(),
             options: self.options.text.clone(),
             shard_bytes,

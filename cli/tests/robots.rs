@@ -1,0 +1,557 @@
+//! Motion of robots through the program: the layouts of other programs, their orders, and what is refused.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use crate::program::{Run, run, succeed};
+
+/// Two arms of two hinges each on a body that moves freely: depth first and breadth first differ.
+pub(crate) const ROBOT: &str = r#"<mujoco model="two arms"><compiler angle="radian"/><worldbody>
+  <body name="chest" pos="0 0 1"><freejoint name="free"/><inertial pos="0 0 0.1" mass="1"/>
+    <body name="left_upper" pos="0 0.2 0.3"><joint name="left_shoulder" axis="0 1 0" range="-1 0.25"/>
+      <inertial pos="0 0.05 0" mass="1"/>
+      <body name="left_lower" pos="0 0.1 -0.3"><joint name="left_elbow" axis="1 0 0"/>
+        <inertial pos="0 0 -0.1" mass="1"/></body></body>
+    <body name="right_upper" pos="0 -0.2 0.3"><joint name="right_shoulder" axis="0 1 0"/>
+      <inertial pos="0 -0.05 0" mass="1"/>
+      <body name="right_lower" pos="0 -0.1 -0.3"><joint name="right_elbow" axis="1 0 0"/>
+        <inertial pos="0 0 -0.1" mass="1"/></body></body>
+  </body></worldbody></mujoco>"#;
+
+/// A folder with the robot and its motion.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("robot.xml"), ROBOT).unwrap();
+    fs::write(folder.path().join("take.csv"), take()).unwrap();
+    folder
+}
+
+/// 31 frames of the robot's motion in Unitree's layout, joints depth first.
+pub(crate) fn take() -> String {
+    let mut text = String::new();
+    for frame in 0..31 {
+        let t = f32::from(frame as u8) / 30.0;
+        let half = 0.4 * t;
+        let numbers = [
+            t,
+            0.1 * (3.0 * t).sin(),
+            1.0,
+            0.0,
+            0.0,
+            half.sin(),
+            half.cos(),
+            0.3 * (4.0 * t).sin(),
+            0.5 * t,
+            -0.2 * t * t,
+            0.4 * (2.0 * t).cos(),
+        ];
+        let cells: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+        writeln!(text, "{}", cells.join(",")).unwrap();
+    }
+    text
+}
+
+fn line(folder: &Path, line: &str) -> Run {
+    succeed(folder, &line.split_whitespace().collect::<Vec<_>>())
+}
+
+fn refused(folder: &Path, words: &str, code: &str) {
+    let run = run(folder, &words.split_whitespace().collect::<Vec<_>>());
+    assert_ne!(run.code, 0, "{words}");
+    assert!(run.words.contains(code), "{words}: {}", run.words);
+}
+
+/// The arrays of numbers of a file by NumPy.
+fn arrays(path: &Path) -> HashMap<String, Vec<f64>> {
+    let mut archive = zip::ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
+    let names: Vec<String> = archive
+        .file_names()
+        .map(|name| name.unwrap().into_owned())
+        .collect();
+    let mut all = HashMap::new();
+    for name in names {
+        let mut bytes = Vec::new();
+        archive
+            .by_name(&name)
+            .unwrap()
+            .read_to_end(&mut bytes)
+            .unwrap();
+        let numbers = tumble_formats::npy::read_numbers(&name, &bytes, |_| Ok(()));
+        if let Ok(numbers) = numbers {
+            all.insert(name.trim_end_matches(".npy").to_owned(), numbers.values);
+        }
+    }
+    all
+}
+
+fn numbers(path: &Path) -> Vec<f64> {
+    let text = fs::read_to_string(path).unwrap();
+    let cells = text.lines().flat_map(|line| line.split(','));
+    cells.map(|cell| cell.parse().unwrap()).collect()
+}
+
+fn largest_difference(found: &[f64], expected: &[f64]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let pairs = found.iter().zip(expected);
+    pairs
+        .map(|(found, expected)| (found - expected).abs())
+        .fold(0.0, f64::max)
+}
+
+/// From Unitree's lines to each dialect and back: positions and joints to the last bit, rotations within a step of f32.
+/// What is stored as centimetres and degrees is rounded once more.
+#[test]
+fn every_dialect_is_read_back() {
+    let folder = folder();
+    let folder = folder.path();
+    let expected = numbers(&folder.join("take.csv"));
+    for (dialect, ending) in [
+        ("mjlab", "npz"),
+        ("beyondmimic", "npz"),
+        ("isaaclab", "npz"),
+        ("unitree-csv", "csv"),
+        ("kimodo-csv", "csv"),
+        ("bones-seed", "csv"),
+        ("gmr", "pkl"),
+        ("motion-lib", "pkl"),
+        ("mimickit", "pkl"),
+    ] {
+        let out = format!("{dialect}.{ending}");
+        line(
+            folder,
+            &format!("convert take.csv --robot robot.xml --dialect {dialect} -o {out}"),
+        );
+        let order = match dialect {
+            "kimodo-csv" => "--source-order wxyz",
+            "bones-seed" => "--source-fps 30",
+            _ => "",
+        };
+        let back = format!("{dialect}.back.csv");
+        let read =
+            format!("convert {out} {order} --robot robot.xml --dialect unitree-csv -o {back}");
+        line(folder, &read);
+        let found = numbers(&folder.join(back));
+        assert_eq!(found.len(), expected.len(), "{dialect}");
+        for (row, (found, expected)) in found.chunks(11).zip(expected.chunks(11)).enumerate() {
+            let off = largest_difference(&found[3..7], &expected[3..7]);
+            assert!(off < 2e-7, "{dialect}, frame {row}: {off:e}");
+            let rest = |numbers: &[f64]| [&numbers[..3], &numbers[7..]].concat();
+            let off = largest_difference(&rest(found), &rest(expected));
+            let allowed = if dialect == "bones-seed" { 6e-8 } else { 0.0 };
+            assert!(off <= allowed, "{dialect}, frame {row}: {off:e}");
+        }
+    }
+}
+
+/// Breadth first, a level of the tree comes before the next, and joints follow their bodies. The file says nothing of it;
+/// its bodies do.
+#[test]
+fn orders_are_stated_and_checked() {
+    let folder = folder();
+    let folder = folder.path();
+    let eval = "eval take.csv --fps 50 --robot robot.xml";
+    line(folder, &format!("{eval} --dialect mjlab -o depth.npz"));
+    let json = line(
+        folder,
+        &format!("{eval} --dialect beyondmimic --json -o breadth.npz"),
+    );
+    let report: serde_json::Value = serde_json::from_slice(&json.out).unwrap();
+    let robot = &report[0]["robot"];
+    assert_eq!(robot["body_order"], "breadth-first", "{report}");
+    assert_eq!(robot["velocity_at"], "mass");
+    let upper = [
+        "left_shoulder",
+        "right_shoulder",
+        "left_elbow",
+        "right_elbow",
+    ];
+    assert_eq!(robot["joints"], serde_json::json!(upper));
+    let bodies = [
+        "chest",
+        "left_upper",
+        "right_upper",
+        "left_lower",
+        "right_lower",
+    ];
+    assert_eq!(robot["bodies"], serde_json::json!(bodies));
+    let [depth, breadth] = ["depth.npz", "breadth.npz"].map(|file| arrays(&folder.join(file)));
+    let column = |array: &[f64], width: usize, at: usize| -> Vec<f64> {
+        array.chunks(width).map(|row| row[at]).collect()
+    };
+    for (to, from) in [0, 2, 1, 3].into_iter().enumerate() {
+        let name = "joint_pos";
+        assert_eq!(column(&breadth[name], 4, to), column(&depth[name], 4, from));
+    }
+    for (to, from) in [0, 1, 3, 2, 4].into_iter().enumerate() {
+        let name = "body_pos_w";
+        assert_eq!(
+            column(&breadth[name], 15, 3 * to),
+            column(&depth[name], 15, 3 * from)
+        );
+    }
+    assert_ne!(breadth["body_lin_vel_w"], depth["body_lin_vel_w"]);
+    let mut archive =
+        zip::ZipArchive::new(fs::File::open(folder.join("depth.npz")).unwrap()).unwrap();
+    let mut fps = Vec::new();
+    archive
+        .by_name("fps.npy")
+        .unwrap()
+        .read_to_end(&mut fps)
+        .unwrap();
+    let fps = npyz::NpyFile::new(&fps[..]).unwrap();
+    assert_eq!(fps.shape(), [1]);
+    assert_eq!(fps.into_vec::<i64>().unwrap(), [50]);
+    // Both are read as what they are, and other words than theirs are refused.
+    for file in ["depth", "breadth"] {
+        line(
+            folder,
+            &format!("convert {file}.npz --robot robot.xml --dialect unitree-csv -o {file}.csv"),
+        );
+    }
+    assert_eq!(
+        numbers(&folder.join("depth.csv")),
+        numbers(&folder.join("breadth.csv"))
+    );
+    let read = "convert breadth.npz --robot robot.xml --dialect gmr -o x.pkl";
+    refused(
+        folder,
+        &format!("{read} --source-body-order depth-first"),
+        "E907",
+    );
+    refused(folder, &format!("{read} --source-order xyzw"), "E907");
+    refused(
+        folder,
+        "convert breadth.npz --source-order zyxw -o x.npz",
+        "zyxw",
+    );
+    line(folder, &format!("{read} --source-body-order breadth-first"));
+    // Stated beside the motion, names decide.
+    line(
+        folder,
+        &format!("{eval} --dialect beyondmimic --describe -o named.npz"),
+    );
+    let info = line(folder, "info named.npz");
+    let text = String::from_utf8(info.out).unwrap();
+    assert!(
+        !info.words.contains("W906") && text.contains("right_elbow"),
+        "{text} {}",
+        info.words
+    );
+}
+
+#[test]
+fn joints_of_another_robot_are_refused() {
+    let folder = folder();
+    let folder = folder.path();
+    let fewer = ROBOT.replace(r#"<joint name="left_elbow" axis="1 0 0"/>"#, "");
+    fs::write(folder.join("fewer.xml"), fewer).unwrap();
+    refused(
+        folder,
+        "convert take.csv --robot fewer.xml --dialect gmr -o x.pkl",
+        "E904",
+    );
+    line(
+        folder,
+        "convert take.csv --robot robot.xml --dialect isaaclab -o named.npz",
+    );
+    refused(
+        folder,
+        "convert named.npz --robot fewer.xml --dialect gmr -o x.pkl",
+        "left_elbow",
+    );
+    // Other lengths: named joints are taken with a warning, those without names are in no known order.
+    fs::write(
+        folder.join("longer.xml"),
+        ROBOT.replace("0.1 -0.3", "0.1 -0.4"),
+    )
+    .unwrap();
+    let run = line(
+        folder,
+        "convert named.npz --robot longer.xml --dialect gmr -o y.pkl",
+    );
+    assert!(run.words.contains("W914"), "{}", run.words);
+    line(
+        folder,
+        "convert take.csv --robot robot.xml --dialect mjlab -o unnamed.npz",
+    );
+    refused(
+        folder,
+        "convert unnamed.npz --robot longer.xml --dialect gmr -o x.pkl",
+        "E904",
+    );
+    let massless = ROBOT.replace(r#"<inertial pos="0 0.05 0" mass="1"/>"#, "");
+    fs::write(folder.join("massless.xml"), massless).unwrap();
+    refused(
+        folder,
+        "convert take.csv --robot massless.xml --dialect beyondmimic -o x.npz",
+        "E905",
+    );
+    line(
+        folder,
+        "convert take.csv --robot massless.xml --dialect beyondmimic --velocity-at origin -o z.npz",
+    );
+    // Fewer columns than the robot has joints: the others rest.
+    let text = fs::read_to_string(folder.join("take.csv")).unwrap();
+    let heading = "Frame,root_translateX,root_translateY,root_translateZ,root_rotateX,root_rotateY,root_rotateZ,\
+                   left_elbow_dof\n";
+    let rows = text.lines().enumerate();
+    let rows: Vec<String> = rows
+        .map(|(i, _)| format!("{i},0,0,100,0,0,0,{i}"))
+        .collect();
+    fs::write(
+        folder.join("elbow.csv"),
+        format!("{heading}{}", rows.join("\n")),
+    )
+    .unwrap();
+    let run = line(
+        folder,
+        "convert elbow.csv --robot robot.xml --dialect mjlab -o elbow.npz",
+    );
+    assert!(
+        run.words.contains("W913") && run.words.contains("right_elbow"),
+        "{}",
+        run.words
+    );
+    assert!(!folder.join("x.pkl").exists() && !folder.join("x.npz").exists());
+}
+
+#[test]
+fn limits_are_reported_kept_or_refused() {
+    let folder = folder();
+    let folder = folder.path();
+    let eval = "eval take.csv --fps 60 -m slerp --robot robot.xml --dialect mjlab";
+    let reported = line(folder, &format!("{eval} -o report.npz"));
+    assert!(
+        reported.words.contains("W904") && reported.words.contains("left_shoulder"),
+        "{}",
+        reported.words
+    );
+    line(folder, &format!("{eval} --limits clamp -o clamp.npz"));
+    refused(
+        folder,
+        &format!("{eval} --limits refuse -o refuse.npz"),
+        "E919",
+    );
+    let [report, clamp] = ["report.npz", "clamp.npz"].map(|file| arrays(&folder.join(file)));
+    let joints = report["joint_pos"].iter().zip(&clamp["joint_pos"]);
+    let rates = report["joint_vel"].iter().zip(&clamp["joint_vel"]);
+    let mut clamped = 0;
+    for (index, ((before, after), (rate, kept))) in joints.zip(rates).enumerate() {
+        if index % 4 == 0 && *before > 0.25 {
+            assert_eq!((*after, *kept), (0.25, 0.0));
+            clamped += 1;
+        } else {
+            assert_eq!((before, rate), (after, kept));
+        }
+    }
+    assert!(clamped > 5, "{clamped}");
+}
+
+#[test]
+fn options_without_effect_are_refused() {
+    let folder = folder();
+    let folder = folder.path();
+    refused(
+        folder,
+        "eval take.csv --robot robot.xml --dialect mjlab --fps 29.5 -o x.npz",
+        "E918",
+    );
+    for words in [
+        "eval take.csv --dialect mjlab -o x.npz",
+        "eval take.csv --robot robot.xml --body-order breadth-first -o x.npz",
+        "eval take.csv --robot robot.xml --dialect mjlab --fps 50 -o x.csv",
+        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --to npz -o x",
+        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --describe -o x.pkl",
+        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --order wxyz -o x.pkl",
+        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --output euler -o x.pkl",
+        "eval take.csv --robot robot.xml --dialect gmr --at 0.5 -o x.pkl",
+        "convert take.csv --robot robot.xml --dialect gmr --sequence XYZ -o x.pkl",
+        "eval take.csv --robot take.csv --fps 50 -o x.npz",
+    ] {
+        let run = run(folder, &words.split(' ').collect::<Vec<_>>());
+        assert_ne!(run.code, 0, "{words}: {}", run.words);
+    }
+    let files = fs::read_dir(folder).unwrap().count();
+    assert_eq!(files, 2, "nothing is written");
+}
+
+/// Batches in the layout of another program are resumed, and made again where the robot is another.
+#[test]
+fn batches_of_robots_are_resumed() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::create_dir_all(folder.join("takes/more")).unwrap();
+    for name in ["takes/a.csv", "takes/more/b.csv"] {
+        fs::copy(folder.join("take.csv"), folder.join(name)).unwrap();
+    }
+    let eval = "eval takes -o out --fps 50 --robot robot.xml --dialect mjlab --resume";
+    line(folder, eval);
+    let bytes = fs::read(folder.join("out/more/b.npz")).unwrap();
+    fs::remove_file(folder.join("out/a.npz")).unwrap();
+    let again = line(folder, eval);
+    assert!(again.words.contains("1 "), "{}", again.words);
+    assert_eq!(fs::read(folder.join("out/a.npz")).unwrap(), bytes);
+    fs::write(
+        folder.join("robot.xml"),
+        ROBOT.replace("0 0.2 0.3", "0 0.25 0.3"),
+    )
+    .unwrap();
+    line(folder, eval);
+    assert_ne!(fs::read(folder.join("out/more/b.npz")).unwrap(), bytes);
+    line(
+        folder,
+        "eval takes -o plain --fps 50 --robot robot.xml --to npz",
+    );
+    let info = line(folder, "info plain/a.npz");
+    assert!(String::from_utf8(info.out).unwrap().contains("left_elbow"));
+}
+
+/// The motion of `pico` in every layout of the test data, at 30 and 50 frames a second: joints and bodies as `MuJoCo`
+/// has them, with the last frame; and by differences as mjlab and `BeyondMimic` compute it, which lose the last.
+#[test]
+fn files_of_other_programs_become_those_of_mjlab() {
+    let shared = crate::program::root().join("../shared/data/robots");
+    if !shared.is_dir() {
+        eprintln!("{} is not there: nothing compared", shared.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let expected = arrays(&shared.join("layouts/expected.npz"));
+    let text = |path: PathBuf| path.to_str().unwrap().to_owned();
+    let (pico, urdf) = (
+        text(shared.join("robots/pico.xml")),
+        text(shared.join("robots/pico.urdf")),
+    );
+    let check = |found: &HashMap<String, Vec<f64>>,
+                 of: &str,
+                 rows: Option<usize>,
+                 lin: &str,
+                 velocity_rows: usize| {
+        for name in [
+            "joint_pos",
+            "joint_vel",
+            "body_pos_w",
+            "body_quat_w",
+            "body_lin_vel_w",
+            "body_ang_vel_w",
+        ] {
+            let array = if name == "body_lin_vel_w" { lin } else { name };
+            let (found, expected) = (&found[name], &expected[&format!("{of}_{array}")]);
+            let width = match name {
+                "joint_pos" | "joint_vel" => 13,
+                "body_quat_w" => 17 * 4,
+                _ => 17 * 3,
+            };
+            let is_rate = name.contains("vel");
+            let rows = if is_rate && velocity_rows > 0 {
+                Some(velocity_rows)
+            } else {
+                rows
+            };
+            let count = rows.map_or(expected.len(), |rows| rows * width);
+            if rows.is_none() {
+                assert_eq!(found.len(), expected.len(), "{of} {name}");
+            }
+            let pairs = found[..count].iter().zip(&expected[..count]);
+            let off = match name {
+                // Either sign is the same rotation.
+                "body_quat_w" => found[..count]
+                    .chunks(4)
+                    .zip(expected[..count].chunks(4))
+                    .map(|(a, b)| {
+                        let apart = |sign: f64| -> f64 {
+                            a.iter().zip(b).map(|(a, b)| (a - sign * b).abs()).sum()
+                        };
+                        apart(1.0).min(apart(-1.0))
+                    })
+                    .fold(0.0, f64::max),
+                _ => pairs
+                    .map(|(a, b)| (a - b).abs() / b.abs().max(1.0))
+                    .fold(0.0, f64::max),
+            };
+            assert!(off < 1e-5, "{of} {name}: {off:e}");
+        }
+    };
+    for (file, options) in [
+        ("gmr_p2.pkl", ""),
+        ("gmr_p5.pkl", ""),
+        ("motion_lib_lz4.pkl", ""),
+        ("protomotions.motion", ""),
+        ("mimickit.pkl", ""),
+        ("isaaclab_amp.npz", ""),
+        ("unitree_lafan1.csv", ""),
+        ("kimodo_qpos.csv", "--source-order wxyz"),
+        ("bones_seed_g1.csv", "--source-fps 30"),
+    ] {
+        let input = text(shared.join("layouts").join(file));
+        for fps in [30, 50] {
+            let out = format!("{file}.{fps}.npz");
+            let eval = format!(
+                "eval {input} {options} -m slerp --fps {fps} --robot {pico} --dialect mjlab -o {out}"
+            );
+            line(folder, &eval);
+            check(
+                &arrays(&folder.join(out)),
+                &format!("exact{fps}"),
+                None,
+                "body_lin_vel_w",
+                0,
+            );
+        }
+    }
+    let input = text(shared.join("layouts/gmr_p4.pkl"));
+    let eval = format!("eval {input} -m slerp --fps 50 --dialect");
+    // The base of a robot without a free joint moves as its root does.
+    line(folder, &format!("{eval} mjlab --robot {urdf} -o urdf.npz"));
+    check(
+        &arrays(&folder.join("urdf.npz")),
+        "exact50",
+        None,
+        "body_lin_vel_w",
+        0,
+    );
+    line(
+        folder,
+        &format!("{eval} mjlab --velocity-at mass --robot {pico} -o mass.npz"),
+    );
+    check(
+        &arrays(&folder.join("mass.npz")),
+        "exact50",
+        None,
+        "body_com_lin_vel_w",
+        0,
+    );
+    line(
+        folder,
+        &format!("{eval} mjlab --velocities differences --robot {pico} -o peers.npz"),
+    );
+    let peers = arrays(&folder.join("peers.npz"));
+    // Their last row has a difference to one side alone.
+    check(&peers, "peer50", Some(50), "body_lin_vel_w", 49);
+    assert_eq!(peers["joint_pos"].len(), 51 * 13);
+    // Files of these programs are read in their orders.
+    for (file, of) in [
+        ("mjlab.npz", "body_lin_vel_w"),
+        ("beyondmimic.npz", "body_com_lin_vel_w"),
+    ] {
+        let input = text(shared.join("layouts").join(file));
+        let point = if of == "body_lin_vel_w" {
+            "origin"
+        } else {
+            "mass"
+        };
+        let out = format!("again.{file}");
+        line(
+            folder,
+            &format!(
+                "convert {input} --robot {pico} --dialect mjlab --velocity-at {point} \
+                               --velocities differences -o {out}"
+            ),
+        );
+        check(&arrays(&folder.join(out)), "peer50", Some(50), of, 49);
+    }
+}

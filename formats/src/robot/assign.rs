@@ -1,0 +1,485 @@
+//! The joints of a robot in the clips of a file: the root and the scalars get the names of the robot's joints. Files that
+//! name no joints have them in an order, which follows from the poses of bodies that the file has beside them.
+
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3};
+use tumble::trees::{BodyOrder, BodyPose, JointKind, Siblings, Tree, TreeJoint};
+use tumble::{Channel, TrackError, TrackSet};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Adjustment, Loaded};
+use crate::motion::{Motion, RecordedBodies, Scalar, ScalarKind, carry_key_data};
+use crate::quaternion::ComponentOrder;
+use crate::robot::Robot;
+use crate::robot::bodies::unwrap_joint;
+use crate::warnings::{Warnings, listed};
+
+/// The largest distance of a body from where its joints put it, in metres.
+const FITS: f64 = 1e-3;
+
+/// An order of bodies, and of bodies with the same parent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ListedOrder(BodyOrder, Siblings);
+
+/// How the joints and bodies of a file may belong to those of a robot.
+struct Candidate {
+    /// `None` where names say it.
+    listed: Option<ListedOrder>,
+    /// The joint of each scalar, as [`Tree::scalar_joints`] counts them.
+    joints: Vec<usize>,
+    /// The body of each of the file's.
+    bodies: Vec<Option<usize>>,
+    quaternions: ComponentOrder,
+}
+
+impl Robot {
+    /// Gives the root and the scalars of clips the names of this robot's joints, with their limits. Angles of hinges
+    /// without limits are unwrapped. The root of a file in a dialect is the robot's free joint; of a robot without one,
+    /// its first body, which moves the base. `file` is the input's name in messages.
+    ///
+    /// `order` is the order of joints and bodies in files that do not name them. Without, it is the order in which the
+    /// file's bodies are where their joints put them, and depth first in files without bodies.
+    ///
+    /// # Errors
+    /// When no clip has the joints of this robot (`E904`), or the bodies contradict the order (`E907`). Those of several
+    /// clips that are refused are in [`Loaded::refused`].
+    pub fn assign(
+        &self,
+        loaded: &mut Loaded,
+        file: &str,
+        order: Option<BodyOrder>,
+    ) -> Result<(), Diagnostic> {
+        let mut warnings = Warnings::new(file);
+        let mut refused = Vec::new();
+        for clip in std::mem::take(&mut loaded.clips) {
+            match self.assigned(&clip, file, order, &mut warnings) {
+                Ok(clip) => loaded.clips.push(clip),
+                Err(error) => refused.push(match &clip.name {
+                    Some(name) => error.inside(format!("['{name}']")),
+                    None => error,
+                }),
+            }
+        }
+        if loaded.clips.is_empty() && !refused.is_empty() {
+            return Err(refused.swap_remove(0));
+        }
+        loaded.refused.append(&mut refused);
+        // The robot names them.
+        loaded
+            .warnings
+            .retain(|warning| warning.code != Code::UnnamedJoints);
+        loaded.warnings.extend(warnings.into_list());
+        loaded.adjustment = loaded.adjustment.or(Some(Adjustment::Robot));
+        Ok(())
+    }
+
+    fn assigned(
+        &self,
+        clip: &Motion,
+        file: &str,
+        order: Option<BodyOrder>,
+        warnings: &mut Warnings,
+    ) -> Result<Motion, Diagnostic> {
+        let refuse = |message: String| Diagnostic::new(file, Code::JointsDoNotFit, message);
+        let tree = &self.tree;
+        let names: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
+        let candidate = choose(tree, clip, &names, order, warnings, &refuse)?;
+        let mut motion = Motion {
+            set: TrackSet::new(),
+            ..clip.without_tracks()
+        };
+        motion.is_world = true;
+        (motion.skeleton, motion.channels, motion.origins) = Default::default();
+        let kept = |error: TrackError| refuse(format!("the clip cannot be kept: {error}"));
+        for (track, name) in tracks(tree, clip, &refuse)? {
+            let (keys, index) = (clip.set.track(track), motion.set.track_count());
+            motion.set.push(name, keys.times, keys.keys).map_err(kept)?;
+            carry_key_data(&mut motion.set, index, &keys, 0..keys.keys.len()).map_err(kept)?;
+            if let Some(at) = clip.set.vector_keys(Channel::Translation, track) {
+                let moved = motion
+                    .set
+                    .set_translations(index, at.times, at.keys, at.tangents);
+                moved.map_err(kept)?;
+            }
+            if !clip.channels.is_empty() {
+                motion.channels.push(clip.channel(track));
+            }
+            motion.set_origin(index, clip.origin(track));
+        }
+        let joints: Vec<&TreeJoint> = tree.scalar_joints().collect();
+        for (index, (&joint, keys)) in candidate.joints.iter().zip(clip.scalar_keys()).enumerate() {
+            let (joint, scalar) = (joints[joint], clip.scalar(index));
+            let mut values: Vec<f64> = keys
+                .keys
+                .iter()
+                .map(|&key| f64::from(key) + scalar.origin)
+                .collect();
+            unwrap_joint(tree, &joint.name, &mut values);
+            let scalar = Scalar {
+                kind: match joint.kind {
+                    JointKind::Slide => ScalarKind::Length,
+                    _ => ScalarKind::Angle,
+                },
+                origin: whole_turns(&values)
+                    .filter(|_| joint.kind == JointKind::Hinge)
+                    .unwrap_or(0.0),
+                limits: joint.limits,
+                ..scalar
+            };
+            let values: Vec<f32> = values
+                .iter()
+                .map(|value| (value - scalar.origin) as f32)
+                .collect();
+            motion
+                .add_scalar(scalar, &joint.name, keys.times, &values, keys.tangents)
+                .map_err(kept)?;
+        }
+        let resting = joints
+            .iter()
+            .filter(|joint| motion.set.scalar_named(&joint.name).is_none());
+        if let Some(resting) = listed(resting.map(|joint| joint.name.clone()).collect()) {
+            warnings.warn(Code::RestingJoints, || {
+                (
+                    None,
+                    format!("joints without keys stay where the robot's file has them: {resting}"),
+                )
+            });
+        }
+        Ok(motion)
+    }
+}
+
+/// The whole turns nearest to the middle of some angles; `None` if there are none.
+fn whole_turns(angles: &[f64]) -> Option<f64> {
+    let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
+    let turns = (f64::midpoint(low?, high?) / TAU).round();
+    (turns != 0.0).then_some(turns * TAU)
+}
+
+/// The tracks that move joints, with the names of these.
+fn tracks<'a>(
+    tree: &'a Tree,
+    clip: &Motion,
+    refuse: &impl Fn(String) -> Diagnostic,
+) -> Result<Vec<(usize, &'a str)>, Diagnostic> {
+    let bodies = tree.bodies();
+    let of_joints = bodies.iter().flat_map(|body| {
+        let joints = body
+            .joints
+            .iter()
+            .filter(|joint| matches!(joint.kind, JointKind::Free | JointKind::Ball));
+        joints.map(move |joint| (joint.kind, &*joint.name, &*body.name))
+    });
+    let mut moving: Vec<(JointKind, &str, &str)> = of_joints.collect();
+    let root = match tree.counts().free {
+        0 => bodies.first().map(|body| &*body.name),
+        1 => moving
+            .iter()
+            .find(|joint| joint.0 == JointKind::Free)
+            .map(|joint| joint.1),
+        _ => None,
+    };
+    if let (0, Some(root)) = (tree.counts().free, root) {
+        moving.push((JointKind::Free, root, root));
+    }
+    let all = || 0..clip.set.track_count();
+    if clip.robot.is_some() && clip.set.track_count() > 0 {
+        let Some(root) = root else {
+            return Err(refuse(format!(
+                "the file has the motion of one root, and the robot has {} free joints",
+                tree.counts().free
+            )));
+        };
+        let first = bodies.first().map_or("", |body| &*body.name);
+        let named = all().find(|&track| clip.set.track_name(track) == first);
+        return Ok(vec![(named.unwrap_or(0), root)]);
+    }
+    let joint_of = |track: usize| {
+        let name = clip.set.track_name(track);
+        let joint = moving.iter().find(|joint| joint.1 == name).or_else(|| {
+            let mut free = moving.iter().filter(|joint| joint.0 == JointKind::Free);
+            free.find(|joint| joint.2 == name)
+        });
+        let only = root.filter(|_| clip.set.track_count() == 1 && name == "root");
+        joint.map(|joint| joint.1).or(only).map(|joint| (track, joint)).ok_or_else(|| {
+            let known = listed(moving.iter().map(|joint| joint.1.to_owned()).collect());
+            refuse(format!(
+                "track {track} is called `{name}`, which is no joint of the robot; tracks move {}",
+                known.unwrap_or_else(|| "none of its joints".to_owned())
+            ))
+        })
+    };
+    all().map(joint_of).collect()
+}
+
+/// The joints that have values, in the order of their bodies.
+pub(crate) fn joints_of(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
+    let mut next = 0;
+    let has_value = |joint: &&TreeJoint| {
+        matches!(joint.kind, JointKind::Hinge | JointKind::Slide) && joint.mimic.is_none()
+    };
+    let of_body = tree.bodies().iter().map(|body| {
+        let first = next;
+        next += body.joints.iter().filter(has_value).count();
+        first..next
+    });
+    let of_body: Vec<_> = of_body.collect();
+    bodies
+        .iter()
+        .flat_map(|&body| of_body[body].clone())
+        .collect()
+}
+
+/// The joints of the scalars: by their names, or by the order that fits best.
+fn choose(
+    tree: &Tree,
+    clip: &Motion,
+    names: &[&str],
+    stated: Option<BodyOrder>,
+    warnings: &mut Warnings,
+    refuse: &impl Fn(String) -> Diagnostic,
+) -> Result<Candidate, Diagnostic> {
+    let recorded = clip.robot.as_ref().and_then(|robot| robot.bodies.as_ref());
+    let is_numbered = names
+        .iter()
+        .enumerate()
+        .all(|(i, name)| *name == format!("joint_{i}"));
+    let names_joints = clip
+        .robot
+        .as_ref()
+        .map_or(!is_numbered, |robot| robot.names_joints);
+    let orders: Vec<ListedOrder> = BodyOrder::ALL
+        .into_iter()
+        .flat_map(|order| Siblings::ALL.map(|siblings| ListedOrder(order, siblings)))
+        .collect();
+    let by_name = names_joints
+        .then(|| joints_by_name(tree, names, refuse))
+        .transpose()?;
+    if by_name.is_none() && names.len() != tree.counts().scalars {
+        let joints: Vec<&str> = tree.scalar_joints().map(|joint| &*joint.name).collect();
+        return Err(refuse(format!(
+            "the file has {} joints, and the robot {}: {}",
+            names.len(),
+            joints.len(),
+            joints.join(", ")
+        )));
+    }
+    let with_joints = |&body: &usize| body == 0 || !tree.bodies()[body].joints.is_empty();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for &listed in &orders {
+        let all = tree.order(listed.0, listed.1);
+        let joints = by_name.clone().unwrap_or_else(|| joints_of(tree, &all));
+        let bodies = bodies_of(tree, recorded, &all, with_joints);
+        for quaternions in
+            recorded.map_or(vec![ComponentOrder::Wxyz], |_| ComponentOrder::ALL.to_vec())
+        {
+            let is_known = |known: &Candidate| {
+                (&known.joints, &known.bodies, known.quaternions) == (&joints, &bodies, quaternions)
+            };
+            if !candidates.iter().any(is_known) {
+                candidates.push(Candidate {
+                    listed: Some(listed),
+                    joints: joints.clone(),
+                    bodies: bodies.clone(),
+                    quaternions,
+                });
+            }
+        }
+    }
+    let first = |candidates: Vec<Candidate>| {
+        let order = stated.unwrap_or_default();
+        let mut all = candidates.into_iter();
+        all.find(|candidate| candidate.listed.is_some_and(|listed| listed.0 == order))
+    };
+    let none = || refuse("the robot has no bodies".to_owned());
+    let errors = recorded
+        .filter(|recorded| !recorded.samples.is_empty())
+        .and_then(|recorded| {
+            let errors = candidates
+                .iter()
+                .map(|candidate| error(tree, clip, recorded, candidate));
+            errors.collect::<Option<Vec<f64>>>()
+        });
+    let (Some(errors), Some(recorded)) = (errors, recorded) else {
+        // The arrays are those of two programs, whose orders differ.
+        let is_doubtful = recorded.is_some() && by_name.is_none() && stated.is_none();
+        if is_doubtful
+            && candidates
+                .iter()
+                .any(|other| other.joints != candidates[0].joints)
+        {
+            warnings.warn(Code::UnnamedJoints, || {
+                let message = "the file does not name its joints, and its bodies are not those of the robot; they are \
+                               taken depth first; --source-body-order gives another order";
+                (None, message)
+            });
+        }
+        return first(candidates).ok_or_else(none);
+    };
+    checked(
+        candidates,
+        &errors,
+        recorded,
+        (stated, by_name.is_some()),
+        warnings,
+        refuse,
+    )
+}
+
+/// The candidate that fits best, if it is the one that is stated.
+fn checked(
+    mut candidates: Vec<Candidate>,
+    errors: &[f64],
+    recorded: &RecordedBodies,
+    (stated, is_named): (Option<BodyOrder>, bool),
+    warnings: &mut Warnings,
+    refuse: &impl Fn(String) -> Diagnostic,
+) -> Result<Candidate, Diagnostic> {
+    let is_stated = |candidate: &Candidate| {
+        let is_order = |order| candidate.listed.is_some_and(|listed| listed.0 == order);
+        candidate.quaternions == recorded.order && (is_named || stated.is_none_or(is_order))
+    };
+    let best_of = |of: &dyn Fn(&Candidate) -> bool| {
+        let fitting = (0..errors.len()).filter(|&index| of(&candidates[index]));
+        fitting.min_by(|&a, &b| errors[a].total_cmp(&errors[b]))
+    };
+    let (Some(best), Some(of_stated)) = (best_of(&|_| true), best_of(&is_stated)) else {
+        return Err(refuse("the robot has no bodies".to_owned()));
+    };
+    if errors[of_stated] <= FITS {
+        // Joints that never move fit in any order.
+        let other = candidates.iter().zip(errors).find(|(other, error)| {
+            **error <= FITS && is_stated(other) && other.joints != candidates[of_stated].joints
+        });
+        if other.is_some() && stated.is_none() {
+            warnings.warn(Code::UnnamedJoints, || {
+                let message = "the file does not name its joints, and its bodies fit the robot in several orders; they \
+                               are taken depth first; --source-body-order gives another order";
+                (None, message)
+            });
+            let index = candidates.iter().position(is_stated).unwrap_or(of_stated);
+            return Ok(candidates.swap_remove(index));
+        }
+        return Ok(candidates.swap_remove(of_stated));
+    }
+    let (found, array) = (&candidates[best], &recorded.positions);
+    if errors[best] <= FITS {
+        let message = match found.listed {
+            _ if found.quaternions != recorded.order => {
+                let (order, rotations) = (found.quaternions.name(), &recorded.rotations);
+                format!("`{rotations}` is in the order {order}; give --source-order {order}")
+            }
+            Some(ListedOrder(order, _)) => {
+                format!("`{array}` is in {order} order; give --source-body-order {order}")
+            }
+            None => format!("`{array}` is in another order"),
+        };
+        let message = format!(
+            "{message}: the bodies are within {:.1e} m of their joints then, and {:.2} m otherwise",
+            errors[best], errors[of_stated]
+        );
+        return Err(Diagnostic {
+            code: Code::OrderContradicts,
+            ..refuse(message)
+        });
+    }
+    let farthest = errors[of_stated];
+    if !is_named && stated.is_none() {
+        return Err(refuse(format!(
+            "the file does not name its joints, and in no order are the bodies of `{array}` where the robot's joints put \
+             them (at best {farthest:.3} m away): it is another robot, or another version of it; --source-body-order \
+             takes an order without this check"
+        )));
+    }
+    warnings.warn(Code::OtherRobot, || {
+        let message = format!(
+            "the bodies of `{array}` are up to {farthest:.3} m from where the robot's joints put them: it may be another \
+             version of the robot; bodies are computed from the joints"
+        );
+        (None, message)
+    });
+    Ok(candidates.swap_remove(of_stated))
+}
+
+fn joints_by_name(
+    tree: &Tree,
+    names: &[&str],
+    refuse: &impl Fn(String) -> Diagnostic,
+) -> Result<Vec<usize>, Diagnostic> {
+    let joints: Vec<&str> = tree.scalar_joints().map(|joint| &*joint.name).collect();
+    let position = |name: &&str| joints.iter().position(|joint| joint == name);
+    let found: Option<Vec<usize>> = names.iter().map(position).collect();
+    found.ok_or_else(|| {
+        let unknown: Vec<&str> = names
+            .iter()
+            .copied()
+            .filter(|name| position(name).is_none())
+            .collect();
+        refuse(format!(
+            "the robot has no joint `{}`; the file has {}, and the robot {}",
+            unknown.join("`, `"),
+            names.join(", "),
+            joints.join(", ")
+        ))
+    })
+}
+
+/// The body of each body of the file: by its name, or else in an order. Of fewer bodies they are those with joints, as
+/// programs have them that merge the others into their parents.
+fn bodies_of(
+    tree: &Tree,
+    recorded: Option<&RecordedBodies>,
+    order: &[usize],
+    with_joints: impl Fn(&usize) -> bool,
+) -> Vec<Option<usize>> {
+    let Some(recorded) = recorded else {
+        return Vec::new();
+    };
+    if !recorded.names.is_empty() {
+        let named = |name: &String| tree.bodies().iter().position(|body| body.name == *name);
+        return recorded.names.iter().map(named).collect();
+    }
+    let moving: Vec<usize> = order.iter().copied().filter(with_joints).collect();
+    match recorded.count {
+        count if count == order.len() => order.iter().copied().map(Some).collect(),
+        count if count == moving.len() => moving.into_iter().map(Some).collect(),
+        count => vec![None; count],
+    }
+}
+
+/// The largest distance of a recorded body from where its joints put it; `None` if it cannot be compared.
+fn error(
+    tree: &Tree,
+    clip: &Motion,
+    recorded: &RecordedBodies,
+    candidate: &Candidate,
+) -> Option<f64> {
+    // The rotation of the first is known.
+    (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
+    let mut largest: f64 = 0.0;
+    for sample in &recorded.samples {
+        let mut at = tree.rest();
+        for (index, &joint) in candidate.joints.iter().enumerate() {
+            let key = clip.set.scalar(index)?.keys.get(sample.key)?;
+            at.scalars[joint] = f64::from(*key) + clip.scalar(index).origin;
+        }
+        let [a, b, c, d] = sample.root;
+        let rotation = match candidate.quaternions {
+            ComponentOrder::Xyzw => DQuat::from_xyzw(a, b, c, d),
+            ComponentOrder::Wxyz => DQuat::from_xyzw(b, c, d, a),
+        };
+        let pose = BodyPose {
+            position: *sample.positions.first()?,
+            rotation: rotation.normalize(),
+        };
+        *at.free.first_mut().unwrap_or(&mut at.base) = pose;
+        let poses = tree.poses(&at).ok()?;
+        let of_file = candidate.bodies.iter().zip(&sample.positions);
+        let distance = |(body, position): (&Option<usize>, &DVec3)| {
+            body.map_or(0.0, |body| poses[body].position.distance(*position))
+        };
+        largest = of_file.map(distance).fold(largest, f64::max);
+    }
+    largest.is_finite().then_some(largest)
+}
