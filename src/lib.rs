@@ -252,7 +252,7 @@ pub mod vulkan {
         //! `Automatic`, the default of each, is right for programs.
 
         pub use crate::machine::options::{
-            Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads,
+            Mapping, PrepareArcs, ReadBack, Reads, RunLanes, Transfer, Uploads,
         };
     }
 }

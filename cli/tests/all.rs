@@ -22,6 +22,7 @@ mod examples;
 mod faults;
 mod follow;
 mod json;
+mod lab;
 mod motion;
 mod peers;
 mod plot;

@@ -10,8 +10,9 @@ use crate::program::{Run, finish, root, succeed};
 
 /// Examples that take minutes, each with what runs instead: a shorter part of the same, or nothing where tests of their
 /// own run the command.
-const LONG: [(&str, Option<&str>); 10] = [
+const LONG: [(&str, Option<&str>); 11] = [
     ("tumble prove", None),
+    ("tumble lab", None),
     ("tumble bench", None),
     (
         "tumble render data/pendulum.dat -o pendulum.gif",

@@ -11,11 +11,11 @@ use serde_json::Value;
 use crate::program::{Run, command, finish, root, run};
 use crate::support::vulkan_devices;
 
-const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
+pub(crate) const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
 const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 
 /// Whether a driver is there; on CI it must be.
-fn is_there(driver: &str) -> bool {
+pub(crate) fn is_there(driver: &str) -> bool {
     let there = Path::new(driver).exists() && !vulkan_devices().is_empty();
     assert!(
         there || std::env::var_os("CI").is_none(),
@@ -28,7 +28,7 @@ fn is_there(driver: &str) -> bool {
 }
 
 /// The program with one driver.
-fn with_driver(folder: &Path, driver: &str, line: &[&str]) -> Command {
+pub(crate) fn with_driver(folder: &Path, driver: &str, line: &[&str]) -> Command {
     let mut command = command(folder, line);
     command
         .env("VK_DRIVER_FILES", driver)
@@ -36,7 +36,7 @@ fn with_driver(folder: &Path, driver: &str, line: &[&str]) -> Command {
     command
 }
 
-fn read(path: &Path) -> Value {
+pub(crate) fn read(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -59,7 +59,7 @@ fn expect_proof(run: &Run, proof: &Value, name: &str) {
     assert!(number("/golden/cases") > 360, "{page}");
     assert_eq!(number("/golden/cases_compared"), number("/golden/cases"));
     assert!(number("/random/crowds") >= 1 && number("/random/values") > 10_000);
-    assert_eq!(faults(&schema(), proof), Vec::<String>::new());
+    assert_eq!(faults(&schema("proof"), proof), Vec::<String>::new());
 }
 
 /// Everything, on both software drivers, under the validation layer too; each in a time that CI has. What both
@@ -140,7 +140,7 @@ fn a_driver_that_is_not_exact_is_told_with_code_6() {
     );
     let proof: Value = serde_json::from_slice(&run.out).unwrap();
     assert_eq!(proof["verdict"], "bits_differ");
-    assert_eq!(faults(&schema(), &proof), Vec::<String>::new());
+    assert_eq!(faults(&schema("proof"), &proof), Vec::<String>::new());
 }
 
 /// The CPU beside itself, time that is too short for all that must run, and no driver at all.
@@ -176,13 +176,13 @@ fn what_proves_nothing_is_refused() {
 
 // ---------------------------------------------------------------- the schema
 
-fn schema() -> Value {
-    read(&root().join("docs/proof.schema.json"))
+pub(crate) fn schema(of: &str) -> Value {
+    read(&root().join(format!("docs/{of}.schema.json")))
 }
 
 /// What is wrong with a value, by the parts of JSON Schema that the schema uses: `type`, `properties`,
 /// `required`, `additionalProperties`, `items`, `enum`, `const`.
-fn faults(schema: &Value, value: &Value) -> Vec<String> {
+pub(crate) fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut found = Vec::new();
     check(schema, value, "$", &mut found);
     found
@@ -275,7 +275,7 @@ fn the_schema_refuses_what_it_does_not_describe() {
     let Some(path) = proofs().into_iter().next() else {
         panic!("proofs/ is empty");
     };
-    let schema = schema();
+    let schema = schema("proof");
     let good = read(&path);
     assert_eq!(faults(&schema, &good), Vec::<String>::new());
     let changes: [fn(&mut Value); 5] = [
@@ -477,7 +477,7 @@ const END: &str = "<!-- end -->\n";
 /// `UPDATE_PROOFS=1` writes the page anew.
 #[test]
 fn the_page_of_proofs_is_what_the_files_say() {
-    let schema = schema();
+    let schema = schema("proof");
     for path in proofs() {
         let proof = read(&path);
         assert_eq!(

@@ -69,6 +69,27 @@ impl Pipeline {
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
         let (name, code, reads_texels) = kernel.code(device.variants());
+        let words = words(device, code, exactness);
+        Self::of_words(device, kernel, (name, &words), reads_texels)
+    }
+
+    /// The pipeline of a kernel's code, which differs from the engine's in ways that no bit depends on.
+    #[cfg(feature = "prove")]
+    pub(crate) fn of_code(
+        device: &Arc<LogicalDevice>,
+        kernel: Kernel,
+        (name, code): (&'static str, &[u32]),
+    ) -> Result<Self, VulkanError> {
+        let words = words(device, code, Exactness::Demanded);
+        Self::of_words(device, kernel, (name, &words), false)
+    }
+
+    fn of_words(
+        device: &Arc<LogicalDevice>,
+        kernel: Kernel,
+        (name, words): (&'static str, &[u32]),
+        reads_texels: bool,
+    ) -> Result<Self, VulkanError> {
         let mut pipeline = Self {
             device: Arc::clone(device),
             raw: vk::Pipeline::null(),
@@ -117,9 +138,8 @@ impl Pipeline {
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 
-        let words = words(device, code, exactness);
-        pipeline.code_hash = spirv::hash(&words);
-        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        pipeline.code_hash = spirv::hash(words);
+        let info = vk::ShaderModuleCreateInfo::default().code(words);
         // SAFETY: the words are valid SPIR-V: naga made and validated them, and the passes keep them valid.
         let module = unsafe { device.raw.create_shader_module(&info, None) }
             .named("vkCreateShaderModule")?;

@@ -319,7 +319,7 @@ impl<'a> Commands<'a> {
     }
 
     /// Records a barrier: earlier writes by `from` are visible to `to` afterwards.
-    fn barrier(self, from: Users, to: Users) {
+    pub(crate) fn barrier(self, from: Users, to: Users) {
         let [from, to] = self.scopes.of_barrier([from, to]);
         let ((source, written), (destination, used)) = (scope(from, true), scope(to, false));
         let memory = [vk::MemoryBarrier::default()

@@ -134,10 +134,36 @@ pub struct EngineOptions {
     pub mapping: Mapping,
     /// Where arcs are prepared for a Vulkan device.
     pub prepare_arcs: PrepareArcs,
+    /// How many invocations of a Vulkan device evaluate a run together; by default what is best on cards of its vendor.
+    pub run_lanes: Option<RunLanes>,
     /// Whether a device is used although it fails the self-test; its bits may differ from the CPU's.
     pub allow_inexact: bool,
     /// Which files an engine on a Vulkan device reads and writes.
     pub cache_files: CacheFiles,
+}
+
+/// How many neighbouring invocations of a graphics card evaluate a run of samples together, for runs of each class of
+/// lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next smaller one,
+/// or the nearest of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct RunLanes(pub [u32; 5]);
+
+impl RunLanes {
+    /// The mean number of samples of a run below which it belongs to the class; runs of the last class are longer.
+    pub const CLASSES: [u64; 4] = [8, 16, 32, 128];
+
+    /// The class of runs by their number and that of their samples.
+    #[must_use]
+    pub fn class(runs: u64, samples: u64) -> usize {
+        Self::CLASSES.partition_point(|end| samples >= end.saturating_mul(runs))
+    }
+
+    /// The number of invocations for runs of a class.
+    pub(crate) fn of_class(self, class: usize) -> u32 {
+        let lanes = self.0[class].clamp(4, 32);
+        1 << lanes.ilog2()
+    }
 }
 
 /// The times of a Vulkan device's evaluations ([`Engine::take_timings`](crate::engine::Engine::take_timings)).

@@ -1,6 +1,8 @@
 //! SPIR-V modules as words: parsing of instructions, adding of the float controls that a device reports, and removal
 //! of the decorations that the shader compiler's exactness pass added.
 
+use std::collections::BTreeMap;
+
 const MAGIC: u32 = 0x0723_0203;
 pub(crate) const HEADER_WORDS: usize = 5;
 
@@ -10,6 +12,12 @@ pub(crate) mod op {
     pub(crate) const ENTRY_POINT: u16 = 15;
     pub(crate) const EXECUTION_MODE: u16 = 16;
     pub(crate) const CAPABILITY: u16 = 17;
+    pub(crate) const TYPE_ARRAY: u16 = 28;
+    pub(crate) const TYPE_POINTER: u16 = 32;
+    pub(crate) const CONSTANT: u16 = 43;
+    pub(crate) const STORE: u16 = 62;
+    pub(crate) const MULTIPLY_INTEGERS: u16 = 132;
+    pub(crate) const SHIFT_RIGHT: u16 = 194;
     pub(crate) const DECORATE: u16 = 71;
 }
 /// A decoration.
@@ -190,4 +198,88 @@ pub fn without_decorations(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let kept = code.iter().filter(|i| i.decorated().is_none());
     let kept = kept.flat_map(|i| i.words);
     Ok(module[..HEADER_WORDS].iter().chain(kept).copied().collect())
+}
+
+/// A module whose workgroups have `to` invocations along x instead of `from`. Products and shifts of a constant of that
+/// value are those of the number of invocations, and workgroup memory grows or shrinks with it. Other uses of equal
+/// constants, such as masks, stay.
+///
+/// # Errors
+/// When the words are not a module, or not one of workgroups of `from`.
+pub fn with_workgroup(module: &[u32], [from, to]: [u32; 2]) -> Result<Vec<u32>, SpirvError> {
+    const LOCAL_SIZE: u32 = 17; // an execution mode
+    const WORKGROUP: u32 = 4; // a storage class
+    let code = instructions(module)?;
+    let mut lengths = BTreeMap::new();
+    let mut shared = BTreeMap::new();
+    for instruction in &code {
+        match (instruction.opcode, instruction.words) {
+            (op::TYPE_ARRAY, &[_, id, _, length]) => {
+                lengths.insert(id, length);
+            }
+            (op::TYPE_POINTER, &[_, _, WORKGROUP, array]) => {
+                shared.extend(lengths.get(&array).map(|&length| (array, length)));
+            }
+            _ => {}
+        }
+    }
+    let mut words = module[..HEADER_WORDS].to_vec();
+    let mut bound = words[3];
+    // The new constants of the number of invocations and of lengths, by the old ones.
+    let (mut numbers, mut new_lengths) = (BTreeMap::new(), BTreeMap::new());
+    let mut is_found = false;
+    for instruction in &code {
+        let start = words.len();
+        words.extend_from_slice(instruction.words);
+        match (instruction.opcode, instruction.words) {
+            (op::EXECUTION_MODE, &[_, _, LOCAL_SIZE, x, ..]) if x == from => {
+                (words[start + 3], is_found) = (to, true);
+            }
+            (op::CONSTANT, &[first, kind, id, value]) => {
+                let is_length = shared.values().any(|&length| length == id);
+                for (is_used, changed, value) in [
+                    (value == from, &mut numbers, to),
+                    (is_length, &mut new_lengths, value / from * to),
+                ] {
+                    if is_used {
+                        words.extend([first, kind, bound, value]);
+                        changed.insert(id, bound);
+                        bound += 1;
+                    }
+                }
+            }
+            (op::TYPE_ARRAY, &[_, id, _, length]) if shared.contains_key(&id) => {
+                words[start + 3] = new_lengths.get(&length).copied().unwrap_or(length);
+            }
+            (op::MULTIPLY_INTEGERS | op::SHIFT_RIGHT, &[_, _, _, one, other]) => {
+                let new = |id: u32| numbers.get(&id).copied().unwrap_or(id);
+                (words[start + 3], words[start + 4]) = (new(one), new(other));
+            }
+            _ => {}
+        }
+    }
+    words[3] = bound;
+    match is_found {
+        true => Ok(words),
+        false => Err(SpirvError::Incomplete),
+    }
+}
+
+/// The module without the operand that marks its stores as not temporal.
+///
+/// # Errors
+/// When the words are not a module.
+pub fn temporal_stores(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    const NONTEMPORAL: u32 = 4; // a memory operand
+    let code = instructions(module)?;
+    let mut words = module[..HEADER_WORDS].to_vec();
+    for instruction in &code {
+        match (instruction.opcode, instruction.words) {
+            (op::STORE, &[_, pointer, value, NONTEMPORAL]) => {
+                words.extend([instruction_word(op::STORE, 3), pointer, value]);
+            }
+            (_, all) => words.extend_from_slice(all),
+        }
+    }
+    Ok(words)
 }

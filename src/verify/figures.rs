@@ -21,6 +21,9 @@ use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, shared_set};
 /// The duration of the keys of the cases, seconds: 26 keys, 0.8 s apart.
 const SECONDS: f64 = 20.0;
 
+/// The calls of a row.
+const ROW: u32 = 32;
+
 /// Measured speeds. Rates are bytes per second. Each figure is the median of several runs after a run that is
 /// ignored.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -62,6 +65,10 @@ pub struct FigureCase {
     pub host_seconds: f64,
     /// The time in which the host recorded a later call into commands, seconds; `None` if the case is not recorded.
     pub record_seconds: Option<f64>,
+    /// The time of one of a row of calls that are recorded one after another, with a barrier between them, seconds;
+    /// `None` if the case is not recorded, or the device has no time stamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_seconds: Option<f64>,
     /// The rate of the result, bytes per second.
     pub rate: f64,
     /// The figure that limits the rate: `fill` or `download`.
@@ -75,9 +82,21 @@ pub struct FigureCase {
 /// # Errors
 /// When the device cannot be opened, or fails.
 pub fn figures(device: &VulkanDevice, budget: Duration) -> Result<Figures, GoldenError> {
+    figures_with(device, &EngineOptions::default(), budget)
+}
+
+/// As [`figures`], with other options of the engine.
+///
+/// # Errors
+/// As [`figures`].
+pub fn figures_with(
+    device: &VulkanDevice,
+    options: &EngineOptions,
+    budget: Duration,
+) -> Result<Figures, GoldenError> {
     let deadline = Instant::now() + budget;
     let is_software = matches!(device.info().kind, DeviceKind::Cpu | DeviceKind::Other);
-    let renderer = Renderer::new(device, false, &EngineOptions::default())?;
+    let renderer = Renderer::new(device, false, options)?;
     let mut bench = Bench {
         renderer,
         is_software,
@@ -231,6 +250,7 @@ impl Bench {
             seconds,
             host_seconds: on_host,
             record_seconds: None,
+            row_seconds: None,
             rate,
             limit,
             share: if of > 0.0 { rate / of } else { 0.0 },
@@ -280,12 +300,23 @@ impl Bench {
             Ok(ran)
         })?;
         application.forget_commands();
+        let (_, rows) = measured(|| {
+            let row = application.recorded(true, |commands| {
+                (0..ROW).try_for_each(|_| record_clip(&target, commands, 0))
+            })?;
+            Ok(application.timed(row)?)
+        })?;
+        application.forget_commands();
         drop(target);
         let name = format!("{tracks} tracks × {samples} frames, {method}, {encoding}, {layout:?}");
         let values = (tracks * samples) as u64;
         let first_call = first_call.unwrap_or_default();
         self.add((case, name), (values, bytes), first_call, &runs, "fill");
         self.recorded_in(recording);
+        if let (Some(case), (Some(on_device), _)) = (self.figures.cases.last_mut(), seconds(&rows))
+        {
+            case.row_seconds = Some(on_device / f64::from(ROW));
+        }
         Ok(())
     }
 

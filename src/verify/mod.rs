@@ -9,6 +9,8 @@ mod comparison;
 pub mod figures;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(feature = "prove")]
+pub mod lab;
 pub(crate) mod outputs;
 #[cfg(feature = "prove")]
 pub mod random;

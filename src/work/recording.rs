@@ -267,6 +267,12 @@ impl Recording {
         });
     }
 
+    /// A barrier that no step needs, as measurements record it.
+    #[cfg(feature = "prove")]
+    pub(crate) fn barrier(&mut self, from: Users, to: Users) {
+        self.steps.push(Step::Barrier { from, to });
+    }
+
     /// Everything that is submitted or recorded later sees what was written.
     pub(crate) fn publish(&mut self) {
         if let Some(from) = self.written.after(Last::default()) {

@@ -14,6 +14,7 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
+use crate::gpu::physical::shapes::run_lanes;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -457,6 +458,7 @@ fn of_clip(
     };
     let request = ListRequest {
         maps_samples,
+        run_lanes: run_lanes(0),
         clip,
         timeline,
     };

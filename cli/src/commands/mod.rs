@@ -12,6 +12,7 @@ pub(crate) mod explain;
 pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
+pub(crate) mod lab;
 pub(crate) mod man;
 pub(crate) mod merge;
 pub(crate) mod methods;
@@ -43,6 +44,7 @@ pub(crate) enum Command {
     Compare(Box<compare::Arguments>),
     Verify(verify::Arguments),
     Prove(prove::Arguments),
+    Lab(lab::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
     Generate(generate::Arguments),
@@ -72,6 +74,7 @@ impl Command {
             Self::Compare(arguments) => compare::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
             Self::Prove(arguments) => prove::run(&arguments),
+            Self::Lab(arguments) => lab::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),
             Self::Generate(arguments) => generate::run(&arguments),

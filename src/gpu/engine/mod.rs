@@ -23,15 +23,15 @@ use crate::gpu::instance::Instance;
 use crate::gpu::job::{ClipBuffers, Job, WorkLists};
 use crate::gpu::kernel_check::passes::KernelPass;
 use crate::gpu::kernel_check::{self, KernelCheck};
-use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::physical::upload_memory::KernelReads;
+use crate::gpu::physical::{PhysicalDevice, shapes};
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::writable;
 use crate::machine::error::calls::Named as _;
 use crate::machine::error::{EvaluateError, VulkanError};
-use crate::machine::options::{EngineOptions, Timings, Transfer};
+use crate::machine::options::{EngineOptions, RunLanes, Timings, Transfer};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -68,6 +68,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
+    /// How many of them evaluate a run together.
+    pub(crate) run_lanes: RunLanes,
     /// The number of keys from which on the arcs between them are prepared on the device.
     pub(crate) prepares_arcs_from: usize,
     /// Whether the caller's memory is imported if the device can.
@@ -113,6 +115,9 @@ impl VulkanEngine {
             keys_in_flight: Exclusive::default(),
             in_flight_count,
             maps_samples: device.physical.maps_samples(options.mapping),
+            run_lanes: options
+                .run_lanes
+                .unwrap_or_else(|| shapes::run_lanes(info.vendor_id)),
             prepares_arcs_from: arcs::prepared_from(options.prepare_arcs, info.kind),
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
@@ -339,6 +344,7 @@ impl VulkanEngine {
     pub(crate) fn list_request<'a>(&'a self, job: Job<'a>) -> ListRequest<'a> {
         ListRequest {
             maps_samples: self.maps_samples,
+            run_lanes: self.run_lanes,
             clip: job.clip,
             timeline: job.timeline,
         }

@@ -6,7 +6,7 @@ mod from_keys;
 pub(crate) mod passes;
 mod poses;
 pub(crate) mod random;
-mod segments;
+pub(crate) mod segments;
 pub(crate) mod self_test;
 mod whole_instances;
 
@@ -71,7 +71,15 @@ impl Trial {
 
     /// Runs the trial, and counts the values that differ, of all.
     fn differing(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<[usize; 2], VulkanError> {
-        let mut expected = self.expected(kernel);
+        self.differing_from(self.expected(kernel), pipeline)
+    }
+
+    /// Runs the trial, and counts the values that differ from an output, of all.
+    pub(crate) fn differing_from(
+        &self,
+        mut expected: Vec<u32>,
+        pipeline: &Pipeline,
+    ) -> Result<[usize; 2], VulkanError> {
         expected.resize(expected.len() + GUARD, UNTOUCHED);
         let mut found = self.before.clone();
         found.resize(expected.len(), UNTOUCHED);

@@ -85,11 +85,39 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
                 List::TimesCoalesced => scene.frame_by_frame(random, true),
                 List::FramesSpread | List::TimesSpread => {
                     let lanes_log2 = random.below(2) + if first { 2 } else { 4 };
-                    scene.spread(random, matches!(list, List::TimesSpread), lanes_log2)
+                    let lanes = SpreadLanes::new(lanes_log2);
+                    scene.spread(random, matches!(list, List::TimesSpread), lanes)
                 }
             }
         })
         .collect()
+}
+
+/// A trial of the kernel over spread runs of frames in an encoding: the same samples for any lanes and workgroups.
+#[cfg(feature = "prove")]
+pub(crate) fn spread_trial(form: Form, encoding: Encoding, lanes: SpreadLanes) -> Trial {
+    fn of_form<S: Segment>(encoding: Encoding, lanes: SpreadLanes) -> Trial {
+        let random = &mut Random::canonical();
+        SegmentInputs::<S>::new(random, encoding).spread(random, false, lanes)
+    }
+    match form {
+        Form::Arc => of_form::<ArcSegment>(encoding, lanes),
+        Form::Polynomial => of_form::<PolynomialSegment>(encoding, lanes),
+    }
+}
+
+/// The bytes of segments between rotations.
+#[cfg(feature = "prove")]
+pub(crate) fn rotations(form: Form, count: usize) -> Vec<u8> {
+    let random = &mut Random::canonical();
+    match form {
+        Form::Arc => bytes(&Vec::from_iter(
+            (0..count).map(|_| ArcSegment::between(random.pair())),
+        )),
+        Form::Polynomial => bytes(&Vec::from_iter(
+            (0..count).map(|_| PolynomialSegment::between(random.pair())),
+        )),
+    }
 }
 
 /// The inputs that all work of a dispatch shares.
@@ -271,10 +299,9 @@ impl<S: Segment> SegmentInputs<S> {
     }
 
     /// Runs of contiguous samples, between some of which there are samples of no run; each run has a number of lanes.
-    fn spread(mut self, random: &mut Random, is_listed: bool, lanes_log2: u32) -> Trial {
+    fn spread(mut self, random: &mut Random, is_listed: bool, lanes: SpreadLanes) -> Trial {
         const RUNS: usize = 60;
         const FIRST: u32 = 3;
-        let lanes = SpreadLanes::new(lanes_log2);
         let mut chunk = WorkChunk::default();
         let mut output = 0;
         for _ in 0..RUNS {

@@ -6,6 +6,7 @@ pub(crate) mod cards;
 pub(crate) mod details;
 pub(crate) mod external;
 pub(crate) mod queues;
+pub(crate) mod shapes;
 pub(crate) mod upload_memory;
 
 use std::sync::Arc;

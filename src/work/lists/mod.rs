@@ -8,6 +8,7 @@ pub(crate) mod spread;
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
+use crate::machine::options::RunLanes;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
@@ -26,7 +27,7 @@ use crate::time::spans::TrackPart;
 use crate::twin::{COARSE, Evaluate as _};
 use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
 use crate::work::lists::sample_list::{KeyDensity, SampleList};
-use crate::work::lists::spread::{NO_RUN, SpreadLanes};
+use crate::work::lists::spread::{NO_RUN, RunCounts, SpreadLanes};
 use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
@@ -195,6 +196,8 @@ pub(crate) struct ListRequest<'a> {
     /// Whether neighbouring invocations evaluate neighbouring samples, if possible; otherwise each evaluates a run of
     /// samples.
     pub(crate) maps_samples: bool,
+    /// How many of them evaluate a run together.
+    pub(crate) run_lanes: RunLanes,
     pub(crate) clip: &'a ClipData,
     pub(crate) timeline: &'a Timeline,
 }
@@ -231,6 +234,7 @@ impl Lister {
             maps_samples,
             clip,
             timeline,
+            ..
         } = request;
         if let Some(list) = SampleList::new(clip, timeline, window, KeyDensity::Unknown) {
             return write_samples(&list, window, memory);
@@ -306,8 +310,9 @@ impl Lister {
     ) -> Result<Work, R::Error> {
         let ListRequest { clip, timeline, .. } = request;
         let lists = work(clip, timeline, window, Cut::Spread, &mut self.spare)?;
-        let lanes = SpreadLanes::of_lists(&lists);
-        if SpreadLanes::are_too_short(&lists)
+        let counts = RunCounts::of_lists(&lists);
+        let lanes = SpreadLanes::of_runs(counts, request.run_lanes);
+        if counts.are_too_short()
             && let Some(list) = SampleList::new(clip, timeline, window, KeyDensity::ShortRuns)
         {
             self.take_back(lists);

@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use crate::machine::options::RunLanes;
 use crate::shader::{IS_CONSTANT, LINE, NEEDS_CARE, NO_KEY, SPREAD_WORKGROUP, Spread, SpreadRun};
 use crate::work::lists::{GroupWork, WorkChunk};
 
@@ -33,36 +34,55 @@ pub(crate) fn sample_count(run: &SpreadRun) -> u32 {
     run.count & !(IS_CONSTANT | NEEDS_CARE)
 }
 
-/// Whether the runs of a window have on average fewer samples than this.
-fn are_shorter(lists: &[GroupWork], than: u64) -> bool {
-    let chunks = || lists.iter().flat_map(|list| &list.chunks);
-    let runs: usize = chunks().map(|chunk| chunk.runs.len()).sum();
-    let samples = chunks().flat_map(|chunk| &chunk.runs).map(sample_count);
-    samples.map(u64::from).sum::<u64>() < than * runs as u64
+/// The numbers of the runs of a window and of their samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunCounts {
+    runs: u64,
+    samples: u64,
 }
 
-/// The number of lanes of a run: a power of two from 4 to 32.
+impl RunCounts {
+    pub(crate) fn of_lists(lists: &[GroupWork]) -> Self {
+        let runs = || lists.iter().flat_map(|list| &list.chunks);
+        let runs = || runs().flat_map(|chunk| &chunk.runs);
+        Self {
+            runs: runs().count() as u64,
+            samples: runs().map(|run| u64::from(sample_count(run))).sum(),
+        }
+    }
+
+    /// Whether runs have so few samples on average that samples should rather be listed one by one.
+    pub(crate) fn are_too_short(self) -> bool {
+        const TOO_SHORT: u64 = 4;
+        self.samples < TOO_SHORT * self.runs
+    }
+}
+
+/// The number of lanes of a run, a power of two from 4 to 32, and the invocations of a workgroup.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SpreadLanes {
     log2: u32,
+    workgroup: u32,
 }
 
 impl SpreadLanes {
     pub(crate) fn new(log2: u32) -> Self {
-        Self { log2 }
+        Self {
+            log2,
+            workgroup: SPREAD_WORKGROUP,
+        }
     }
 
-    /// The lanes for the runs of a window. What a run takes before its first sample, and the lanes without a sample in
-    /// its first and its last iteration, weigh less the fewer lanes it has; eight store a whole line.
-    pub(crate) fn of_lists(lists: &[GroupWork]) -> Self {
-        const SHORT: u64 = 16;
-        Self::new(if are_shorter(lists, SHORT) { 2 } else { 3 })
+    /// The same for a kernel whose workgroups have another number of invocations.
+    #[cfg(feature = "prove")]
+    pub(crate) fn with_workgroup(self, workgroup: u32) -> Self {
+        Self { workgroup, ..self }
     }
 
-    /// Whether runs have so few samples that samples should rather be listed one by one.
-    pub(crate) fn are_too_short(lists: &[GroupWork]) -> bool {
-        const TOO_SHORT: u64 = 4;
-        are_shorter(lists, TOO_SHORT)
+    /// The lanes for the runs of a window.
+    pub(crate) fn of_runs(counts: RunCounts, run_lanes: RunLanes) -> Self {
+        let class = RunLanes::class(counts.runs, counts.samples);
+        Self::new(run_lanes.of_class(class).ilog2())
     }
 
     fn lanes(self) -> u32 {
@@ -75,7 +95,7 @@ impl SpreadLanes {
     }
 
     fn runs_of_workgroup(self) -> usize {
-        (SPREAD_WORKGROUP >> self.log2) as usize
+        (self.workgroup >> self.log2) as usize
     }
 
     /// The iterations of a run, wherever in a line it begins.
@@ -170,7 +190,7 @@ impl SpreadLanes {
 
     /// The workgroups of a dispatch.
     pub(crate) fn workgroups(self, entries: u32) -> [u32; 3] {
-        [(entries << self.log2).div_ceil(SPREAD_WORKGROUP), 1, 1]
+        [(entries << self.log2).div_ceil(self.workgroup), 1, 1]
     }
 }
 

@@ -7,12 +7,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::commands::prove::report::{FORMAT, FORMAT_VERSION};
-use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::commands::prove::report::{FORMAT, FORMAT_VERSION, read_report};
+use crate::messages::exit::{DIFFERENCE, Failure};
 use crate::messages::listing;
-
-/// Files larger than any proof are refused unread.
-const MAX_BYTES: u64 = 64 << 20;
 
 /// What was found; also the form of the JSON.
 #[derive(Debug, Serialize)]
@@ -48,25 +45,7 @@ struct SavedProof {
 impl SavedProof {
     fn new(path: &Path) -> Result<Self, Failure> {
         let name = path.display().to_string();
-        let refuse = |why: String| Failure::new(ALL_INPUTS, format!("{name}: {why}"));
-        let size = std::fs::metadata(path).map_err(|error| refuse(error.to_string()))?;
-        if size.len() > MAX_BYTES {
-            return Err(refuse("it is too large to be a proof".to_owned()));
-        }
-        let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
-        let value: Value = serde_json::from_str(&text)
-            .map_err(|error| refuse(format!("it is not JSON: {error}")))?;
-        if value["format"] != FORMAT {
-            return Err(refuse(
-                "it is not a proof; `tumble prove -o FILE` writes one".to_owned(),
-            ));
-        }
-        if value["format_version"] != FORMAT_VERSION {
-            let version = &value["format_version"];
-            return Err(refuse(format!(
-                "it is of version {version} of the format; this program reads {FORMAT_VERSION}"
-            )));
-        }
+        let value = read_report(path, [FORMAT, "a proof", "tumble prove"], FORMAT_VERSION)?;
         Ok(Self { name, value })
     }
 

@@ -10,8 +10,10 @@ pub(crate) mod text;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::arguments::device::vulkan_device;
+use crate::commands::lab;
 use crate::commands::prove::report::Verdict;
 use crate::commands::prove::steps::ProofOptions;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
@@ -59,7 +61,28 @@ pub(crate) struct Arguments {
     /// Run everything again under the Khronos validation layer; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Where to write: the proof, as JSON
+    /// The report of a lab (tumble lab) with the lanes of runs to use
+    #[arg(long, value_name = "FILE")]
+    lab: Option<PathBuf>,
+    #[command(flatten)]
+    output: ReportOutput,
+    /// Compare two proofs instead: bits, then figures
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["FILE", "FILE"],
+        conflicts_with_all = ["device", "time_limit", "quick", "seed", "validate", "lab", "out", "overwrite"]
+    )]
+    compare: Vec<PathBuf>,
+    /// Compile every kernel, and say how long each took
+    #[arg(long, hide = true)]
+    compile_kernels: bool,
+}
+
+/// What a report goes to.
+#[derive(Debug, Args)]
+pub(crate) struct ReportOutput {
+    /// Where to write: the report, as JSON
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Replace existing files
@@ -68,22 +91,32 @@ pub(crate) struct Arguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Compare two proofs instead: bits, then figures
-    #[arg(
-        long,
-        num_args = 2,
-        value_names = ["FILE", "FILE"],
-        conflicts_with_all = ["device", "time_limit", "quick", "seed", "validate", "out", "overwrite"]
-    )]
-    compare: Vec<PathBuf>,
-    /// Compile every kernel, and say how long each took
-    #[arg(long, hide = true)]
-    compile_kernels: bool,
+}
+
+impl ReportOutput {
+    /// Refuses a file that cannot be written, before anything is done.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        match &self.out {
+            Some(path) => report::check_output(path, self.overwrite),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes a report, and prints it, or its page.
+    pub(crate) fn report(&self, report: &impl Serialize, page: &str) -> Result<(), Failure> {
+        if let Some(path) = &self.out {
+            report::write(report, path)?;
+        }
+        match self.json {
+            true => listing::json(report),
+            false => listing::text(page),
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let [one, two] = &arguments.compare[..] {
-        return compare::run([one, two], arguments.json);
+        return compare::run([one, two], arguments.output.json);
     }
     let device = vulkan_device(arguments.device.as_deref())?;
     if arguments.compile_kernels {
@@ -96,25 +129,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
              --device, or leave that out for the first one (`tumble devices` lists them)",
         ));
     };
-    let out = arguments.out.as_deref();
-    if let Some(path) = out {
-        report::check_output(path, arguments.overwrite)?;
-    }
+    arguments.output.check()?;
+    let lab = arguments.lab.as_deref();
+    let run_lanes = lab.map(lab::run_lanes).transpose()?;
     let proof = steps::prove(&ProofOptions {
         device,
         seconds: arguments.time_limit,
         quick: arguments.quick,
         seed: arguments.seed,
         validate: arguments.validate,
+        run_lanes,
     });
-    if let Some(path) = out {
-        proof.write(path)?;
-    }
-    if arguments.json {
-        listing::json(&proof)?;
-    } else {
-        listing::text(&text::page(&proof))?;
-    }
+    arguments.output.report(&proof, &text::page(&proof))?;
     let reasons = proof.reasons.join("; ");
     match proof.verdict {
         Verdict::Proved => Ok(()),

@@ -4,13 +4,14 @@ use std::io::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
+use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 use tumble::verify::figures::Figures;
 use tumble::verify::random::RandomRound;
 use tumble::verify::renderer::{RendererCheck, RendererReport};
 use tumble::vulkan::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
 
-use crate::messages::exit::Failure;
+use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// The value of `format` in the JSON.
 pub(crate) const FORMAT: &str = "tumble-proof";
@@ -408,31 +409,62 @@ impl Proof {
         }
         reasons
     }
+}
 
-    /// Writes the JSON, whole or not at all.
-    pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let name = path.display().to_string();
-        let failed = |error: &std::io::Error| Failure::writing(&name, error);
-        let mut text =
-            serde_json::to_string_pretty(self).expect("names are strings and numbers are numbers");
-        text.push('\n');
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|error| failed(&error))?;
-        file.write_all(text.as_bytes())
-            .map_err(|error| failed(&error))?;
-        let kept = file.persist(path).map_err(|error| failed(&error.error))?;
-        // Temporary files are for their owner alone; results are as other files.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            let _ = kept.set_permissions(std::fs::Permissions::from_mode(0o644));
-        }
-        drop(kept);
-        Ok(())
+/// Writes a report as JSON, whole or not at all.
+pub(crate) fn write(report: &impl Serialize, path: &Path) -> Result<(), Failure> {
+    let name = path.display().to_string();
+    let failed = |error: &std::io::Error| Failure::writing(&name, error);
+    let mut text =
+        serde_json::to_string_pretty(report).expect("names are strings and numbers are numbers");
+    text.push('\n');
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|error| failed(&error))?;
+    file.write_all(text.as_bytes())
+        .map_err(|error| failed(&error))?;
+    let kept = file.persist(path).map_err(|error| failed(&error.error))?;
+    // Temporary files are for their owner alone; results are as other files.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let _ = kept.set_permissions(std::fs::Permissions::from_mode(0o644));
     }
+    drop(kept);
+    Ok(())
+}
+
+/// Reads a report as it was written: of a format, which a command writes, and of a version of it.
+pub(crate) fn read_report(
+    path: &Path,
+    [format, called, command]: [&str; 3],
+    version: u64,
+) -> Result<Value, Failure> {
+    /// Files larger than any report are refused unread.
+    const MAX_BYTES: u64 = 64 << 20;
+    let name = path.display();
+    let refuse = |why: String| Failure::new(ALL_INPUTS, format!("{name}: {why}"));
+    let size = std::fs::metadata(path).map_err(|error| refuse(error.to_string()))?;
+    if size.len() > MAX_BYTES {
+        return Err(refuse(format!("it is too large to be {called}")));
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+    let value: Value =
+        serde_json::from_str(&text).map_err(|error| refuse(format!("it is not JSON: {error}")))?;
+    if value["format"] != format {
+        return Err(refuse(format!(
+            "it is not {called}; `{command} -o FILE` writes one"
+        )));
+    }
+    if value["format_version"] != version {
+        let found = &value["format_version"];
+        return Err(refuse(format!(
+            "it is of version {found} of the format; this program reads {version}"
+        )));
+    }
+    Ok(value)
 }
 
 /// The first few of some names.

@@ -4,12 +4,12 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use tumble::verify::figures::figures;
+use tumble::verify::figures::figures_with;
 use tumble::verify::golden::Golden;
 use tumble::verify::random::round;
 use tumble::verify::renderer::renderer;
 use tumble::vulkan::VulkanDevice;
-use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, Transfer, Uploads};
+use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, RunLanes, Transfer, Uploads};
 use tumble::{Device, Engine, EngineOptions};
 
 use crate::commands::prove::report::{
@@ -28,6 +28,8 @@ pub(crate) struct ProofOptions {
     pub(crate) quick: bool,
     pub(crate) seed: u64,
     pub(crate) validate: bool,
+    /// The lanes of runs, instead of the engine's choice.
+    pub(crate) run_lanes: Option<RunLanes>,
 }
 
 /// A random round of so many seconds is reported.
@@ -86,7 +88,7 @@ impl DeviceSetting {
 
     /// Every way to read with every way to move results and both budgets. The first four have each of
     /// them at least once.
-    fn all() -> Vec<Self> {
+    fn all(run_lanes: Option<RunLanes>) -> Vec<Self> {
         let reading = [
             (Reads::StorageBuffers, Mapping::Samples, "samples"),
             (Reads::StorageBuffers, Mapping::Runs, "runs"),
@@ -132,6 +134,10 @@ impl DeviceSetting {
             .filter(|combination| known.insert(*combination));
         ordered
             .map(|(r, m, b)| Self::new((reading[r], moving[m], budgets[b])))
+            .map(|mut setting| {
+                setting.options.run_lanes = run_lanes;
+                setting
+            })
             .collect()
     }
 }
@@ -167,7 +173,7 @@ pub(crate) fn prove(options: &ProofOptions) -> Proof {
                 started,
                 cpu,
                 golden: Golden::new(),
-                settings: DeviceSetting::all(),
+                settings: DeviceSetting::all(options.run_lanes),
                 engines: Vec::new(),
                 proof,
             };
@@ -517,7 +523,9 @@ impl ProofRun<'_> {
 
     fn measure(&mut self) -> Result<(), StepError> {
         let budget = self.left_until(MEASURED_BY);
-        self.proof.figures = Some(figures(self.vulkan, budget)?);
+        let mut options = EngineOptions::default();
+        options.run_lanes = self.options.run_lanes;
+        self.proof.figures = Some(figures_with(self.vulkan, &options, budget)?);
         Ok(())
     }
 
@@ -572,7 +580,7 @@ mod tests {
     /// Each way to read, to move results and each budget is in the first settings, and no two are alike.
     #[test]
     fn settings_are_all_there_are_and_the_first_have_each_way_once() {
-        let all = DeviceSetting::all();
+        let all = DeviceSetting::all(None);
         assert_eq!(all.len(), 24);
         let names: BTreeSet<&str> = all.iter().map(|setting| setting.name.as_str()).collect();
         assert_eq!(names.len(), 24);

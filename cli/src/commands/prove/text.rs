@@ -266,7 +266,11 @@ fn speed(proof: &Proof, text: &mut String) {
                 "download" => "the bus",
                 _ => "filling",
             },
-            case.record_seconds
+            case.row_seconds.map_or_else(String::new, |seconds| format!(
+                ", in a row {}",
+                time(seconds)
+            )) + &case
+                .record_seconds
                 .map_or_else(String::new, |seconds| format!(
                     ", recorded in {}",
                     time(seconds)

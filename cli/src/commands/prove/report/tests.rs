@@ -204,7 +204,7 @@ fn a_file_is_written_whole_and_one_that_is_there_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("proof.json");
     assert!(check_output(&path, false).is_ok());
-    proof.write(&path).unwrap();
+    write(&proof, &path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(value["verdict"], "proved");

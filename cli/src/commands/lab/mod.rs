@@ -1,0 +1,133 @@
+//! `tumble lab`: compares and measures what the engine might do otherwise on a card, and says what follows.
+
+mod text;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use serde::Serialize;
+use tumble::verify::lab::{LabOptions, LabReport};
+use tumble::vulkan::DeviceInfo;
+use tumble::vulkan::tuning::RunLanes;
+use tumble::{Engine, EngineOptions};
+
+use crate::arguments::device::{refused, vulkan_device};
+use crate::commands::prove::ReportOutput;
+use crate::commands::prove::device;
+use crate::commands::prove::report::{Host, Program, read_report};
+use crate::messages::exit::{ALL_INPUTS, DEVICE, DIFFERENCE, Failure};
+
+/// Compare every variant of the kernels for cards with the CPU, measure them, and say which follow by rules
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Variants differ in the invocations that evaluate a run together, in the size of workgroups, in how results
+pass the caches, and in how numbers become halves. Each is compared with the same function on the CPU, and
+left out if a bit differs. Then what no kernel exceeds is measured, and rows of 32 dispatches of the
+variants. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
+
+Exit codes:
+  0  no bit differs
+  6  bits differ
+
+Examples:
+  tumble lab --bits                              compare only: nothing is measured
+  tumble lab --time-limit 150 -o lab.json
+  tumble prove --quick --lab lab.json            with the lanes that the lab chose")]
+pub(crate) struct Arguments {
+    /// The device: its index, part of its name or uuid:UUID (`tumble devices`) [default: the first Vulkan
+    /// device]
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
+    /// The time limit, seconds; the most typical runs are measured first
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 150,
+        value_parser = clap::value_parser!(u64).range(1..=86_400)
+    )]
+    time_limit: u64,
+    /// Compare bits only, and measure nothing
+    #[arg(long)]
+    bits: bool,
+    #[command(flatten)]
+    output: ReportOutput,
+}
+
+/// The file of a lab.
+#[derive(Serialize)]
+struct LabFile {
+    format: &'static str,
+    format_version: u64,
+    program: Program,
+    /// When it began, in UTC.
+    date: String,
+    /// How long it took.
+    seconds: f64,
+    host: Host,
+    device: DeviceInfo,
+    lab: LabReport,
+}
+
+/// The value of `format` in the JSON.
+const FORMAT: &str = "tumble-lab";
+
+/// The form of the JSON; another number where names or meanings change.
+const FORMAT_VERSION: u64 = 1;
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let started = Instant::now();
+    let Some(vulkan) = vulkan_device(arguments.device.as_deref())? else {
+        return Err(Failure::new(
+            DIFFERENCE,
+            "nothing is compared: the CPU has no such kernels; name a Vulkan device with --device, or leave \
+             that out for the first one (`tumble devices` lists them)",
+        ));
+    };
+    arguments.output.check()?;
+    let date = device::now();
+    let mut options = EngineOptions::default();
+    options.allow_inexact = true;
+    let engine = Engine::with_options(vulkan, &options).map_err(|error| refused(&error))?;
+    let lab = engine.lab(&LabOptions {
+        bits_only: arguments.bits,
+        budget: Duration::from_secs(arguments.time_limit),
+    });
+    let (Some(lab), Some(info)) = (lab.map_err(|error| refused(&error))?, engine.device_info())
+    else {
+        return Err(Failure::new(DEVICE, "the device is no Vulkan device"));
+    };
+    let file = LabFile {
+        format: FORMAT,
+        format_version: FORMAT_VERSION,
+        program: device::program(),
+        date,
+        seconds: started.elapsed().as_secs_f64(),
+        host: device::host(),
+        device: info.clone(),
+        lab,
+    };
+    let page = text::page(&file.device.name, file.seconds, &file.lab);
+    arguments.output.report(&file, &page)?;
+    match file.lab.rejected.len() {
+        0 => Ok(()),
+        count => Err(Failure::new(
+            DEVICE,
+            format!("bits differ in {count} variants"),
+        )),
+    }
+}
+
+/// The lanes of runs that the report of a lab chose.
+pub(crate) fn run_lanes(path: &Path) -> Result<RunLanes, Failure> {
+    let called = [FORMAT, "the report of a lab", "tumble lab"];
+    let file = read_report(path, called, FORMAT_VERSION)?;
+    let lanes = serde_json::from_value(file["lab"]["run_lanes"].clone());
+    lanes.map(RunLanes).map_err(|_| {
+        let name = path.display();
+        Failure::new(
+            ALL_INPUTS,
+            format!("{name}: it has no `run_lanes`; without --bits `tumble lab` chooses some"),
+        )
+    })
+}

@@ -1,0 +1,607 @@
+//! What the lab compares and measures, on a device.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::QueueLane;
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::kernel_check::segments::{rotations, spread_trial};
+use crate::gpu::physical::DeviceKind;
+use crate::gpu::pipeline::Pipeline;
+use crate::gpu::submission::Submission;
+use crate::machine::error::VulkanError;
+use crate::machine::options::RunLanes;
+use crate::output::encoding::Encoding;
+use crate::shader::{Form, IS_CONSTANT, Kernel, NO_KEY, Spread, SpreadRun, Variants};
+use crate::verify::lab::rules::{self, ROW, Timed};
+use crate::verify::lab::variant::{KernelVariant, LabKernel};
+use crate::verify::lab::{
+    Ceiling, Decision, LabOptions, LabReport, LabRow, RejectedVariant, VariantTime,
+};
+use crate::work::lists::WorkChunk;
+use crate::work::lists::spread::{NO_RUN, SpreadLanes};
+use crate::work::recording::Users;
+
+/// Samples of a measured dispatch: 4096 tracks of 1200 frames, or fewer on software devices.
+const CARD_SAMPLES: u32 = 4096 * 1200;
+const SOFTWARE_SAMPLES: u32 = 1 << 14;
+
+/// The runs that are measured, the most typical first: samples, and whether each begins with a key.
+const RUNS: [(u32, bool); 7] = [
+    (48, false),
+    (48, true),
+    (16, false),
+    (200, false),
+    (8, false),
+    (4, false),
+    (16, true),
+];
+
+/// Segments that runs share in turn, more than a cache has.
+const SEGMENTS: u32 = 1 << 18;
+
+/// The lanes whose numbers decide for a class of runs.
+const LANES: [u32; 4] = [4, 8, 16, 32];
+
+/// The barriers whose time is measured, beside none.
+const BARRIERS: [(&str, [Users; 2]); 5] = [
+    ("barrier between kernels", [Users::Kernel, Users::Kernel]),
+    (
+        "barrier between kernels and copies",
+        [Users::KernelAndCopy, Users::KernelAndCopy],
+    ),
+    ("barrier from all to kernels", [Users::Any, Users::Kernel]),
+    ("barrier from kernels to all", [Users::Kernel, Users::Any]),
+    ("barrier from all to all", [Users::Any, Users::Any]),
+];
+const BETWEEN_KERNELS: [Users; 2] = [Users::Kernel, Users::Kernel];
+
+/// Variants that are left for the last measurement.
+const FINALISTS: usize = 3;
+
+/// A pipeline of a kernel's variant.
+type MadePipeline = (Kernel, KernelVariant, Arc<Pipeline>);
+
+struct Bench<'a> {
+    engine: &'a VulkanEngine,
+    submission: Submission,
+    deadline: Instant,
+    is_software: bool,
+    samples: u32,
+    pipelines: Vec<MadePipeline>,
+    report: LabReport,
+}
+
+/// A dispatch of which a row is made.
+#[derive(Clone, Copy)]
+struct RowDispatch<'a> {
+    pipeline: &'a Pipeline,
+    buffers: [&'a Buffer; 4],
+    push: Spread,
+    groups: [u32; 3],
+}
+
+/// A list of runs on the device, for some lanes and a workgroup.
+struct ListedRuns {
+    lanes: u32,
+    workgroup: u32,
+    entries: u32,
+    buffer: Buffer,
+}
+
+pub(super) fn run(engine: &VulkanEngine, options: &LabOptions) -> Result<LabReport, VulkanError> {
+    let info = &engine.device.physical.info;
+    let is_software = matches!(info.kind, DeviceKind::Cpu | DeviceKind::Other);
+    let mut bench = Bench {
+        engine,
+        submission: Submission::new(&engine.device, QueueLane::Kernels)?,
+        deadline: Instant::now() + options.budget,
+        is_software,
+        samples: if is_software {
+            SOFTWARE_SAMPLES
+        } else {
+            CARD_SAMPLES
+        },
+        pipelines: Vec::new(),
+        report: LabReport {
+            variants_compared: 0,
+            words_compared: 0,
+            rejected: Vec::new(),
+            samples: 0,
+            ceilings: Vec::new(),
+            rows: Vec::new(),
+            decisions: Vec::new(),
+            run_lanes: None,
+            is_complete: true,
+        },
+    };
+    bench.compare()?;
+    if !options.bits_only && engine.device.physical.timestamp_bits() > 0 {
+        bench.report.samples = bench.samples;
+        bench.measure()?;
+    }
+    Ok(bench.report)
+}
+
+impl Bench<'_> {
+    fn is_over(&self) -> bool {
+        Instant::now() > self.deadline
+    }
+
+    fn variants(&self, kernel: LabKernel, lanes: u32) -> Vec<KernelVariant> {
+        let physical = &self.engine.device.physical;
+        let largest = physical.info.max_compute_work_group_invocations;
+        kernel.variants(lanes, physical.converts_halves, largest)
+    }
+
+    fn pipeline(
+        &mut self,
+        kernel: Kernel,
+        variant: KernelVariant,
+    ) -> Result<Arc<Pipeline>, VulkanError> {
+        let code = variant.code();
+        let mut known = self.pipelines.iter();
+        if let Some((.., made)) = known.find(|(of, is, _)| (*of, *is) == (kernel, code)) {
+            return Ok(Arc::clone(made));
+        }
+        let (name, words) = variant.code_of(kernel)?;
+        let made = Arc::new(Pipeline::of_code(
+            &self.engine.device,
+            kernel,
+            (name, &words),
+        )?);
+        self.pipelines.push((kernel, code, Arc::clone(&made)));
+        Ok(made)
+    }
+
+    /// Compares every variant of every kernel with the kernel's twin, word for word. Software devices take a tenth of a
+    /// second for a pipeline: of each kernel they compare as few as have all workgroups and both kinds of stores.
+    fn compare(&mut self) -> Result<(), VulkanError> {
+        for lab_kernel in LabKernel::all() {
+            let LabKernel { form, encoding } = lab_kernel;
+            let kernel = lab_kernel.kernel();
+            let expected = spread_trial(form, encoding, SpreadLanes::new(3)).expected(kernel);
+            for variant in self.variants(lab_kernel, 8) {
+                if self.is_software && !variant.is_typical() {
+                    continue;
+                }
+                let pipeline = self.pipeline(kernel, variant)?;
+                let trial = spread_trial(form, encoding, variant.spread_lanes());
+                let [differing, words] = trial.differing_from(expected.clone(), &pipeline)?;
+                self.report.variants_compared += 1;
+                self.report.words_compared += words as u64;
+                if differing > 0 {
+                    self.report.rejected.push(RejectedVariant {
+                        kernel: pipeline.name,
+                        variant,
+                        words: words as u64,
+                        differing: differing as u64,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The time of one dispatch of a row with a barrier between them, microseconds: the median of some rows.
+    fn row(
+        &mut self,
+        dispatch: RowDispatch<'_>,
+        barrier: Option<[Users; 2]>,
+        rows: u32,
+    ) -> Result<f64, VulkanError> {
+        let mut times = Vec::new();
+        for _ in 0..rows {
+            self.submission.begin()?;
+            let work = &mut self.submission.work;
+            let bindings = dispatch.buffers.map(|buffer| work.whole(buffer).into());
+            let set = work.recording.set(dispatch.pipeline.kernel, bindings);
+            for _ in 0..ROW {
+                work.recording
+                    .dispatch(set, &dispatch.push, dispatch.groups);
+                if let Some([from, to]) = barrier {
+                    work.recording.barrier(from, to);
+                }
+            }
+            work.bind(|_| Ok(dispatch.pipeline))?;
+            times.push(self.submitted()?);
+        }
+        Ok(median(times))
+    }
+
+    /// Submits what was recorded. The time of each part of a row, microseconds.
+    fn submitted(&mut self) -> Result<f64, VulkanError> {
+        let spent = self.submission.run()?;
+        let seconds = spent.map_or(0.0, |spent| spent.on_device.as_secs_f64());
+        Ok(seconds * 1e6 / f64::from(ROW))
+    }
+
+    /// As [`Bench::row`], twice, after a row that is ignored.
+    fn twice(
+        &mut self,
+        dispatch: RowDispatch<'_>,
+        barrier: Option<[Users; 2]>,
+    ) -> Result<Timed, VulkanError> {
+        const ROWS: u32 = 5;
+        self.row(dispatch, barrier, 1)?;
+        let one = self.row(dispatch, barrier, ROWS)?;
+        Ok(Timed::new(one, self.row(dispatch, barrier, ROWS)?))
+    }
+
+    /// The time of filling so many bytes, in a row with a barrier between any commands, or none.
+    fn fill(
+        &mut self,
+        buffer: &Buffer,
+        bytes: u64,
+        has_barriers: bool,
+    ) -> Result<Timed, VulkanError> {
+        let mut times = [0.0; 3];
+        for time in &mut times {
+            self.submission.begin()?;
+            for _ in 0..ROW {
+                let commands = self.submission.commands();
+                if has_barriers {
+                    commands.barrier(Users::Any, Users::Any);
+                }
+                commands.fill(buffer, bytes, 0x3f80_0000);
+                if has_barriers {
+                    commands.barrier(Users::Any, Users::Any);
+                }
+            }
+            *time = self.submitted()?;
+        }
+        Ok(Timed::new(times[1], times[2]))
+    }
+
+    fn resident(&self, bytes: &[u8]) -> Result<Buffer, VulkanError> {
+        self.engine.resident("tumble lab", bytes, &mut Vec::new())
+    }
+
+    fn results(&self, bytes: u64) -> Result<Buffer, VulkanError> {
+        Buffer::new(&self.engine.device, "tumble lab", bytes, Residence::Results)
+    }
+
+    /// Lists runs that follow each other, for some lanes and a workgroup.
+    fn listed(
+        &self,
+        run: SpreadRun,
+        count: u32,
+        lanes: SpreadLanes,
+    ) -> Result<(Buffer, u32), VulkanError> {
+        let mut chunk = WorkChunk::default();
+        let mut output = 0;
+        while output < self.samples {
+            let source = chunk.runs.len() as u32 % SEGMENTS;
+            chunk.runs.push(SpreadRun {
+                source: if run.count & IS_CONSTANT != 0 {
+                    0
+                } else {
+                    source
+                },
+                output,
+                count: count.min(self.samples - output) | run.count,
+                ..run
+            });
+            output += count;
+        }
+        let mut list = vec![NO_RUN; lanes.entries(&chunk)];
+        lanes.write_chunk(&chunk, 0, &mut list);
+        Ok((
+            self.resident(bytemuck::cast_slice(&list))?,
+            list.len() as u32,
+        ))
+    }
+
+    fn measure(&mut self) -> Result<(), VulkanError> {
+        let largest = (Encoding::ALL.into_iter().map(Encoding::bytes).max()).unwrap_or_default();
+        let results = self.results(u64::from(self.samples) * largest as u64)?;
+        let constants = self.resident(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
+        let fill = self.ceilings(&results, &constants)?;
+        let segments = [Form::Arc, Form::Polynomial]
+            .map(|form| rotations(form, SEGMENTS.min(self.samples / 4) as usize));
+        let [arcs, polynomials] = segments;
+        let of_forms = [self.resident(&arcs)?, self.resident(&polynomials)?];
+        // Of each class of runs the lanes, with their times as shares of today's for each kernel.
+        let mut shares: [Vec<[Timed; 4]>; 5] = Default::default();
+        for (run, has_keys) in RUNS {
+            let class = RunLanes::class(1, u64::from(run));
+            let today_lanes = self.engine.run_lanes.of_class(class);
+            let mut lists: Vec<ListedRuns> = Vec::new();
+            for lab_kernel in LabKernel::all() {
+                if self.is_over() {
+                    self.report.is_complete = false;
+                    break;
+                }
+                let buffers = [
+                    &of_forms[usize::from(lab_kernel.form == Form::Polynomial)],
+                    &constants,
+                ];
+                let shape = (run, has_keys);
+                let all = (buffers, &results);
+                let (row, of_lanes) =
+                    self.kernel_row(lab_kernel, shape, today_lanes, all, &mut lists)?;
+                let filled = fill * row.bytes as f64;
+                let share_of_filling = filled / row.winner.time.best().max(f64::MIN_POSITIVE);
+                self.report.rows.push(LabRow {
+                    share_of_filling,
+                    ..row
+                });
+                if !has_keys {
+                    shares[class].extend(of_lanes);
+                }
+            }
+        }
+        self.decide(&shares);
+        Ok(())
+    }
+
+    /// Measures the variants of a kernel over runs of a length; also those of today's that differ in their lanes, as
+    /// shares of today's time, if none was rejected.
+    fn kernel_row(
+        &mut self,
+        lab_kernel: LabKernel,
+        (run, has_keys): (u32, bool),
+        today_lanes: u32,
+        (read, results): ([&Buffer; 2], &Buffer),
+        lists: &mut Vec<ListedRuns>,
+    ) -> Result<(LabRow, Option<[Timed; 4]>), VulkanError> {
+        let kernel = lab_kernel.kernel();
+        let detail = lab_kernel.encoding.row().detail;
+        let mut variants = self.variants(lab_kernel, today_lanes);
+        variants.retain(|variant| {
+            let mut rejected = self.report.rejected.iter();
+            let is_rejected = |one: &RejectedVariant| {
+                one.variant == *variant && one.kernel == variant_name(kernel, *variant)
+            };
+            !rejected.any(is_rejected)
+        });
+        let like = SpreadRun {
+            first: -(run as i32 / 2),
+            scale: 2.0 / run as f32,
+            key: if has_keys { 0 } else { NO_KEY },
+            ..NO_RUN
+        };
+        let mut prepared = Vec::new();
+        for &variant in &variants {
+            let KernelVariant {
+                lanes, workgroup, ..
+            } = variant;
+            let is_listed = |list: &ListedRuns| (list.lanes, list.workgroup) == (lanes, workgroup);
+            if !lists.iter().any(is_listed) {
+                let (buffer, entries) = self.listed(like, run, variant.spread_lanes())?;
+                lists.push(ListedRuns {
+                    lanes,
+                    workgroup,
+                    entries,
+                    buffer,
+                });
+            }
+            let index = lists.iter().position(is_listed).unwrap_or_default();
+            prepared.push((self.pipeline(kernel, variant)?, index));
+        }
+        let dispatch = |index: usize| {
+            let (pipeline, list) = &prepared[index];
+            let list = &lists[*list];
+            let lanes = variants[index].spread_lanes();
+            RowDispatch {
+                pipeline,
+                buffers: [read[0], read[1], &list.buffer, results],
+                push: lanes.dispatch([0, list.entries], detail, 0),
+                groups: lanes.workgroups(list.entries),
+            }
+        };
+        let between = Some(BETWEEN_KERNELS);
+        let mut left = rules::halve(variants.len(), FINALISTS, &mut |index, rows| {
+            self.row(dispatch(index), between, rows)
+        })?;
+        // A rule asks for the one that differs from today's in its stores alone.
+        let cached = variants[0].cached();
+        let cached = variants.iter().position(|variant| *variant == cached);
+        left.extend(cached.filter(|index| !left.contains(index)));
+        let mut finalists = Vec::new();
+        for index in left {
+            finalists.push(VariantTime {
+                variant: variants[index],
+                time: self.twice(dispatch(index), between)?,
+            });
+        }
+        let today = finalists[0];
+        let candidates = finalists.iter();
+        let candidates = candidates.map(|one| (one.time, one.variant.new_pipelines(today.variant)));
+        let winner = finalists[rules::winner(&Vec::from_iter(candidates))];
+        let mut of_lanes = Vec::new();
+        for lanes in LANES {
+            let variant = KernelVariant {
+                lanes,
+                ..today.variant
+            };
+            if let Some(index) = variants.iter().position(|one| *one == variant) {
+                let [least, most] = self.twice(dispatch(index), between)?.microseconds;
+                let of_today = today.time.best().max(f64::MIN_POSITIVE);
+                of_lanes.push(Timed::new(least / of_today, most / of_today));
+            }
+        }
+        let row = LabRow {
+            kernel: prepared[0].0.name,
+            run,
+            has_keys,
+            bytes: u64::from(self.samples) * lab_kernel.encoding.bytes() as u64,
+            today,
+            winner,
+            share_of_filling: 0.0,
+            finalists,
+        };
+        Ok((row, of_lanes.try_into().ok()))
+    }
+
+    /// Measures the ceilings. The time of filling a byte, microseconds.
+    fn ceilings(&mut self, results: &Buffer, constants: &Buffer) -> Result<f64, VulkanError> {
+        let mut found = Vec::new();
+        let mut add = |name, time, bytes| found.push(Ceiling { name, time, bytes });
+        let bytes = u64::from(self.samples) * 16;
+        let more = (bytes / 10 * 34).min(results.size) / 16 * 16;
+        for (name, bytes, has_barriers) in [
+            ("fill", bytes, false),
+            ("fill between barriers for all", bytes, true),
+            ("fill more", more, false),
+            ("fill more between barriers for all", more, true),
+        ] {
+            add(name, self.fill(results, bytes, has_barriers)?, Some(bytes));
+        }
+        let fill = found[0].time.best() / bytes as f64;
+        let kernel = LabKernel {
+            form: Form::Arc,
+            encoding: Encoding::F32,
+        };
+        let today = self.variants(kernel, 8)[0];
+        let pipeline = self.pipeline(kernel.kernel(), today)?;
+        let constant = SpreadRun {
+            count: IS_CONSTANT,
+            ..NO_RUN
+        };
+        let mut add = |name, time, bytes| found.push(Ceiling { name, time, bytes });
+        for (name, lanes_log2, run) in [
+            ("store, neighbours in line", 5, 512),
+            ("store, eight lanes at 1 KiB from the next", 3, 64),
+            ("store, a workgroup in line", 7, 2048),
+        ] {
+            let lanes = SpreadLanes::new(lanes_log2);
+            let (list, entries) = self.listed(constant, run, lanes)?;
+            let dispatch = RowDispatch {
+                pipeline: &pipeline,
+                buffers: [constants, constants, &list, results],
+                push: lanes.dispatch([0, entries], 0, 0),
+                groups: lanes.workgroups(entries),
+            };
+            add(
+                name,
+                self.twice(dispatch, Some(BETWEEN_KERNELS))?,
+                Some(bytes),
+            );
+        }
+        let nothing = RowDispatch {
+            pipeline: &pipeline,
+            buffers: [constants, constants, constants, results],
+            push: SpreadLanes::new(3).dispatch([0, 0], 0, 0),
+            groups: [1, 1, 1],
+        };
+        add(
+            "empty dispatch, no barrier",
+            self.twice(nothing, None)?,
+            None,
+        );
+        for (name, barrier) in BARRIERS {
+            add(name, self.twice(nothing, Some(barrier))?, None);
+        }
+        let (name, workgroups) = match self.is_software {
+            true => ("64 workgroups that end at once", 64),
+            false => ("32 768 workgroups that end at once", 1 << 15),
+        };
+        let many = RowDispatch {
+            groups: [workgroups, 1, 1],
+            ..nothing
+        };
+        add(name, self.twice(many, None)?, None);
+        self.report.ceilings = found;
+        Ok(fill)
+    }
+
+    fn ceiling(&self, name: &str) -> f64 {
+        let mut all = self.report.ceilings.iter();
+        all.find(|ceiling| ceiling.name == name)
+            .map_or(0.0, |ceiling| ceiling.time.best())
+    }
+
+    fn decide(&mut self, shares: &[Vec<[Timed; 4]>; 5]) {
+        let fill = self.ceiling("fill");
+        let linear = self.ceiling("store, neighbours in line");
+        let strided = self.ceiling("store, eight lanes at 1 KiB from the next");
+        let is_wide = rules::needs_wide_runs(fill, linear, strided);
+        let mut decisions = vec![Decision {
+            rule: "where linear stores are as fast as filling and those of eight lanes are not, long runs get 32 lanes",
+            microseconds: vec![fill, linear, strided],
+            applies: is_wide,
+            result: match is_wide {
+                true => "runs of 32 samples and more get 32 lanes".to_owned(),
+                false => "lanes follow from the times of kernels".to_owned(),
+            },
+        }];
+        let for_kernels = self.ceiling("barrier between kernels");
+        let for_all = self.ceiling("barrier from all to all");
+        let needs_scopes = rules::needs_scopes(for_all, for_kernels);
+        decisions.push(Decision {
+            rule: "where a barrier for all takes 2 µs more than one for kernels, the users of results are named",
+            microseconds: vec![for_all, for_kernels],
+            applies: needs_scopes,
+            result: match needs_scopes {
+                true => "scopes by default".to_owned(),
+                false => "scopes only where applications name them".to_owned(),
+            },
+        });
+        decisions.extend(self.streaming());
+        let today = self.engine.run_lanes;
+        let mut lanes = [0, 1, 2, 3, 4].map(|class| today.of_class(class));
+        for (class, of_kernels) in shares.iter().enumerate() {
+            let today = lanes[class];
+            let mut all = Vec::from_iter(LANES.iter().enumerate().map(|(index, &lanes)| {
+                let mean = |which: usize| {
+                    let times = of_kernels
+                        .iter()
+                        .map(|of_lanes| of_lanes[index].microseconds[which]);
+                    times.sum::<f64>() / of_kernels.len().max(1) as f64
+                };
+                (lanes, Timed::new(mean(0), mean(1)))
+            }));
+            all.sort_by_key(|(lanes, _)| *lanes != today);
+            if !of_kernels.is_empty() {
+                lanes[class] = rules::lanes(&all);
+            }
+            let is_long = RunLanes::CLASSES[..class]
+                .last()
+                .is_some_and(|&start| start >= 32);
+            if is_wide && is_long {
+                lanes[class] = 32;
+            }
+        }
+        let run_lanes = RunLanes(lanes);
+        decisions.push(Decision {
+            rule: "other lanes than today's must save 2 % beyond what measurements vary, on average over kernels",
+            microseconds: Vec::new(),
+            applies: run_lanes.0 != [0, 1, 2, 3, 4].map(|class| today.of_class(class)),
+            result: format!("lanes of runs below 8, 16, 32, 128 samples and longer: {lanes:?}"),
+        });
+        (self.report.decisions, self.report.run_lanes) = (decisions, Some(run_lanes));
+    }
+
+    /// Whether results go past the caches, by the times of cubics over typical runs.
+    fn streaming(&self) -> Option<Decision> {
+        let mut rows = self.report.rows.iter();
+        let cubics = Kernel::PolynomialFramesSpreadF32
+            .code(Variants::default())
+            .0;
+        let row = rows.find(|row| row.kernel == cubics)?;
+        let cached = row.today.variant.cached();
+        let cached = row.finalists.iter().find(|one| one.variant == cached)?;
+        let times = [cached.time.best(), row.today.time.best()];
+        let streams = rules::streams(times[0], times[1]);
+        Some(Decision {
+            rule: "stores go past the caches where cubics are a tenth faster so",
+            microseconds: times.to_vec(),
+            applies: streams,
+            result: match streams {
+                true => "stores stay as they are: past the caches".to_owned(),
+                false => "stores through the caches would do".to_owned(),
+            },
+        })
+    }
+}
+
+fn variant_name(kernel: Kernel, variant: KernelVariant) -> &'static str {
+    variant.code_of(kernel).map_or("", |(name, _)| name)
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or_default()
+}

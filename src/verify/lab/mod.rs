@@ -1,0 +1,132 @@
+//! The lab of `tumble lab`: measures on a card what the engine might do otherwise, and says what follows by rules that
+//! were written before ([`rules`]). A card can be had rarely and for minutes, so nothing is decided by hand.
+//!
+//! Every variant of a kernel ([`KernelVariant`]) is first compared with the kernel's twin; one that differs is rejected.
+//! Then the ceilings are measured, which no kernel exceeds, and rows of dispatches of the variants.
+
+mod bench;
+mod rules;
+mod variant;
+
+use std::time::Duration;
+
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::machine::options::RunLanes;
+pub use crate::verify::lab::rules::Timed;
+pub use crate::verify::lab::variant::{HalfConversion, KernelVariant, StoreCaching};
+
+/// What the lab does.
+#[derive(Debug, Clone, Copy)]
+pub struct LabOptions {
+    /// Compare bits only: nothing is timed.
+    pub bits_only: bool,
+    /// The time for measurements; what is left then is not measured.
+    pub budget: Duration,
+}
+
+/// What was compared and measured.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LabReport {
+    /// The number of variants that were compared with the twins of their kernels.
+    pub variants_compared: usize,
+    /// The number of words that were compared.
+    pub words_compared: u64,
+    /// The variants whose words differ; they are not measured.
+    pub rejected: Vec<RejectedVariant>,
+    /// The samples of each measured dispatch.
+    pub samples: u32,
+    /// What no kernel exceeds. Empty if nothing was timed.
+    pub ceilings: Vec<Ceiling>,
+    /// Each kernel over runs of each length.
+    pub rows: Vec<LabRow>,
+    /// What follows from the times.
+    pub decisions: Vec<Decision>,
+    /// The lanes of runs of each class that follow; `None` if nothing was timed.
+    pub run_lanes: Option<RunLanes>,
+    /// Whether everything was measured in the time.
+    pub is_complete: bool,
+}
+
+/// A variant whose words differ from those of the twin.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RejectedVariant {
+    /// The kernel's name.
+    pub kernel: &'static str,
+    /// The variant.
+    pub variant: KernelVariant,
+    /// The number of compared words.
+    pub words: u64,
+    /// The number of words that differ.
+    pub differing: u64,
+}
+
+/// A time that no kernel can go below.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Ceiling {
+    /// What was done: one of a row.
+    pub name: &'static str,
+    /// The time of one, measured twice.
+    #[serde(flatten)]
+    pub time: Timed,
+    /// The bytes that one writes; `None` if it writes nothing.
+    pub bytes: Option<u64>,
+}
+
+/// A kernel over runs of one length.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LabRow {
+    /// The kernel's name.
+    pub kernel: &'static str,
+    /// The samples of a run.
+    pub run: u32,
+    /// Whether each run begins with a key.
+    pub has_keys: bool,
+    /// The bytes that one dispatch writes.
+    pub bytes: u64,
+    /// The engine's variant.
+    pub today: VariantTime,
+    /// The best variant by the rules; the engine's unless another beats it.
+    pub winner: VariantTime,
+    /// The time of filling as many bytes, as a share of the winner's.
+    pub share_of_filling: f64,
+    /// The variants that were left at the end.
+    pub finalists: Vec<VariantTime>,
+}
+
+/// The time of a variant.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct VariantTime {
+    /// The variant.
+    pub variant: KernelVariant,
+    /// The time of one dispatch of a row, measured twice.
+    #[serde(flatten)]
+    pub time: Timed,
+}
+
+/// A rule, and what follows from it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Decision {
+    /// The rule.
+    pub rule: &'static str,
+    /// The times that it looks at, microseconds.
+    pub microseconds: Vec<f64>,
+    /// Whether it applies.
+    pub applies: bool,
+    /// What follows.
+    pub result: String,
+}
+
+impl Engine {
+    /// Compares all variants of the kernels over spread runs with their twins, and measures them. `None` on the CPU.
+    /// Without a clock on the device, nothing is timed.
+    ///
+    /// # Errors
+    /// When the device fails, or has no memory for the test.
+    pub fn lab(&self, options: &LabOptions) -> Result<Option<LabReport>, Error> {
+        let Some(opened) = self.opened() else {
+            return Ok(None);
+        };
+        Ok(Some(bench::run(&opened.engine(), options)?))
+    }
+}

@@ -1,0 +1,206 @@
+//! The variants of a kernel over spread runs, as data. All give the same bits, so that each is compared with the kernel's
+//! twin. Modules are changed when they are loaded: those that are shipped stay as they are.
+
+use crate::machine::error::VulkanError;
+use crate::output::encoding::Encoding;
+use crate::shader::{Form, Kernel, List, SPREAD_WORKGROUP, Store, Variants, spirv};
+use crate::work::lists::spread::SpreadLanes;
+
+/// How results pass the caches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StoreCaching {
+    /// Stores are marked as not temporal, so that what kernels read stays in the caches.
+    Streamed,
+    /// Stores are as others.
+    Cached,
+}
+
+/// How numbers become halves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HalfConversion {
+    /// By operations on integers.
+    Integers,
+    /// By the device's instruction.
+    Device,
+}
+
+/// One way to run a kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct KernelVariant {
+    /// The invocations that evaluate a run together.
+    pub lanes: u32,
+    /// The invocations of a workgroup.
+    pub workgroup: u32,
+    /// How results pass the caches.
+    pub stores: StoreCaching,
+    /// How numbers become halves; `None` where the kernel stores none.
+    pub halves: Option<HalfConversion>,
+}
+
+impl KernelVariant {
+    /// What distinguishes pipelines: all but the lanes, which come with a dispatch.
+    pub(super) fn code(self) -> Self {
+        Self { lanes: 0, ..self }
+    }
+
+    /// The same with stores through the caches.
+    pub(super) fn cached(self) -> Self {
+        let stores = StoreCaching::Cached;
+        Self { stores, ..self }
+    }
+
+    /// Whether it is one of the few that have every workgroup and both kinds of stores among them.
+    pub(super) fn is_typical(self) -> bool {
+        (self.stores == StoreCaching::Cached) == (self.workgroup == 64)
+    }
+
+    /// The pipelines that it needs beside today's.
+    pub(super) fn new_pipelines(self, today: Self) -> usize {
+        usize::from(self.code() != today.code())
+    }
+
+    pub(super) fn spread_lanes(self) -> SpreadLanes {
+        SpreadLanes::new(self.lanes.ilog2()).with_workgroup(self.workgroup)
+    }
+
+    /// The kernel's name and its code in this variant.
+    pub(super) fn code_of(self, kernel: Kernel) -> Result<(&'static str, Vec<u32>), VulkanError> {
+        let variants = Variants {
+            reads_texels: false,
+            converts: self.halves == Some(HalfConversion::Device),
+        };
+        let (name, code, _) = kernel.code(variants);
+        let of_workgroup = match self.workgroup {
+            SPREAD_WORKGROUP => Ok(code.to_vec()),
+            other => spirv::with_workgroup(code, [SPREAD_WORKGROUP, other]),
+        };
+        let changed = of_workgroup.and_then(|code| match self.stores {
+            StoreCaching::Streamed => Ok(code),
+            StoreCaching::Cached => spirv::temporal_stores(&code),
+        });
+        Ok((
+            name,
+            changed.expect("the kernels passed when they were compiled"),
+        ))
+    }
+}
+
+/// A kernel over spread runs, and what it stores.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LabKernel {
+    pub(super) form: Form,
+    pub(super) encoding: Encoding,
+}
+
+impl LabKernel {
+    /// Every form with every store, the most used ones first.
+    pub(super) fn all() -> Vec<Self> {
+        let mut encodings: Vec<Encoding> = Vec::new();
+        for encoding in Encoding::ALL {
+            let store = encoding.row().store;
+            if encodings.iter().all(|known| known.row().store != store) {
+                encodings.push(encoding);
+            }
+        }
+        let each = encodings.into_iter();
+        each.flat_map(|encoding| [Form::Arc, Form::Polynomial].map(|form| Self { form, encoding }))
+            .collect()
+    }
+
+    pub(super) fn kernel(self) -> Kernel {
+        Kernel::over_segments(self.form, List::FramesSpread, self.encoding.row().store)
+    }
+
+    /// The variant that the engine runs today, then the others.
+    pub(super) fn variants(
+        self,
+        today_lanes: u32,
+        converts: bool,
+        largest: u32,
+    ) -> Vec<KernelVariant> {
+        let is_half = self.encoding.row().store == Store::F16;
+        let conversions: &[Option<HalfConversion>] = match (is_half, converts) {
+            (false, _) => &[None],
+            (true, true) => &[Some(HalfConversion::Device), Some(HalfConversion::Integers)],
+            (true, false) => &[Some(HalfConversion::Integers)],
+        };
+        let today = KernelVariant {
+            lanes: today_lanes,
+            workgroup: SPREAD_WORKGROUP,
+            stores: StoreCaching::Streamed,
+            halves: conversions[0],
+        };
+        let mut all = vec![today];
+        for &halves in conversions {
+            for stores in [StoreCaching::Streamed, StoreCaching::Cached] {
+                for workgroup in [64, SPREAD_WORKGROUP, 256]
+                    .into_iter()
+                    .filter(|&n| n <= largest)
+                {
+                    for lanes in [4, 8, 16, 32] {
+                        let variant = KernelVariant {
+                            lanes,
+                            workgroup,
+                            stores,
+                            halves,
+                        };
+                        all.extend((variant != today).then_some(variant));
+                    }
+                }
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Today's is the first, and no two are alike.
+    #[test]
+    fn variants_are_all_there_are() {
+        let kernels = LabKernel::all();
+        assert_eq!(kernels.len(), 16);
+        let f16 = kernels
+            .iter()
+            .find(|one| one.encoding == Encoding::F16)
+            .unwrap();
+        for (kernel, converts, count) in
+            [(&kernels[0], true, 24), (f16, false, 24), (f16, true, 48)]
+        {
+            let all = kernel.variants(8, converts, 1024);
+            assert_eq!(all.len(), count);
+            assert!((1..count).all(|i| !all[..i].contains(&all[i])));
+            assert_eq!((all[0].lanes, all[0].workgroup), (8, 128));
+            assert_eq!(kernel.variants(8, converts, 128).len(), count / 3 * 2);
+        }
+    }
+
+    /// Code of other workgroups has one or two constants more, and that of today's is what is shipped.
+    #[test]
+    fn code_is_changed_where_it_says_so() {
+        for lab_kernel in LabKernel::all() {
+            let kernel = lab_kernel.kernel();
+            let (_, shipped, _) = kernel.code(Variants::default());
+            let all = lab_kernel.variants(8, false, 1024);
+            assert_eq!(all[0].code_of(kernel).unwrap().1, shipped);
+            let bound_of = |code: &[u32]| code[3] - shipped[3];
+            for variant in all {
+                let code = variant.code_of(kernel).unwrap().1;
+                let constants = bound_of(&code);
+                match variant.workgroup {
+                    SPREAD_WORKGROUP => assert_eq!(constants, 0),
+                    _ => assert!((1..=2).contains(&constants), "{lab_kernel:?}: {constants}"),
+                }
+                let length = shipped.len() + 4 * constants as usize;
+                match variant.stores {
+                    StoreCaching::Streamed => assert_eq!(code.len(), length),
+                    StoreCaching::Cached => assert!(code.len() < length),
+                }
+            }
+        }
+    }
+}
