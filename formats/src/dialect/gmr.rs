@@ -1,6 +1,6 @@
 //! GMR's motion of a robot: a pickle of a dict.
 
-use super::{Axis, Dialect, root_and_joints};
+use super::{Axis, DOF_NAMES, Dialect, JOINT_NAMES, root_and_joints};
 use crate::quaternion::ComponentOrder;
 
 pub(super) static DIALECT: Dialect = Dialect {
@@ -13,7 +13,7 @@ pub(super) static DIALECT: Dialect = Dialect {
     ],
     plan: |archive, warnings| {
         let rotation = ("root_rot", ComponentOrder::Xyzw);
-        let beside = &["local_body_pos", "link_body_list"];
+        let beside = &["local_body_pos", "link_body_list", JOINT_NAMES, DOF_NAMES];
         root_and_joints(
             archive, "gmr", rotation, "root_pos", "dof_pos", beside, warnings,
         )

@@ -79,6 +79,34 @@ pub(crate) fn plan(
     (first.plan)(archive, warnings).map(Some)
 }
 
+/// Why a file that has all arrays of a dialect is not in it: one of them has another shape. `None` for other files.
+pub(crate) fn misfit(archive: &Archive) -> Option<String> {
+    DIALECTS.iter().find_map(|dialect| {
+        let shapes = dialect.arrays.iter();
+        let shapes = shapes.map(|(name, axes)| Some((*name, *axes, archive.shape(name)?)));
+        let shapes: Vec<_> = shapes.collect::<Option<_>>()?;
+        let listed = shapes
+            .iter()
+            .map(|(name, _, shape)| format!("`{name}` {shape:?}"));
+        let listed: Vec<String> = listed.collect();
+        let frames = shapes
+            .iter()
+            .filter(|(_, axes, _)| axes.first() == Some(&Axis::Frames));
+        let frames: Vec<usize> = frames
+            .filter_map(|(.., shape)| shape.first().copied())
+            .collect();
+        let why = match frames.iter().any(|count| Some(count) != frames.first()) {
+            true => "have different numbers of frames",
+            false => "have other shapes than that layout",
+        };
+        Some(format!(
+            "the arrays of {} {why}: {}",
+            dialect.name,
+            listed.join(", ")
+        ))
+    })
+}
+
 impl Dialect {
     /// Whether a file has all arrays.
     fn fits(&self, archive: &Archive) -> bool {
@@ -136,8 +164,9 @@ fn root(
     Ok((part, frames))
 }
 
-/// The arrays with the names of joints and bodies that `tumble eval --describe` adds.
+/// The arrays with the names of joints and bodies: those that `tumble eval --describe` adds, and that others call so.
 const JOINT_NAMES: &str = "joint_names";
+const DOF_NAMES: &str = "dof_names";
 const BODY_NAMES: &str = "body_names";
 
 /// The plan of a root and of joints, all of them hinges or slides, which the file does not tell apart.
@@ -166,7 +195,10 @@ fn root_and_joints(
             .and_then(|array| array.texts().ok()))
     };
     let columns = (member(archive, joints)?, Layout::FrameMajor, 0);
-    let names: Option<Vec<String>> = texts(JOINT_NAMES)?;
+    let names: Option<Vec<String>> = match texts(JOINT_NAMES)? {
+        None => texts(DOF_NAMES)?,
+        found => found,
+    };
     let mut robot = RobotArrays::of(dialect, names.is_some());
     plan.add_scalars(archive, columns, names, |_| ScalarKind::Angle, warnings)?;
     let members = [member(archive, position)?, member(archive, rotation.0)?];

@@ -166,6 +166,9 @@ fn read_known(
         },
     };
     let mut plan = plan.ok_or_else(|| {
+        if let Some(message) = dialect::misfit(archive) {
+            return Diagnostic::new(&archive.file, Code::Shape, message);
+        }
         let message = format!(
             "no array has a known name (poses, rotations, body_rotations); say what they \
              are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",
