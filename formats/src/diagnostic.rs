@@ -362,6 +362,7 @@ codes! {
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
     OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`, as of another version of the robot. Bodies are computed from the joints.";
+    AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn, as angles do that a program wraps to one turn. It is interpolated as it is, the long way around. `--robot` unwraps the hinges without limits; otherwise unwrap the angles before (numpy.unwrap).";
 }
 
 impl Code {

@@ -100,6 +100,33 @@ fn our_npz_keeps_scalars_with_names_kinds_and_limits() {
     }
 }
 
+/// An angle without limits that goes from one end of a turn to the other is probably a wrapped one.
+#[test]
+fn wrapped_angles_are_noticed() {
+    let times = TIMES.map(|time| time * 2.0);
+    let mut clip = Motion::default();
+    clip.set.push("root", &times, &[Quat::IDENTITY; 4]).unwrap();
+    let keys = [3.0, -3.0, -2.5, -2.0];
+    clip.set.push_scalar("wheel", &times, &keys, &[]).unwrap();
+    clip.scalars.push(Scalar::of(ScalarKind::Angle));
+    let warning = |clip: &Motion| {
+        let samples = keyed(clip).unwrap();
+        let sampled = [samples.of(clip, Some("1".parse().unwrap()), &[])];
+        let mut bytes = Vec::new();
+        let format = Format::named("npz").unwrap();
+        let written = format.write_clips(&sampled, &MotionOptions::default(), &mut bytes);
+        written.unwrap();
+        let read = read_npz("a.npz", bytes, &ReadOptions::default()).unwrap();
+        let mut warnings = read.warnings.into_iter();
+        warnings.find(|warning| warning.code == Code::AngleJumps)
+    };
+    let message = warning(&clip).unwrap().message;
+    let expected = "`wheel` changes by -344° between its keys at 0 and 1 s; ";
+    assert!(message.starts_with(expected), "{message}");
+    clip.scalars[0].limits = Some([-3.1, 3.1]);
+    assert_eq!(warning(&clip), None);
+}
+
 #[test]
 fn operations_keep_scalars_or_change_them_with_the_clip() {
     let (clip, engine) = (clip(), engine());

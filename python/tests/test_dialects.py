@@ -28,7 +28,7 @@ def test_joints_have_the_names_of_the_file(tmp_path, name):
         warnings.simplefilter("error")
         clip = tumble.load(file)
     out = tmp_path / "out.npz"
-    tumble.Engine("cpu").save(clip, out, fps=30)
+    tumble.save(out, clip, fps=30)
     assert list(np.load(out)["scalar_names"]) == ["knee", "ankle"]
 
 
@@ -36,4 +36,12 @@ def test_arrays_of_other_lengths_are_named(tmp_path):
     file = tmp_path / "longer.pkl"
     file.write_bytes(pickle.dumps(gmr(frames=4)))
     with pytest.raises(ValueError, match=r"gmr have different numbers of frames: .*`dof_pos` \[4, 2\]"):
+        tumble.load(file)
+
+
+def test_wrapped_angles_are_noticed(tmp_path):
+    file = tmp_path / "wrapped.npz"
+    angles = np.array([[6.0, 0.0], [0.2, 0.1], [0.6, 0.2]])
+    np.savez(file, **gmr(dof_pos=angles, joint_names=np.array(["wheel", "ankle"])))
+    with pytest.warns(tumble.InputWarning, match=r"W915.*`wheel` changes by -332° between its keys at 0 and 0.0333"):
         tumble.load(file)

@@ -1,5 +1,7 @@
 //! The scalars of a clip: numbers over time beside its tracks, such as the angles of a robot's joints.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use tumble::{Error, ScalarKeys, TrackError};
 
@@ -85,6 +87,33 @@ impl Motion {
         self.scalars.resize(index, Scalar::default());
         self.scalars.push(scalar);
         Ok(())
+    }
+
+    /// Where an angle without limits first changes by more than half a turn between two keys, as wrapped angles do.
+    pub(crate) fn angle_jump(&self) -> Option<String> {
+        let angles = self.scalar_keys().enumerate().filter(|(index, _)| {
+            let scalar = self.scalar(*index);
+            scalar.kind == ScalarKind::Angle && scalar.limits.is_none()
+        });
+        let jumps = angles.filter_map(|(_, keys)| {
+            let mut steps = keys.keys.windows(2);
+            let key = steps.position(|pair| (pair[1] - pair[0]).abs() > PI)?;
+            Some((keys, key))
+        });
+        let jumps: Vec<(ScalarKeys<'_>, usize)> = jumps.collect();
+        let (keys, key) = jumps.first()?;
+        let degrees = (keys.keys[key + 1] - keys.keys[*key]).to_degrees();
+        let others = match jumps.len() {
+            1 => String::new(),
+            count => format!(" (and {} more joints)", count - 1),
+        };
+        Some(format!(
+            "`{}` changes by {degrees:.0}° between its keys at {} and {} s{others}; if it was wrapped to one turn, unwrap \
+             it (--robot does it for hinges without limits, numpy.unwrap for others)",
+            keys.name,
+            keys.times[*key],
+            keys.times[key + 1]
+        ))
     }
 
     /// The keys of all scalars.

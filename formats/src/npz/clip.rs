@@ -134,6 +134,9 @@ pub(crate) fn read(
     for part in &plan.scalars {
         part.read(archive, (&times, &frames), &mut motion)?;
     }
+    if let Some(message) = motion.angle_jump() {
+        warnings.warn(Code::AngleJumps, || (None, message));
+    }
     motion.robot = recorded_robot(archive, plan, &frames)?;
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
         for track in 0..plan.tracks {

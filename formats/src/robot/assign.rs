@@ -68,7 +68,7 @@ impl Robot {
         // The robot names them.
         loaded
             .warnings
-            .retain(|warning| warning.code != Code::UnnamedJoints);
+            .retain(|warning| !matches!(warning.code, Code::UnnamedJoints | Code::AngleJumps));
         loaded.warnings.extend(warnings.into_list());
         loaded.adjustment = loaded.adjustment.or(Some(Adjustment::Robot));
         Ok(())
