@@ -15,7 +15,7 @@ pub(crate) struct GlobalArguments {
     /// Print errors only: no notes, no warnings; manifests and JSON still have all of them
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// How many threads compute [default: RAYON_NUM_THREADS, else one for each core]
+    /// How many threads compute [default: `RAYON_NUM_THREADS`, else one for each core]
     #[arg(short = 'j', long, value_name = "COUNT", global = true)]
     threads: Option<NonZeroUsize>,
     /// When messages have colours
@@ -32,7 +32,7 @@ pub(crate) const GLOBAL: [&str; 4] = ["quiet", "threads", "color", "progress"];
 /// When messages have colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum ColourChoice {
-    /// on a terminal, unless NO_COLOR is set
+    /// on a terminal, unless `NO_COLOR` is set
     #[default]
     Auto,
     /// always

@@ -20,7 +20,7 @@ pub(crate) enum ProgressStyleChoice {
     /// a bar on a terminal, nothing elsewhere
     #[default]
     Auto,
-    /// a line of JSON each second on standard error: label, done, total, failed, bytes, seconds, seconds_left
+    /// a line of JSON each second on standard error: label, done, total, failed, bytes, seconds, `seconds_left`
     Json,
     /// nothing
     Never,
