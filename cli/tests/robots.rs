@@ -58,8 +58,12 @@ fn line(folder: &Path, line: &str) -> Run {
     succeed(folder, &line.split_whitespace().collect::<Vec<_>>())
 }
 
+fn run_words(folder: &Path, words: &str) -> Run {
+    run(folder, &words.split_whitespace().collect::<Vec<_>>())
+}
+
 fn refused(folder: &Path, words: &str, code: &str) {
-    let run = run(folder, &words.split_whitespace().collect::<Vec<_>>());
+    let run = run_words(folder, words);
     assert_ne!(run.code, 0, "{words}");
     assert!(run.words.contains(code), "{words}: {}", run.words);
 }
@@ -367,15 +371,67 @@ fn options_without_effect_are_refused() {
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --describe -o x.pkl",
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --order wxyz -o x.pkl",
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --output euler -o x.pkl",
-        "eval take.csv --robot robot.xml --dialect gmr --at 0.5 -o x.pkl",
+        "eval take.csv --robot robot.xml --dialect gmr --at keys -o x.pkl",
         "convert take.csv --robot robot.xml --dialect gmr --sequence XYZ -o x.pkl",
         "eval take.csv --robot take.csv --fps 50 -o x.npz",
     ] {
-        let run = run(folder, &words.split(' ').collect::<Vec<_>>());
+        let run = run_words(folder, words);
         assert_ne!(run.code, 0, "{words}: {}", run.words);
     }
     let files = fs::read_dir(folder).unwrap().count();
     assert_eq!(files, 2, "nothing is written");
+}
+
+/// The joints alone, as numbers: an array (frames, joints), and columns with their names.
+#[test]
+fn scalars_are_evaluated_alone() {
+    let folder = folder();
+    let folder = folder.path();
+    let eval = "eval take.csv --fps 50 --robot robot.xml";
+    line(folder, &format!("{eval} --dialect mjlab -o bodies.npz"));
+    let bodies = arrays(&folder.join("bodies.npz"));
+    for (output, array) in [("scalars", "joint_pos"), ("scalar-velocities", "joint_vel")] {
+        line(folder, &format!("{eval} --output {output} -o {output}.npy"));
+        let bytes = fs::read(folder.join(format!("{output}.npy"))).unwrap();
+        let found = tumble_formats::npy::read_numbers(output, &bytes, |_| Ok(())).unwrap();
+        assert_eq!(
+            (found.shape, &found.values),
+            (vec![51, 4], &bodies[array]),
+            "{output}"
+        );
+    }
+    line(folder, &format!("{eval} --output scalars -o scalars.csv"));
+    let text = fs::read_to_string(folder.join("scalars.csv")).unwrap();
+    let heading = "frame,time,left_shoulder,left_elbow,right_shoulder,right_elbow";
+    assert_eq!(text.lines().next(), Some(heading));
+    let last: Vec<f32> = text
+        .lines()
+        .last()
+        .unwrap()
+        .split(',')
+        .map(|cell| cell.parse().unwrap())
+        .collect();
+    let joints = bodies["joint_pos"].last_chunk::<4>().unwrap();
+    let joints = joints.map(|value| value as f32);
+    assert_eq!(last, [&[50.0, 1.0], &joints[..]].concat());
+    // Without the robot the joints have numbers, and wrap as they are.
+    let run = line(
+        folder,
+        "eval take.csv --fps 10 --output scalar-accelerations -o a.csv",
+    );
+    assert!(run.words.contains("4 scalars"), "{}", run.words);
+    fs::write(folder.join("a.tum"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").unwrap();
+    for words in [
+        "eval a.tum --output scalars --fps 30 -o x.npy",
+        "eval take.csv --output scalars --fps 30 --tracks 0 -o x.npy",
+        "eval take.csv --output scalars --fps 30 --order wxyz -o x.npy",
+        "eval take.csv --output scalars --fps 30 --axes parent -o x.npy",
+        "eval take.csv --output scalars --fps 30 -o x.glb",
+    ] {
+        let run = run_words(folder, words);
+        assert_ne!(run.code, 0, "{words}: {}", run.words);
+    }
+    assert!(!folder.join("x.npy").exists());
 }
 
 /// Batches in the layout of another program are resumed, and made again where the robot is another.

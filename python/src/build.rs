@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tumble::{Layout, Tcb, TrackError, TrackSet};
 use tumble_formats::motion::{Joint, Motion, Transform, circle, clock_second};
 
@@ -313,6 +314,45 @@ pub(crate) struct ClipArguments<'a, 'py> {
     pub(crate) velocities: Option<&'a Bound<'py, PyAny>>,
     pub(crate) tangents: Option<&'a Bound<'py, PyAny>>,
     pub(crate) tcb: Option<&'a Bound<'py, PyAny>>,
+}
+
+/// The name, the key times and the values of a scalar.
+pub(crate) type ScalarRow = (String, Vec<f64>, Vec<f64>);
+
+/// Reads scalars: their times and keys by their names.
+pub(crate) fn scalar_keys(scalars: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<ScalarRow>> {
+    let read = |(name, keys): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let name: String = name.extract()?;
+        let refused = || {
+            input(format!(
+                "scalars[{name:?}]: give a pair (times, keys) of two lists of one length"
+            ))
+        };
+        let (times, keys): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+            keys.extract().map_err(|_| refused())?;
+        let (times, keys) = (doubles(&times, "scalars")?, doubles(&keys, "scalars")?);
+        match (times.shape.len(), times.shape == keys.shape) {
+            (1, true) => Ok((name, times.values, keys.values)),
+            _ => Err(refused()),
+        }
+    };
+    scalars.into_iter().flatten().map(read).collect()
+}
+
+/// Adds scalars to a clip.
+pub(crate) fn put_scalars(clip: &mut Motion, scalars: &[ScalarRow]) -> PyResult<()> {
+    for (name, times, keys) in scalars {
+        if clip.set.scalar_named(name).is_some() {
+            return Err(input(format!("scalars: `{name}` is there twice")));
+        }
+        let offset = clip.time_offset as f64;
+        let times: Vec<f64> = times.iter().map(|time| time - offset).collect();
+        let keys: Vec<f32> = keys.iter().map(|&key| key as f32).collect();
+        clip.set
+            .push_scalar(name.as_str(), &times, &keys, &[])
+            .map_err(|error| of_track_since(clip.time_offset, &error))?;
+    }
+    Ok(())
 }
 
 /// Why positions of joints are unknown.

@@ -17,7 +17,7 @@ use crate::errors::expected;
 /// Tracks of rotation keys, with names, a skeleton, translations and scales where there are any.
 ///
 /// `Clip(times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
-/// translations=None, scales=None, velocities=None, tangents=None, tcb=None)`
+/// translations=None, scales=None, velocities=None, tangents=None, tcb=None, scalars=None)`
 ///
 /// `times` are seconds, increasing: `(keys,)` for all tracks, `(tracks, keys)`, or a list with an
 /// array for each track. `keys` are unit quaternions: `(keys, 4)` for one track,
@@ -33,6 +33,9 @@ use crate::errors::expected;
 /// like `keys` with 3 components instead of 4: `translations`, `scales`, and what some methods use:
 /// `velocities` (rad/s, body frame; `hermite`), `tangents` (`(…, 2, 4)`, arriving and leaving, a
 /// second; `gltf-cubic`), `tcb` (tension, continuity, bias; `kochanek-bartels`).
+///
+/// `scalars` are numbers over time beside the tracks, such as the angles of a robot's joints: a dict with a pair
+/// `(times, keys)` for each name.
 ///
 /// >>> import numpy as np, tumble
 /// >>> half = np.sqrt(0.5)

@@ -35,6 +35,7 @@ mod run;
 mod sampler;
 mod samples;
 mod save;
+mod scalars;
 mod shards;
 mod stream;
 mod unpickle;

@@ -135,3 +135,41 @@ def test_resampled_motions_are_those_that_are_expected(shared, rate):
         robot, *keys, order="wxyz", source_fps=30, fps=rate, method="slerp", velocity_at="mass"
     )
     np.testing.assert_allclose(at_mass["body_lin_vel_w"], expected[f"exact{rate}_body_com_lin_vel_w"], atol=1e-5, rtol=1e-5)
+
+
+def test_scalars_are_evaluated_and_kept():
+    half = np.sqrt(0.5)
+    keys = {"knee": ([0.0, 0.5, 1.0], [0.1, 0.4, 0.2]), "grip": ([0.0, 1.0], [0.0, 1.0])}
+    clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, half, half]], names=["root"], scalars=keys)
+    assert list(clip.scalars) == ["knee", "grip"]
+    for name, (times, values) in keys.items():
+        np.testing.assert_array_equal(clip.scalars[name][0], times)
+        np.testing.assert_array_equal(clip.scalars[name][1], np.float32(values))
+    engine = tumble.Engine("cpu")
+    found = engine.scalars(clip, fps=4, method="slerp")
+    np.testing.assert_allclose(found, [[0.1, 0.25, 0.4, 0.3, 0.2], [0, 0.25, 0.5, 0.75, 1]], rtol=1e-6)
+    assert found.dtype == np.float32
+    rates = engine.scalars(clip, at=[0.0, 0.5, 1.0], method="slerp", quantity="velocity", names=["knee"], layout="frame")
+    # At a key that of the interval after it, at the last key that of the last interval.
+    np.testing.assert_allclose(rates, [[0.6], [-0.4], [-0.4]], rtol=1e-6)
+    np.testing.assert_array_equal(engine.scalars(clip, fps=4, quantity="acceleration", method="slerp"), 0)
+    again = pickle.loads(pickle.dumps(clip))
+    assert again == clip
+    np.testing.assert_array_equal(engine.scalars(again, fps=50), engine.scalars(clip, fps=50))
+    with pytest.raises(tumble.InputError, match="has no scalar `knees`"):
+        engine.scalars(clip, fps=4, names=["knees"])
+    with pytest.raises(tumble.InputError, match="value, velocity, acceleration"):
+        engine.scalars(clip, fps=4, quantity="speed")
+    with pytest.raises(tumble.InputError, match="give a pair"):
+        tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": [0.0, 1.0]})
+    with pytest.raises(tumble.InputError, match="does not come after"):
+        tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": ([1.0, 0.0], [0.0, 1.0])})
+
+
+def test_clips_of_robots_files_have_their_scalars(tmp_path):
+    rows = "".join(f"{k / 30},0,1,0,0,0,1,{k * 0.01},{-k * 0.02}\n" for k in range(31))
+    (tmp_path / "take.csv").write_text(rows)
+    with pytest.warns(UserWarning):
+        clip = tumble.load(tmp_path / "take.csv").clip
+    assert list(clip.scalars) == ["joint_0", "joint_1"]
+    np.testing.assert_allclose(tumble.Engine().scalars(clip, fps=60)[0, :3], [0, 0.005, 0.01], atol=1e-6)

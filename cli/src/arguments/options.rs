@@ -303,6 +303,10 @@ fn parents(result: &ResultDescription<'_>) -> Option<String> {
 fn order(result: &ResultDescription<'_>) -> Option<String> {
     let (output, format) = (result.output, result.format);
     match result.kind {
+        ResultKind::Poses if output.scalars().is_some() => Some(format!(
+            "--order is for quaternions, and --output {} has none; leave it out",
+            output.name()
+        )),
         ResultKind::Rotations if !output.is_rotations() => Some(format!(
             "--order is for quaternions, and --output {} has none; leave it out",
             output.name()

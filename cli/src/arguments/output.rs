@@ -3,7 +3,9 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
-use tumble::{Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, Skeleton};
+use tumble::{
+    Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, ScalarQuantity, Skeleton,
+};
 use tumble_formats::quaternion::ComponentOrder;
 
 #[derive(Debug, Clone, Args)]
@@ -44,6 +46,7 @@ enum OutputKind {
     Acceleration,
     Transform,
     World,
+    Scalars(ScalarQuantity),
 }
 
 const QUATERNION: &str = "quaternion";
@@ -70,7 +73,25 @@ fn outputs() -> Vec<NamedValue<OutputKind>> {
         ("transform", poses, OutputKind::Transform),
         ("world", world, OutputKind::World),
     ]);
+    outputs.extend(ScalarQuantity::ALL.map(|quantity| {
+        let help = match quantity {
+            ScalarQuantity::Value => {
+                "(frames, scalars): angles of joints and other numbers of the clip"
+            }
+            ScalarQuantity::Velocity => "their velocities, per second: derivatives of the curves",
+            ScalarQuantity::Acceleration => "their accelerations, per second squared",
+        };
+        (scalar_output(quantity), help, OutputKind::Scalars(quantity))
+    }));
     outputs
+}
+
+fn scalar_output(quantity: ScalarQuantity) -> &'static str {
+    match quantity {
+        ScalarQuantity::Value => "scalars",
+        ScalarQuantity::Velocity => "scalar-velocities",
+        ScalarQuantity::Acceleration => "scalar-accelerations",
+    }
 }
 
 fn encodings(filter: impl Fn(Encoding) -> bool) -> impl Iterator<Item = NamedValue<Encoding>> {
@@ -146,7 +167,10 @@ impl OutputArguments {
         let order = self.major;
         let sequence = self.sequence.unwrap_or(EulerSequence::XYZ);
         match self.output {
-            OutputKind::Quaternion | OutputKind::Transform | OutputKind::World => components,
+            OutputKind::Quaternion
+            | OutputKind::Transform
+            | OutputKind::World
+            | OutputKind::Scalars(_) => components,
             OutputKind::Encoded(encoding) => encoding.with(EncodingOptions { order, sequence }),
             OutputKind::Velocity | OutputKind::Acceleration => Encoding::Vector,
         }
@@ -211,6 +235,7 @@ impl OutputArguments {
             OutputKind::Acceleration => "acceleration",
             OutputKind::Transform => "transform",
             OutputKind::World => "world",
+            OutputKind::Scalars(quantity) => scalar_output(quantity),
         }
     }
 
@@ -253,6 +278,14 @@ impl OutputArguments {
         match self.output {
             OutputKind::Transform => Some(PoseKind::Transform),
             OutputKind::World => Some(PoseKind::World),
+            _ => None,
+        }
+    }
+
+    /// What is written of scalars, if they are.
+    pub(crate) fn scalars(&self) -> Option<ScalarQuantity> {
+        match self.output {
+            OutputKind::Scalars(quantity) => Some(quantity),
             _ => None,
         }
     }

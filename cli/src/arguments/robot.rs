@@ -8,6 +8,7 @@ use tumble::{Engine, Error, FrameRate, SampleTimes};
 use tumble_formats::dialect::write::{RobotMotion, WRITTEN, WrittenDialect, written_joints};
 use tumble_formats::format::Format;
 use tumble_formats::motion::Motion;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::robot::{
     Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, Robot, VelocityPoint,
     VelocitySource, bodies,
@@ -319,7 +320,7 @@ impl DialectArguments {
             }),
             body_order: dialect.has_bodies.then_some(order.name()),
             siblings: self.siblings.name(),
-            quaternion: dialect.quaternions.map(|order| order.name()),
+            quaternion: dialect.quaternions.map(ComponentOrder::name),
             velocities: self.velocities.name(),
             velocity_at: self.velocity_at.unwrap_or(dialect.velocity_at).name(),
             outside_limits: bodies.excesses.len(),

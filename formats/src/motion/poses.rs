@@ -16,6 +16,10 @@ pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "
 /// Names of the components of a pose in the world: position, rotation.
 pub const WORLD: [&str; 7] = ["px", "py", "pz", "x", "y", "z", "w"];
 
+/// Name of the component of a scalar. Its array has no axis of components, and its column in CSV is called after the
+/// scalar alone.
+pub const SCALAR: [&str; 1] = ["value"];
+
 /// The numbers of all tracks at all frames, with the names of their components.
 #[derive(Debug, Clone, Copy)]
 pub struct Poses<'a> {
@@ -54,7 +58,12 @@ impl Poses<'_> {
         numbers.map(move |(index, &number)| (index / width % tracks, index % width, number))
     }
 
-    /// Writes an NPY array of shape (frames, tracks, components). It is float32; with origins it is float64, and they
+    /// Whether the tracks are scalars.
+    fn are_scalars(&self) -> bool {
+        self.components == SCALAR
+    }
+
+    /// Writes an NPY array of shape (frames, tracks, components), of scalars (frames, scalars). It is float32; with origins it is float64, and they
     /// are added to the positions.
     ///
     /// # Errors
@@ -62,13 +71,14 @@ impl Poses<'_> {
     /// components.
     pub fn write_npy(&self, writer: &mut impl Write) -> io::Result<()> {
         self.check()?;
-        let shape = [
+        let all = [
             self.timeline.len(),
             self.set.track_count(),
             self.components.len(),
         ];
+        let shape = if self.are_scalars() { &all[..2] } else { &all };
         if self.has_origins() {
-            writer.write_all(&ArrayHeader::write(&Element::F64, &shape))?;
+            writer.write_all(&ArrayHeader::write(&Element::F64, shape))?;
             return self.each().try_for_each(|(track, component, number)| {
                 let moved = if component < 3 {
                     self.origin(track)[component]
@@ -78,7 +88,7 @@ impl Poses<'_> {
                 writer.write_all(&(f64::from(number) + moved).to_le_bytes())
             });
         }
-        writer.write_all(&ArrayHeader::write(&Element::F32, &shape))?;
+        writer.write_all(&ArrayHeader::write(&Element::F32, shape))?;
         if cfg!(target_endian = "little") {
             return writer.write_all(bytemuck::cast_slice(self.numbers));
         }
@@ -98,7 +108,10 @@ impl Poses<'_> {
         let mut row = vec!["frame".to_owned(), "time".to_owned()];
         for track in 0..tracks {
             let name = self.set.track_name(track);
-            let component = |component| text_cell(&format!("{name}.{component}")).into_owned();
+            let component = |component| match self.are_scalars() {
+                true => text_cell(&name).into_owned(),
+                false => text_cell(&format!("{name}.{component}")).into_owned(),
+            };
             row.extend(self.components.iter().map(component));
         }
         csv.write_record(&row)?;

@@ -213,13 +213,19 @@ impl ChannelMethods {
             return Ok(Vec::new());
         }
         let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span())?;
-        let times: Vec<f64> = timeline.times(0).collect();
-        let frames = SampleTimes::at(times.clone());
+        // Frames are exact where their rate is known, and times in f64 are not.
+        let frames = frames
+            .clone()
+            .spanning(clip.set.time_span().unwrap_or_default());
+        let frames = match frames.resolve(0, None) {
+            Ok(_) => frames,
+            Err(_) => SampleTimes::at(timeline.times(0).collect()),
+        };
         let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
         let methods: Vec<VectorMethod> = (0..count)
             .map(|index| self.vector_method(clip.scalar(index).interpolation))
             .collect();
-        let mut all = vec![0.0; times.len() * count];
+        let mut all = vec![0.0; timeline.len() * count];
         for (first, &method) in methods.iter().enumerate() {
             if methods[..first].contains(&method) {
                 continue;

@@ -121,7 +121,7 @@ impl Robot {
                     JointKind::Slide => ScalarKind::Length,
                     _ => ScalarKind::Angle,
                 },
-                origin: whole_turns(&values)
+                origin: whole_circles(&values)
                     .filter(|_| joint.kind == JointKind::Hinge)
                     .unwrap_or(0.0),
                 limits: joint.limits,
@@ -151,10 +151,10 @@ impl Robot {
 }
 
 /// The whole turns nearest to the middle of some angles; `None` if there are none.
-fn whole_turns(angles: &[f64]) -> Option<f64> {
+fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
-    let turns = (f64::midpoint(low?, high?) / TAU).round();
-    (turns != 0.0).then_some(turns * TAU)
+    let circles = (f64::midpoint(low?, high?) / TAU).round();
+    (circles != 0.0).then_some(circles * TAU)
 }
 
 /// The tracks that move joints, with the names of these.

@@ -280,13 +280,13 @@ fn set_differences(all: &mut [(Configuration, ConfigurationRates)], times: &[f64
         } else {
             sample.clamp(1, last - 1)
         };
-        let turn = [centre.saturating_sub(1), (centre + 1).min(last)];
-        let turned = times[turn[1]] - times[turn[0]];
+        let beside = [centre.saturating_sub(1), (centre + 1).min(last)];
+        let apart = times[beside[1]] - times[beside[0]];
         let angular = |rotation: &dyn Fn(&Configuration) -> DQuat| {
-            let [low, high] = turn.map(|sample| rotation(&values[sample]));
+            let [low, high] = beside.map(|sample| rotation(&values[sample]));
             let step = high * low.inverse();
             let step = if step.w < 0.0 { -step } else { step };
-            rotation_vector::log_of(step, None) / turned
+            rotation_vector::log_of(step, None) / apart
         };
         for (ball, rate) in rates.balls.iter_mut().enumerate() {
             // In the axes of the body.
@@ -552,9 +552,9 @@ impl Sampled {
             .request(set, *rotations, frames)
             .layout(layout)
             .evaluate()?;
-        let mut turns: Vec<Quat> = poses.as_quats().to_vec();
-        continue_signs(&mut turns, tracks);
-        sampled.rotations = turns.iter().map(Quat::to_array).collect();
+        let mut rows: Vec<Quat> = poses.as_quats().to_vec();
+        continue_signs(&mut rows, tracks);
+        sampled.rotations = rows.iter().map(Quat::to_array).collect();
         let rate = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
             ..*rotations

@@ -173,6 +173,7 @@ class Clip:
         velocities: _Arrays | Sequence[_Array | None] | None = None,
         tangents: _Arrays | Sequence[_Array | None] | None = None,
         tcb: _Arrays | Sequence[_Array | None] | None = None,
+        scalars: dict[str, tuple[ArrayLike, ArrayLike]] | None = None,
     ) -> Clip: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -188,6 +189,8 @@ class Clip:
     def offsets(self) -> _Places | None: ...
     @property
     def origins(self) -> NDArray[np.float64] | None: ...
+    @property
+    def scalars(self) -> dict[str, tuple[NDArray[np.float64], _Places]]: ...
     @property
     def rate(self) -> Fraction | None: ...
     @property
@@ -501,6 +504,28 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> dict[str, _Single]: ...
+    def scalars(
+        self,
+        clip: Clip,
+        *,
+        quantity: Literal["value", "velocity", "acceleration"] = "value",
+        names: Sequence[str] | None = None,
+        layout: _Layout = "track",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Outside | None = None,
+        after: _Outside | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> _Single: ...
     @overload
     def velocity(
         self,

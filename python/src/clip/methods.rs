@@ -11,7 +11,7 @@ use pyo3::types::{PyDict, PyTuple};
 use tumble::{Channel, Layout};
 
 use crate::arrays::{ListArgument, Order};
-use crate::build::{ClipArguments, ClipKeys, KeysLayout};
+use crate::build::{ClipArguments, ClipKeys, KeysLayout, put_scalars, scalar_keys};
 use crate::clip::{Clip, counted};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{guarded, input};
@@ -32,7 +32,7 @@ impl Clip {
     #[new]
     #[pyo3(signature = (
         times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
-        translations=None, scales=None, velocities=None, tangents=None, tcb=None
+        translations=None, scales=None, velocities=None, tangents=None, tcb=None, scalars=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn new(
@@ -49,6 +49,7 @@ impl Clip {
         velocities: Option<&Bound<'_, PyAny>>,
         tangents: Option<&Bound<'_, PyAny>>,
         tcb: Option<&Bound<'_, PyAny>>,
+        scalars: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         guarded(|| {
             let names = names.map(|names| names.0);
@@ -81,9 +82,11 @@ impl Clip {
             };
             let layout = layout.unwrap_or(Layout::TrackMajor);
             let parts = arguments.read(tracks, names.as_deref(), layout)?;
+            let scalars = scalar_keys(scalars)?;
             let motion = work(times.py(), arrays.key_count(), move || {
                 let mut motion = arrays.clip(names.as_deref())?;
                 parts.put_into(&mut motion, order)?;
+                put_scalars(&mut motion, &scalars)?;
                 motion.name = name;
                 Ok(motion)
             })?;
@@ -281,6 +284,35 @@ impl Clip {
         let numbers: Vec<f32> = keys.flat_map(|key| order.of_xyzw(key.to_array())).collect();
         let count = numbers.len() / 4;
         PyArray1::from_vec(py, numbers).reshape([count, 4])
+    }
+
+    /// The scalars, such as the angles of a robot's joints, by their names: the times of their keys (keys,), seconds, and
+    /// their values (keys,), float32 (float64 where whole turns were taken off an angle).
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": ([0.0, 1.0], [0.5, 0.25])})
+    /// >>> clip.scalars["knee"][1]
+    /// array([0.5 , 0.25], dtype=float32)
+    #[getter]
+    fn scalars<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (motion, all) = (&self.motion, PyDict::new(py));
+        for index in 0..motion.set.scalar_count() {
+            let Some(scalar) = motion.set.scalar(index) else {
+                continue;
+            };
+            let offset = motion.time_offset as f64;
+            let times: Vec<f64> = scalar.times.iter().map(|time| time + offset).collect();
+            let origin = motion.scalar(index).origin;
+            let values = match origin == 0.0 {
+                true => PyArray1::from_slice(py, scalar.keys).into_any(),
+                false => {
+                    let values = scalar.keys.iter().map(|&key| f64::from(key) + origin);
+                    PyArray1::from_vec(py, values.collect()).into_any()
+                }
+            };
+            all.set_item(scalar.name, (PyArray1::from_vec(py, times), values))?;
+        }
+        Ok(all)
     }
 
     /// The translation keys of a track, by its index or name: their times (keys,), seconds, and

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyString, PyTuple};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::{
     Axes, Device, Encoding, EncodingOptions, Interpolation, Layout, MatrixOrder, Quantity,
@@ -20,13 +20,14 @@ use crate::engine::{
 use crate::errors::{guarded, input, of_engine};
 use crate::evaluate::OutputForm;
 use crate::follow;
-use crate::names::option_named;
+use crate::names::{option_named, option_of};
 use crate::options::{EvaluationKeywords, method_named, request_arrays, samples_of};
 use crate::output::{encoding_named, quaternions_of};
 use crate::poses;
 use crate::robot::{self, BodyNames, JointKeys, Robot};
 use crate::run::{interruptible, stoppable};
 use crate::samples;
+use crate::scalars;
 use crate::stream::Chunks;
 use crate::verify::Verification;
 
@@ -233,6 +234,34 @@ impl Engine {
             velocity_at,
         };
         robot::bodies(self, robot, &keys, &names, options)
+    }
+
+    /// The scalars of a clip, such as the angles of a robot's joints, at every sample: float32, (scalars, frames), with
+    /// `layout="frame"` (frames, scalars). `quantity`: "value", "velocity" (per second: the derivative of the curve) or
+    /// "acceleration". `names` chooses scalars, in this order; the default are all, in the order of `clip.scalars`. Other
+    /// keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": ([0.0, 1.0], [0.5, 0.25])})
+    /// >>> tumble.Engine().scalars(clip, fps=2, method="slerp")
+    /// array([[0.5  , 0.375, 0.25 ]], dtype=float32)
+    #[pyo3(signature = (clip, *, quantity="value", names=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, quantity='value', names=None, layout='track')")]
+    fn scalars<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        quantity: &str,
+        names: Option<ListArgument<String>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let quantity = option_of(PyString::new(clip.py(), quantity).as_any(), "quantity")?;
+        let names = names.map(|names| names.0);
+        scalars::evaluate(
+            self,
+            clip,
+            (quantity, names, layout_named(layout)?),
+            options,
+        )
     }
 
     /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,

@@ -39,6 +39,7 @@ Examples:
   tumble eval data/pendulum.dat -m slerp --fps 30000/1001 -o out.csv
   tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
   tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
+  tumble eval lafan1/walk.csv --fps 50 --output scalar-velocities -o joints.csv
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
   tumble eval walks -o results --resume        a directory tree; skips results that are done
   find . -name '*.dat' | tumble eval --files-from - -o results
@@ -169,6 +170,7 @@ impl Arguments {
             }
         } else {
             kinds.push(match self.output.poses() {
+                _ if self.output.scalars().is_some() => ResultKind::Poses,
                 Some(_) => ResultKind::Poses,
                 None => ResultKind::Rotations,
             });

@@ -5,13 +5,13 @@ use std::borrow::Cow;
 
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
-use tumble::{Engine, Error, Layout, Quantity, SampleTimes, Timeline};
+use tumble::{Engine, Error, Layout, Quantity, SampleTimes, ScalarQuantity, Timeline, TrackSet};
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
-use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
+use tumble_formats::poses::{Poses, SCALAR, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::Samples;
 use tumble_formats::world::{HierarchyError, world};
@@ -124,6 +124,7 @@ impl EvaluationJob<'_> {
         let kind = match output.poses() {
             _ if self.is_baked(target) => ResultKind::Baked,
             _ if self.is_motion(clips, target) => ResultKind::Motion,
+            _ if output.scalars().is_some() => ResultKind::Poses,
             Some(_) => ResultKind::Poses,
             None => ResultKind::Rotations,
         };
@@ -158,6 +159,9 @@ impl EvaluationJob<'_> {
                 format!("{name}: --output needs a single animation; choose one with --animation");
             return Err(Failure::usage(message));
         };
+        if let Some(quantity) = output.scalars() {
+            return self.scalars(name, clip, quantity, end_frame, target);
+        }
         if let (ResultKind::Poses, Some(poses)) = (kind, output.poses()) {
             return self.poses(name, clip, poses, end_frame, target);
         }
@@ -651,6 +655,75 @@ impl EvaluationJob<'_> {
         let method =
             (methods.method_of(clip)).map_or("each channel's method", |method| method.name);
         Ok(self.evaluated(extent, method, written, order))
+    }
+
+    /// The scalars of a clip, `[frame][scalar]`, or how fast they change.
+    fn scalars(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        quantity: ScalarQuantity,
+        end_frame: EndFrame,
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
+        let on = format!("--output {}", self.arguments.output.name());
+        let options = [("tracks", "--tracks"), ("explain_route", "--explain-route")];
+        self.arguments
+            .command_line
+            .refuse(&options, &on, "it has all scalars; leave it out")?;
+        let count = clip.set.scalar_count();
+        if count == 0 {
+            return Err(Failure::usage(format!(
+                "{name}: has no scalars, such as the joints of a robot; leave out --output {}",
+                self.arguments.output.name()
+            )));
+        }
+        let samples = self.clip_frames(clip, end_frame, name)?;
+        self.note_frames(std::slice::from_ref(&samples), target);
+        if samples.is_held() && quantity != ScalarQuantity::Value {
+            return Err(Failure::usage(format!(
+                "{name}: a number that is held has no velocity; leave times in gaps out (--in-gaps leave-out)"
+            )));
+        }
+        let timeline = samples.written_times(clip, name)?;
+        let methods = self.curve().channel_methods();
+        // Names of the rows.
+        let mut set = TrackSet::new();
+        for index in 0..count {
+            let scalar = clip.set.scalar(index).map_or("", |scalar| scalar.name);
+            set.push(scalar, &[0.0], &[Quat::IDENTITY])
+                .map_err(|error| Failure::evaluating(name, &error.into()))?;
+        }
+        room::in_memory(name, &set, &samples.frames, 1)?;
+        let mut all = vec![samples.frames.clone()];
+        all.extend(samples.end.map(|end| SampleTimes::at(vec![end.at])));
+        let mut numbers = Vec::new();
+        for frames in &all {
+            let device = &mut *self.device;
+            let found = device.choose(count * timeline.len()).and_then(|()| {
+                device.work(|engine| methods.scalars(engine, clip, frames, quantity))
+            });
+            numbers.extend(found.map_err(|error| Failure::evaluating(name, &error))?);
+        }
+        if quantity == ScalarQuantity::Value {
+            for (index, number) in numbers.iter_mut().enumerate() {
+                *number = (f64::from(*number) + clip.scalar(index % count).origin) as f32;
+            }
+        }
+        let rows = Poses {
+            set: &set,
+            timeline: &timeline,
+            time_offset: clip.time_offset,
+            components: &SCALAR,
+            numbers: &numbers,
+            origins: &[],
+        };
+        let write = target.results()?.poses;
+        let written = target.prepare(|out| write(&rows, out))?;
+        let method = self.arguments.method.to_string();
+        let extent = (count, timeline.len(), span(&timeline));
+        let counted = words::count(count, "scalar");
+        Ok(self.evaluated_as(&counted, extent, &method, written, None))
     }
 
     /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each of
