@@ -66,9 +66,10 @@ impl IntervalPlan {
         }
     }
 
-    /// Whether there are so few intervals that a lane for each sample is faster.
+    /// Whether there are so few intervals that a lane for each sample is faster. Samples that are all at keys need no
+    /// lane.
     pub(crate) fn is_short(&self) -> bool {
-        self.lane_count < MIN_LANES || self.curve == KeyCurve::TwoKeys
+        (1..MIN_LANES).contains(&self.lane_count) || self.curve == KeyCurve::TwoKeys
     }
 
     /// Finds the intervals with these samples of a frame plan with this number, unless they are found already.
@@ -400,7 +401,7 @@ mod tests {
         let (mut marked, mut all) = (0, 0);
         for (method, rate) in [SLERP, BESSEL_OVERHAUSER, CATMULL_ROM]
             .into_iter()
-            .flat_map(|method| [24, 60, 97, 240].map(|rate| (method, rate)))
+            .flat_map(|method| [24, 30, 60, 97, 240].map(|rate| (method, rate)))
         {
             let interpolation = Interpolation::from(method);
             let frames = SampleTimes::fps(rate);

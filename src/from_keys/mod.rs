@@ -10,6 +10,7 @@ use glam::Vec4;
 
 use crate::curve::options::KeySigns;
 use crate::fit::tangent_weights::WeightRule;
+use crate::math::quaternion::dot;
 use crate::prepare::preparation::SetRequest;
 use crate::shader::{Form, LONGEST_STEP, SMALL_SQUARED_EXTENT};
 use crate::tracks::set::TrackSet;
@@ -75,7 +76,7 @@ fn is_below(request: &SetRequest<'_>, keys: usize, limit: usize) -> bool {
 /// Whether more than two thirds of the keys are within a small angle of the next. With fewer, preparing all segments
 /// takes no longer.
 fn has_small_steps(set: &TrackSet) -> bool {
-    let (small, probes) = probed(set, |[step]| step.length_squared() <= LONGEST_STEP);
+    let (small, probes) = probed(set, |[step]| square(step) <= LONGEST_STEP);
     3 * small > 2 * probes
 }
 
@@ -85,20 +86,20 @@ fn has_small_curves(set: &TrackSet) -> bool {
     let is_small = |steps: [Vec4; 3]| {
         let [before, step, after] = steps;
         let vectors = [before + step, 4.0 * step - before - after, step + after];
-        let squared_extent: f32 = vectors.map(Vec4::length_squared).iter().sum();
-        let longest = steps
-            .map(Vec4::length_squared)
-            .into_iter()
-            .fold(0.0, f32::max);
+        let squared_extent: f32 = vectors.map(square).iter().sum();
+        let longest = steps.map(square).into_iter().fold(0.0, f32::max);
         squared_extent <= 36.0 * SMALL_SQUARED_EXTENT && longest <= LONGEST_STEP
     };
     let (small, probes) = probed(set, is_small);
     5 * small > 4 * probes
 }
 
+fn square(vector: Vec4) -> f32 {
+    dot(vector.to_array(), vector.to_array())
+}
+
 /// Of how many out of at most 64 places the steps between neighbouring keys are small, and the number of places. Only
 /// speed depends on this; the bits do not.
-#[allow(clippy::disallowed_methods)] // as it says
 fn probed<const STEPS: usize>(
     set: &TrackSet,
     is_small: impl Fn([Vec4; STEPS]) -> bool,
@@ -112,7 +113,11 @@ fn probed<const STEPS: usize>(
             let mut from = Vec4::from(keys[0]);
             let steps = std::array::from_fn(|i| {
                 let to = Vec4::from(keys[i + 1]);
-                let to = if from.dot(to) < 0.0 { -to } else { to };
+                let to = if dot(from.to_array(), to.to_array()) < 0.0 {
+                    -to
+                } else {
+                    to
+                };
                 to - std::mem::replace(&mut from, to)
             });
             probes += 1;
