@@ -1,7 +1,8 @@
 // The border to the WebAssembly module: clips, and what they are at times. `index.js` and `node.js` say where
 // the module lies.
 
-const CALLS = { about: 0, unpack: 1, read: 2, sample: 3, keys: 4, free: 5 };
+const CALLS = { about: 0, unpack: 1, read: 2, sample: 3, keys: 4, free: 5, sampler: 6, freeSampler: 7 };
+const EVERY_TRACK = 0xffffffff;
 const text = new TextEncoder();
 const words = new TextDecoder();
 
@@ -23,10 +24,9 @@ class Module {
 
   /** Makes a call; its answer's JSON, with a property for each array. */
   call(name, header, numbers = new Uint8Array(0)) {
-    if (this.broken) throw new TumbleError(`${this.broken}; load the package's engine anew (load())`);
     const json = text.encode(JSON.stringify(header));
     const bytes = json.length + numbers.byteLength;
-    try {
+    return this.attempt(() => {
       const at = this.exports.tumble_input(bytes) >>> 0;
       if (at === 0) throw new TumbleError(`there is no memory for ${bytes} bytes of input`);
       const memory = new Uint8Array(this.exports.memory.buffer, at, bytes);
@@ -34,6 +34,24 @@ class Module {
       memory.set(numbers, json.length);
       const isDone = this.exports.tumble_call(CALLS[name], json.length) === 1;
       return this.answer(isDone);
+    });
+  }
+
+  /** Copies the rotations of a sampler at a time, of a track or of every one, to an array of their length. */
+  pose(sampler, track, time, out) {
+    return this.attempt(() => {
+      const at = this.exports.tumble_pose(sampler, track, time) >>> 0;
+      if (at === 0) return this.answer(false);
+      out.set(new Float32Array(this.exports.memory.buffer, at, out.length));
+      return out;
+    });
+  }
+
+  /** Runs what calls the instance, which must not have stopped before. */
+  attempt(run) {
+    if (this.broken) throw new TumbleError(`${this.broken}; load the package's engine anew (load())`);
+    try {
+      return run();
     } catch (error) {
       if (error instanceof TumbleError) throw error;
       // An instance that stopped in the middle of a call is in no state to be called again.
@@ -156,9 +174,19 @@ function packed(tracks, { name = null, isWorld = false } = {}) {
   return bytes;
 }
 
-const OPTIONS = [
-  "method", "layout", "axes", "ends", "path", "speed", "before", "after", "tension", "continuity", "bias",
-];
+const CURVE_OPTIONS = ["method", "ends", "path", "speed", "before", "after", "tension", "continuity", "bias"];
+const OPTIONS = [...CURVE_OPTIONS, "layout", "axes"];
+
+/** The header of a call for a quantity with these options, of which there are those in a list. */
+function headerOf(quantity, options, known) {
+  const header = { quantity };
+  for (const [name, value] of Object.entries(options)) {
+    if (!known.includes(name)) throw new TumbleError(`there is no option \`${name}\`; there are ${known.join(", ")}`);
+    // Digits are kept as text: JSON's readers may round a number in its last place.
+    if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
+  }
+  return header;
+}
 
 /** Tracks that belong together, ready to be sampled. */
 export class Clip {
@@ -168,7 +196,7 @@ export class Clip {
   /** For this package alone: clips are made by `Tumble.clip`, `Tumble.read` and `Tumble.unpack`. */
   constructor(module, found) {
     this.#module = module;
-    this.#handle = { module, clip: found.clip, isFreed: false };
+    this.#handle = { module, call: "free", header: { clip: found.clip }, isFreed: false };
     this.name = found.name;
     this.names = found.names;
     this.parents = found.parents;
@@ -182,16 +210,11 @@ export class Clip {
 
   #call(name, header, bytes) {
     if (this.#handle.isFreed) throw new TumbleError("the clip was freed");
-    return this.#module.call(name, { clip: this.#handle.clip, ...header }, bytes);
+    return this.#module.call(name, { ...this.#handle.header, ...header }, bytes);
   }
 
   #sample(quantity, times, options) {
-    const header = { quantity };
-    for (const [name, value] of Object.entries(options)) {
-      if (!OPTIONS.includes(name)) throw new TumbleError(`there is no option \`${name}\`; there are ${OPTIONS.join(", ")}`);
-      // Digits are kept as text: JSON's readers may round a number in its last place.
-      if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
-    }
+    const header = headerOf(quantity, options, OPTIONS);
     let list;
     if (isNumbers(times)) {
       list = numbers(times, Float64Array, 1, "times");
@@ -234,6 +257,11 @@ export class Clip {
     return this.#sample("matrices", times, options);
   }
 
+  /** Rotations at one time after another, for what is drawn or controlled now. */
+  sampler(options = {}) {
+    return new Sampler(this.#module, this.#call("sampler", headerOf("pose", options, CURVE_OPTIONS)));
+  }
+
   /** The keys of a track. */
   keys(track) {
     const found = this.#call("keys", { track });
@@ -242,18 +270,64 @@ export class Clip {
 
   /** Gives its memory back; the clip is of no use then. */
   free() {
-    if (this.#handle.isFreed) return;
-    forgotten?.unregister(this.#handle);
-    release(this.#handle);
+    free(this.#handle);
   }
+}
+
+/** Evaluates a clip's rotations at one time after another. */
+export class Sampler {
+  #module;
+  #handle;
+
+  /** For this package alone: samplers are made by `Clip.sampler`. */
+  constructor(module, { sampler, tracks }) {
+    this.#module = module;
+    this.#handle = { module, call: "freeSampler", header: { sampler }, isFreed: false };
+    this.tracks = tracks;
+    forgotten?.register(this, this.#handle, this.#handle);
+  }
+
+  #rotations(track, time, out, length) {
+    if (this.#handle.isFreed) throw new TumbleError("the sampler was freed");
+    if (typeof time !== "number") throw new TumbleError(`a time is a number of seconds, not ${String(time)}`);
+    const isArray = out instanceof Float32Array;
+    if (!isArray || out.length !== length) {
+      throw new TumbleError(`out is a Float32Array of ${length} numbers, not ${isArray ? `of ${out.length}` : typeof out}`);
+    }
+    return this.#module.pose(this.#handle.header.sampler, track, time, out);
+  }
+
+  /** The rotations of all tracks at a time. */
+  pose(time, out = new Float32Array(4 * this.tracks)) {
+    return this.#rotations(EVERY_TRACK, time, out, 4 * this.tracks);
+  }
+
+  /** The rotation of a track at a time. */
+  sample(track, time, out = new Float32Array(4)) {
+    if (!Number.isInteger(track) || track < 0 || track >= this.tracks) {
+      throw new TumbleError(`there is no track ${String(track)} of ${this.tracks}; they count from 0`);
+    }
+    return this.#rotations(track, time, out, 4);
+  }
+
+  /** Gives its memory back; the sampler is of no use then. */
+  free() {
+    free(this.#handle);
+  }
+}
+
+function free(handle) {
+  if (handle.isFreed) return;
+  forgotten?.unregister(handle);
+  release(handle);
 }
 
 function release(handle) {
   handle.isFreed = true;
-  if (!handle.module.broken) handle.module.call("free", { clip: handle.clip });
+  if (!handle.module.broken) handle.module.call(handle.call, handle.header);
 }
 
-// Clips that nobody has any more give their memory back when the garbage is collected.
+// Clips and samplers that nobody has any more give their memory back when the garbage is collected.
 const forgotten = globalThis.FinalizationRegistry && new FinalizationRegistry(release);
 
 /** The engine in this page, worker or process. */

@@ -7,12 +7,10 @@ export type Method =
 /** The order of results: all samples of the first track first, or all tracks of the first sample. */
 export type Layout = "track" | "frame";
 
-/** How clips are sampled. */
-export interface SampleOptions {
+/** The curve between keys and outside them. */
+export interface CurveOptions {
   /** Default: `authored`, the method that the file gives each channel; bessel-overhauser where it gives none. */
   method?: Method;
-  /** Default: `track`. */
-  layout?: Layout;
   /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
   /** Which way to rotate between neighbouring keys. Default: `shortest`. */
@@ -29,6 +27,12 @@ export interface SampleOptions {
   continuity?: number;
   /** kochanek-bartels: 0 is neutral, 1 uses the velocity of the interval before a key, -1 of the one after it. Default: 0. */
   bias?: number;
+}
+
+/** How clips are sampled. */
+export interface SampleOptions extends CurveOptions {
+  /** Default: `track`. */
+  layout?: Layout;
 }
 
 /** How angular velocities and accelerations are sampled. */
@@ -156,8 +160,25 @@ export class Clip {
   world(times: Times, options?: SampleOptions): World;
   /** A matrix for each joint that takes it to the world. */
   matrices(times: Times, options?: SampleOptions): Matrices;
+  /** Rotations at one time after another, such as the frames of a game; the clip may be freed before it. */
+  sampler(options?: CurveOptions): Sampler;
   /** The keys of a track, which counts from 0. */
   keys(track: number): Keys;
+  /** Frees its memory; else the garbage collector does, some time. */
+  free(): void;
+}
+
+/**
+ * Evaluates a clip's rotations at one time after another. They have the bits of `Clip.sample`, except that a rotation
+ * may have the other sign: there neighbouring samples have the nearer one.
+ */
+export class Sampler {
+  private constructor();
+  readonly tracks: number;
+  /** `x y z w` of every track at a time, seconds. `out`: an array of 4 × tracks numbers that is filled and returned. */
+  pose(time: number, out?: Float32Array): Float32Array;
+  /** `x y z w` of a track, which counts from 0. */
+  sample(track: number, time: number, out?: Float32Array): Float32Array;
   /** Frees its memory; else the garbage collector does, some time. */
   free(): void;
 }

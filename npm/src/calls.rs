@@ -1,9 +1,10 @@
-//! The calls, by their numbers, and the clips that JavaScript has handles of.
+//! The calls, by their numbers, and the clips and samplers that JavaScript has handles of.
 
+use glam::Quat;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use tumble::{Channel, Device, Engine, METHODS};
+use tumble::{Channel, Device, Engine, METHODS, Sampler};
 use tumble_formats::motion::Motion;
 use tumble_formats::packed;
 #[cfg(feature = "files")]
@@ -17,6 +18,20 @@ use crate::sampling::{self, SampleCall};
 pub(crate) struct Calls {
     engine: Option<Engine>,
     clips: Vec<Option<Motion>>,
+    samplers: Vec<Option<KeptSampler>>,
+}
+
+/// A sampler, and room for the pose that it gave last.
+struct KeptSampler {
+    sampler: Sampler,
+    pose: Vec<Quat>,
+}
+
+/// A sampler that a call is about.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SamplerHeader {
+    sampler: usize,
 }
 
 /// A clip that a call is about.
@@ -59,6 +74,8 @@ impl Calls {
             3 => self.sample(&read_header(header)?, &numbers),
             4 => self.keys(&read_header(header)?),
             5 => self.free(&read_header(header)?),
+            6 => self.sampler(&read_header(header)?),
+            7 => self.free_sampler(&read_header(header)?),
             _ => Err(Fault::new(format!("there is no call {call}"))),
         }
     }
@@ -104,11 +121,50 @@ impl Calls {
     }
 
     fn sample(&mut self, call: &SampleCall, numbers: &[u8]) -> Result<Answer, Fault> {
-        let engine = match &mut self.engine {
-            Some(engine) => engine,
-            none => none.insert(Engine::new(Device::Cpu)?),
-        };
+        let engine = made(&mut self.engine)?;
         sampling::sample(engine, find(&self.clips, call.clip)?, call, numbers)
+    }
+
+    /// Makes a sampler of a clip.
+    fn sampler(&mut self, call: &SampleCall) -> Result<Answer, Fault> {
+        let engine = made(&mut self.engine)?;
+        let sampler = sampling::sampler(engine, find(&self.clips, call.clip)?, call)?;
+        let tracks = sampler.track_count();
+        let pose = vec![Quat::IDENTITY; tracks.max(1)];
+        let slot = put(&mut self.samplers, KeptSampler { sampler, pose });
+        Ok(Answer::new(
+            json!({"sampler": slot, "tracks": tracks}),
+            Vec::new(),
+        ))
+    }
+
+    /// The rotations of a sampler at a time: of one track, or of every one. Nothing is allocated.
+    pub(crate) fn pose(
+        &mut self,
+        sampler: usize,
+        track: Option<usize>,
+        time: f64,
+    ) -> Result<&[Quat], Fault> {
+        let found = self.samplers.get_mut(sampler).and_then(Option::as_mut);
+        let KeptSampler { sampler, pose } = found.ok_or_else(|| no_sampler(sampler))?;
+        match track {
+            Some(track) => {
+                pose[0] = sampler.sample(track, time)?;
+                Ok(&pose[..1])
+            }
+            None => {
+                let all = &mut pose[..sampler.track_count()];
+                sampler.pose(time, all)?;
+                Ok(all)
+            }
+        }
+    }
+
+    fn free_sampler(&mut self, of: &SamplerHeader) -> Result<Answer, Fault> {
+        let slot = self.samplers.get_mut(of.sampler);
+        let freed = slot.and_then(Option::take);
+        freed.ok_or_else(|| no_sampler(of.sampler))?;
+        Ok(Answer::new(json!({}), Vec::new()))
     }
 
     /// The keys of a track.
@@ -160,15 +216,32 @@ impl Calls {
             "keys": set.key_count(),
             "rate": clip.rate.map(|rate| rate.to_string()),
         });
-        let free = self.clips.iter().position(Option::is_none);
-        let slot = free.unwrap_or(self.clips.len());
-        if free.is_none() {
-            self.clips.push(None);
-        }
-        self.clips[slot] = Some(clip);
-        found["clip"] = slot.into();
+        found["clip"] = put(&mut self.clips, clip).into();
         found
     }
+}
+
+/// The engine, which is made for the first call that needs it.
+fn made(engine: &mut Option<Engine>) -> Result<&Engine, Fault> {
+    Ok(match engine {
+        Some(engine) => engine,
+        none => none.insert(Engine::new(Device::Cpu)?),
+    })
+}
+
+/// Puts a value in the first free slot; returns the slot.
+fn put<T>(slots: &mut Vec<Option<T>>, value: T) -> usize {
+    let free = slots.iter().position(Option::is_none);
+    let slot = free.unwrap_or(slots.len());
+    if free.is_none() {
+        slots.push(None);
+    }
+    slots[slot] = Some(value);
+    slot
+}
+
+fn no_sampler(sampler: usize) -> Fault {
+    Fault::new(format!("there is no sampler {sampler}; it was freed"))
 }
 
 fn find(clips: &[Option<Motion>], clip: usize) -> Result<&Motion, Fault> {

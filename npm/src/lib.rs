@@ -1,8 +1,9 @@
 //! Tumble for JavaScript: the WebAssembly module behind the npm package `tumble`.
 //!
 //! A call is a number (`calls`), a header in JSON and bytes behind it; its answer is JSON and arrays of
-//! numbers. JavaScript writes the call where [`tumble_input`] says, and copies the answer from where it lies:
-//! five functions and no generated code. `npm/package/core.js` is the other side.
+//! numbers. JavaScript writes the call where [`tumble_input`] says, and copies the answer from where it lies. Only the
+//! poses of samplers, of which programs want many, come without JSON ([`tumble_pose`]):
+//! six functions and no generated code. `npm/package/core.js` is the other side.
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -63,6 +64,23 @@ pub extern "C" fn tumble_call(call: u32, header_bytes: usize) -> u32 {
                 border.answer = fault.into_answer();
                 0
             }
+        }
+    })
+}
+
+/// The track that stands for all of them.
+const EVERY_TRACK: u32 = u32::MAX;
+
+/// Where the rotations of a sampler at a time lie, four f32 each: of one track, or of every one if `track` is
+/// 2^32 - 1. 0 where the answer says why there are none.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_pose(sampler: usize, track: u32, time: f64) -> *const u8 {
+    let track = (track != EVERY_TRACK).then_some(track as usize);
+    BORDER.with_borrow_mut(|border| match border.calls.pose(sampler, track, time) {
+        Ok(pose) => pose.as_ptr().cast(),
+        Err(fault) => {
+            border.answer = fault.into_answer();
+            std::ptr::null()
         }
     })
 }

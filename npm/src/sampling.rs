@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::json;
 use tumble::{
     Axes, Engine, FrameRate, InterpolationOption, InterpolationOptions, Layout, OptionValue,
-    Quantity, SampleTimes, UnknownNameError,
+    Quantity, SampleTimes, Sampler, UnknownNameError,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
@@ -82,6 +82,13 @@ impl SampleCall {
         Ok(options)
     }
 
+    fn methods(&self) -> Result<ChannelMethods, Fault> {
+        Ok(ChannelMethods {
+            method: self.method()?,
+            options: self.options()?,
+        })
+    }
+
     fn frames(&self, numbers: &[f64]) -> Result<SampleTimes, Fault> {
         let Some(rate) = &self.rate else {
             return Ok(SampleTimes::at(numbers.to_vec()));
@@ -144,10 +151,7 @@ pub(crate) fn sample(
             bytes / 1e6
         )));
     }
-    let methods = ChannelMethods {
-        method: call.method()?,
-        options: call.options()?,
-    };
+    let methods = call.methods()?;
     let samples = timeline.len();
     let mut arrays = match call.quantity {
         Sampled::Velocities | Sampled::Accelerations => {
@@ -189,6 +193,12 @@ pub(crate) fn sample(
         json!({"tracks": tracks, "samples": samples}),
         arrays,
     ))
+}
+
+/// A sampler of a clip's rotations.
+pub(crate) fn sampler(engine: &Engine, clip: &Motion, call: &SampleCall) -> Result<Sampler, Fault> {
+    let interpolations = call.methods()?.interpolations(clip);
+    Ok(engine.upload(&clip.set, interpolations)?.sampler()?)
 }
 
 fn pose(samples: Samples, call: &SampleCall, tracks: usize) -> Vec<(&'static str, Array)> {

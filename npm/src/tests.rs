@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
-use tumble::{Device, Engine, METHODS, SampleTimes, TrackSet};
+use tumble::{Device, Engine, Interpolation, METHODS, SampleTimes, TrackSet, WrapMode, method};
 use tumble_formats::motion::Motion;
 use tumble_formats::packed;
 
@@ -81,6 +81,41 @@ fn samples_have_the_engine_s_bits_in_both_orders() {
             }
         }
     }
+}
+
+/// Poses and single tracks, of a sampler that outlives its clip.
+#[test]
+fn samplers_have_the_bits_of_listed_times() {
+    let (clip, mut calls) = (clip(), Calls::default());
+    call(&mut calls, 1, json!({}), packed::to_bytes(&clip)).unwrap();
+    let header = json!({"clip": 0, "quantity": "pose", "method": "c2", "after": "loop"});
+    let made = call(&mut calls, 6, header, Vec::new()).unwrap();
+    assert_eq!(
+        (&json(&made)["sampler"], &json(&made)["tracks"]),
+        (&json!(0), &json!(3))
+    );
+    call(&mut calls, 5, json!({"clip": 0}), Vec::new()).unwrap();
+    let times = [0.1, 2.9, -1.0, 7.3];
+    let interpolation = Interpolation {
+        after: WrapMode::Loop,
+        ..method::C2.into()
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let frames = SampleTimes::at(times.to_vec());
+    let right = engine.evaluate(&clip.set, interpolation, &frames).unwrap();
+    for (i, time) in times.into_iter().enumerate() {
+        let expected: Vec<Quat> = (0..3).map(|track| right.get(track, i).unwrap()).collect();
+        assert_eq!(calls.pose(0, None, time).unwrap(), expected);
+        assert_eq!(calls.pose(0, Some(2), time).unwrap(), &expected[2..]);
+    }
+    let refused = |found: Result<&[Quat], crate::answer::Fault>| found.unwrap_err().message;
+    assert!(refused(calls.pose(0, None, f64::NAN)).contains("NaN"));
+    assert!(refused(calls.pose(0, Some(3), 0.0)).contains('3'));
+    call(&mut calls, 7, json!({"sampler": 0}), Vec::new()).unwrap();
+    let words = "there is no sampler 0; it was freed";
+    assert_eq!(refused(calls.pose(0, None, 0.0)), words);
+    let again = call(&mut calls, 7, json!({"sampler": 0}), Vec::new());
+    assert_eq!(again.err().unwrap(), words);
 }
 
 #[test]

@@ -65,6 +65,27 @@ test("options mean what they mean to the program", () => {
   }
 });
 
+test("samplers give the bits of samples, and fill what they are given", () => {
+  const clip = read("data/pendulum-random.dat");
+  const sampler = clip.sampler({ method: "c2", after: "loop" });
+  const found = clip.sample(TIMES, { method: "c2", after: "loop", layout: "frame" });
+  clip.free();
+  const out = new Float32Array(4 * sampler.tracks);
+  TIMES.forEach((time, i) => {
+    assert.equal(sampler.pose(time, out), out);
+    for (let track = 0; track < sampler.tracks; track++) {
+      const at = 4 * track;
+      const expected = found.rotations.subarray(4 * i * sampler.tracks + at, 4 * i * sampler.tracks + at + 4);
+      const rotation = out.subarray(at, at + 4);
+      // Signs continue along the samples of a track.
+      const sign = expected.some((number, c) => number * rotation[c] < 0) ? -1 : 1;
+      assert.deepEqual([...rotation], [...expected].map((number) => number * sign || 0));
+      assert.deepEqual(sampler.sample(track, time), rotation.slice());
+    }
+  });
+  sampler.free();
+});
+
 test("velocities, accelerations and places in the world are the program's", () => {
   const file = "formats/tests/fixtures/bvh/good.bvh";
   const clip = read(file);

@@ -44,9 +44,18 @@ test("times and options that mean nothing", () => {
   refused(() => clip.world([0], { axes: "wrold" }), "there is no kind of axes `wrold`; there are body, parent");
   const { rotations } = clip.sample(0.5);
   assert.ok(Math.abs(rotations[2] - Math.sin(Math.PI / 8)) < 1e-6, "the engine goes on");
+  const sampler = clip.sampler({ method: "slerp" });
+  refused(() => clip.sampler({ layout: "frame" }), "there is no option `layout`");
+  refused(() => sampler.pose(NaN), "NaN");
+  refused(() => sampler.pose("0"), "a time is a number of seconds, not 0");
+  refused(() => sampler.pose(0, new Float32Array(3)), "out is a Float32Array of 4 numbers, not of 3");
+  refused(() => sampler.sample(1, 0), "there is no track 1 of 1");
   clip.free();
   clip.free();
   refused(() => clip.sample(0), "the clip was freed");
+  assert.ok(Math.abs(sampler.pose(0.5)[2] - Math.sin(Math.PI / 8)) < 1e-6, "it outlives its clip");
+  sampler.free();
+  refused(() => sampler.pose(0), "the sampler was freed");
 });
 
 test("files that are broken have the program's code", () => {

@@ -11,4 +11,7 @@ const v = clip.velocities(0.5, { axes: "parent" }).values;
 clip.sample([0], { layout: "frame-major" });
 // @ts-expect-error nobody makes clips so
 new (class extends TumbleError {})("a", "b").code = "c";
+const hip: Float32Array = clip.sampler({ after: "loop" }).sample(0, 0.5);
+// @ts-expect-error a sampler has one pose at a time
+clip.sampler({ layout: "frame" }).pose(hip[0]);
 for (const { name } of engine.methods) console.log(name, first, moved, v.length, engine.read(new ArrayBuffer(4)).clips.length);

@@ -2,7 +2,8 @@
 //! values. Rust's operations are the shader's, one by one and in its order, so both round alike. Names of `let` stay.
 //!
 //! A function is written in the first of these forms that its operations allow:
-//! * for any `N: Number`, a number or a vector with the numbers of several samples, else for f32;
+//! * for any `N: Number`, a number or a vector with the numbers of several samples, or where the list asks for it any
+//!   `N: Choice`, whose numbers can be compared and chosen, else for f32;
 //! * where it treats all components of its vectors alike, for one of them: a caller passes it each component, or all
 //!   of them side by side in one vector. Otherwise vectors are arrays, and those of two components are pairs.
 //!
@@ -70,6 +71,10 @@ const BY_HAND: [(&str, &str); 4] = [
     ("cross3", "math::quaternion::cross3"),
 ];
 
+/// The functions that are written for vectors although they compare numbers: loops over whole vectors call them. Others
+/// stay functions of f32, whose `if` evaluates one side only.
+const CHOOSING: [&str; 1] = ["small_angle_cubic"];
+
 /// What a function cannot be written as, and why.
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
@@ -96,6 +101,24 @@ enum Vectors {
 struct Shape {
     numbers: Numbers,
     vectors: Vectors,
+    /// Whether any numbers can be compared.
+    chooses: bool,
+}
+
+impl Shape {
+    const fn new(numbers: Numbers, vectors: Vectors) -> Self {
+        Self {
+            numbers,
+            vectors,
+            chooses: false,
+        }
+    }
+
+    /// Of vectors with the comparisons of their numbers.
+    const CHOOSING: Self = Self {
+        chooses: true,
+        ..Self::new(Numbers::Any, Vectors::Apart)
+    };
 }
 
 /// Every function that is written, by its name, and the structs that they share.
@@ -109,10 +132,7 @@ pub(crate) struct Functions {
 impl Functions {
     pub(crate) fn new(shared: BTreeSet<String>) -> Self {
         let by_hand = BY_HAND.map(|(name, _)| {
-            let shape = Shape {
-                numbers: Numbers::Any,
-                vectors: Vectors::Apart,
-            };
+            let shape = Shape::new(Numbers::Any, Vectors::Apart);
             (name.to_owned(), (shape, String::new()))
         });
         Self {
@@ -138,11 +158,12 @@ impl Functions {
             let Some((_, cut)) = FUNCTIONS.iter().find(|(listed, _)| *listed == name) else {
                 continue;
             };
-            let mut shapes = [Numbers::Any, Numbers::One]
-                .into_iter()
-                .flat_map(|numbers| {
-                    [Vectors::Alike, Vectors::Apart].map(|vectors| Shape { numbers, vectors })
-                });
+            let of = |numbers| {
+                [Vectors::Alike, Vectors::Apart].map(|vectors| Shape::new(numbers, vectors))
+            };
+            let choosing = CHOOSING.contains(&name).then_some(Shape::CHOOSING);
+            let any = of(Numbers::Any).into_iter().chain(choosing);
+            let mut shapes = any.chain(of(Numbers::One));
             let mut refused = Vec::new();
             let written = shapes.find_map(|shape| {
                 let types = Types {
@@ -173,13 +194,9 @@ impl Functions {
             if let (Some(name), TypeInner::Struct { members, .. }) = (&ty.name, &ty.inner)
                 && !self.shared.contains(name)
             {
-                let shape = Shape {
-                    numbers: Numbers::Any,
-                    vectors: Vectors::Apart,
-                };
                 let types = Types {
                     module,
-                    shape,
+                    shape: Shape::CHOOSING,
                     shared: &self.shared,
                 };
                 let fields: Result<String> = members.iter().try_fold(String::new(), |text, m| {
@@ -190,8 +207,13 @@ impl Functions {
                     ))
                 });
                 if let Ok(fields) = fields {
+                    let bound = if fields.contains("N::") {
+                        ": Choice"
+                    } else {
+                        ""
+                    };
                     let text = format!(
-                        "#[derive(Debug, Clone, Copy)]\npub(crate) struct {name}<N> {{\n{fields}}}\n\n"
+                        "#[derive(Debug, Clone, Copy)]\npub(crate) struct {name}<N{bound}> {{\n{fields}}}\n\n"
                     );
                     self.structs.insert(name.clone(), text);
                 }
@@ -211,7 +233,7 @@ impl Functions {
     pub(crate) fn rust(&self) -> String {
         let mut text = String::from(
             "//! The shaders' arithmetic. Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n\
-             use crate::shader::*;\nuse crate::simd::lanes::Number;\n",
+             use crate::shader::*;\nuse crate::simd::lanes::{Choice, Number};\n",
         );
         for (_, path) in BY_HAND {
             text += &format!("use crate::{path};\n");
@@ -294,12 +316,17 @@ impl Types<'_> {
 
     fn name(&self, ty: Handle<Type>) -> Result<String> {
         let Self { module, shape, .. } = *self;
-        let Shape { numbers, vectors } = shape;
+        let Shape {
+            numbers,
+            vectors,
+            chooses,
+        } = shape;
         let scalar = |kind: ScalarKind, width: u8| match (kind, width, numbers) {
             (ScalarKind::Float, 4, Numbers::Any) => Ok("N"),
             (ScalarKind::Float, 4, Numbers::One) => Ok("f32"),
             (ScalarKind::Uint, 4, _) => Ok("u32"),
             (ScalarKind::Sint, 4, _) => Ok("i32"),
+            (ScalarKind::Bool, ..) if chooses => Ok("N::Flags"),
             (ScalarKind::Bool, ..) => Ok("bool"),
             other => Err(format!("numbers {other:?}")),
         };
@@ -519,6 +546,7 @@ impl<'a> Writer<'a> {
             .map(|(name, ty)| format!("{name}: {ty}, "))
             .collect();
         let generics = match self.shape.numbers {
+            Numbers::Any if self.shape.chooses => "<N: Choice>",
             Numbers::Any => "<N: Number>",
             Numbers::One => "",
         };
@@ -819,7 +847,9 @@ impl<'a> Writer<'a> {
             | Expression::AccessIndex { .. }
             | Expression::Access { .. } => true,
             Expression::CallResult(function) => self.shape_of(function)?.vectors == Vectors::Apart,
-            Expression::Select { condition, .. } => self.components(condition).is_none(),
+            Expression::Select { condition, .. } => {
+                self.components(condition).is_none() && !self.shape.chooses
+            }
             _ => false,
         })
     }
@@ -942,7 +972,10 @@ impl<'a> Writer<'a> {
 
     fn operation(&mut self, handle: Handle<Expression>, i: Option<u8>) -> Result<Text> {
         if self.shape.numbers == Numbers::Any && !self.is_float(handle) {
-            return Err("bits of any number".to_owned());
+            return match self.shape.chooses {
+                true => self.flags(handle),
+                false => Err("bits of any number".to_owned()),
+            };
         }
         match self.function.expressions[handle] {
             Expression::Literal(literal) => self.literal(literal),
@@ -971,12 +1004,15 @@ impl<'a> Writer<'a> {
                 accept,
                 reject,
             } => {
-                if self.shape.numbers == Numbers::Any {
+                if self.shape.numbers == Numbers::Any && !self.shape.chooses {
                     return Err("a choice between any numbers".to_owned());
                 }
                 let condition = self.operand(condition, i)?.text;
                 let accept = self.operand(accept, i)?.text;
                 let reject = self.operand(reject, i)?.text;
+                if self.shape.chooses {
+                    return Ok(atom(format!("N::choose({condition}, {accept}, {reject})")));
+                }
                 let reject = match reject.starts_with("if ") {
                     true => reject,
                     false => format!("{{ {reject} }}"),
@@ -1016,6 +1052,29 @@ impl<'a> Writer<'a> {
             }
             ref other => Err(format!("{other:?}")),
         }
+    }
+
+    /// A comparison of any numbers, or several that are joined.
+    fn flags(&mut self, handle: Handle<Expression>) -> Result<Text> {
+        let Expression::Binary { op, left, right } = self.function.expressions[handle] else {
+            return Err("flags of any number".to_owned());
+        };
+        if op == BinaryOperator::And {
+            let (left, right) = (self.value(left, None)?, self.value(right, None)?);
+            return binary(op, false, left, right);
+        }
+        let (method, sign) = match op {
+            BinaryOperator::LessEqual => ("at_most", ""),
+            BinaryOperator::Equal => ("equals", ""),
+            BinaryOperator::NotEqual => ("equals", "!"),
+            other => return Err(format!("{other:?} of any number")),
+        };
+        let left = self.value(left, None)?.within(ATOM);
+        let right = self.value(right, None)?.text;
+        Ok(Text {
+            text: format!("{sign}{left}.{method}({right})"),
+            level: if sign.is_empty() { ATOM } else { UNARY },
+        })
     }
 
     /// Operations on the bits of any number, which [`Number`](../../src/simd/lanes.rs) has as a whole.
@@ -1156,7 +1215,9 @@ impl<'a> Writer<'a> {
         function: Handle<Function>,
         i: Option<u8>,
     ) -> Result<Text> {
-        let Shape { numbers, vectors } = self.shape_of(function)?;
+        let Shape {
+            numbers, vectors, ..
+        } = self.shape_of(function)?;
         let name = self.module.functions[function]
             .name
             .as_deref()

@@ -124,6 +124,16 @@ fn functions_are_written_for_as_many_numbers_as_their_operations_allow() {
              fn flushed(x: f32) -> f32 { return select(x, 0.0, (bitcast<u32>(x) & 0x7fffffffu) < LIMIT); }",
             "fn flushed<N: Number>(x: N, ) -> N {\nx.zero_below(f32::from_bits(LIMIT))\n}",
         ),
+        (
+            "small_angle_cubic",
+            "fn small_angle_cubic(a: vec3f, b: vec3f, c: vec4f) -> vec3f {
+                 return select(a + b, b, (c.x + c.y <= 2.0) & (c.z != 1.0));
+             }",
+            "fn small_angle_cubic<N: Choice>(a: [N; 3], b: [N; 3], c: [N; 4], ) -> [N; 3] {\n\
+             let number_1 = (c[0] + c[1]).at_most(N::all(2.0)) & !c[2].equals(N::all(1.0));\n\
+             [N::choose(number_1, b[0], a[0] + b[0]), N::choose(number_1, b[1], a[1] + b[1]), \
+             N::choose(number_1, b[2], a[2] + b[2])]\n}",
+        ),
     ] {
         let text = function(name, source);
         assert!(text.contains(expected), "{text}");

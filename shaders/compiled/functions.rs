@@ -5,7 +5,7 @@ use crate::math::quaternion::dot as dot4;
 use crate::math::quaternion::dot3;
 use crate::math::quaternion::product;
 use crate::shader::*;
-use crate::simd::lanes::Number;
+use crate::simd::lanes::{Choice, Number};
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FromIdentity<N> {
@@ -21,9 +21,9 @@ pub(crate) struct MatrixRows<N> {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SmallAngleCubic<N> {
+pub(crate) struct SmallAngleCubic<N: Choice> {
     pub(crate) powers: [[N; 4]; 7],
-    pub(crate) is_valid: bool,
+    pub(crate) is_valid: N::Flags,
 }
 
 /// Components below 2^-64 in magnitude become +0.
@@ -706,14 +706,14 @@ pub(crate) fn canonical_product<N: Number>(m: [N; 4], v: [N; 3], w: N) -> [N; 4]
 /// The curve between `start` and `end`. Each of the four keys has the sign that is nearer to the
 /// key before it.
 #[inline(always)]
-pub(crate) fn small_angle_cubic(
-    before: [f32; 4],
-    start: [f32; 4],
-    end: [f32; 4],
-    after: [f32; 4],
-    first: TangentWeights,
-    last: TangentWeights,
-) -> SmallAngleCubic<f32> {
+pub(crate) fn small_angle_cubic<N: Choice>(
+    before: [N; 4],
+    start: [N; 4],
+    end: [N; 4],
+    after: [N; 4],
+    first: (N, N, N, N),
+    last: (N, N, N, N),
+) -> SmallAngleCubic<N> {
     let chord_before = [
         start[0] - before[0],
         start[1] - before[1],
@@ -737,106 +737,94 @@ pub(crate) fn small_angle_cubic(
     let log = small_log(step);
     let log_after = small_log(step_vector(end, chord_after));
     let first_left = [
-        log_before[0] * first.before,
-        log_before[1] * first.before,
-        log_before[2] * first.before,
+        log_before[0] * first.0,
+        log_before[1] * first.0,
+        log_before[2] * first.0,
     ];
-    let first_right = [
-        log[0] * first.after,
-        log[1] * first.after,
-        log[2] * first.after,
-    ];
-    let last_left = [
-        log[0] * last.before,
-        log[1] * last.before,
-        log[2] * last.before,
-    ];
+    let first_right = [log[0] * first.1, log[1] * first.1, log[2] * first.1];
+    let last_left = [log[0] * last.0, log[1] * last.0, log[2] * last.0];
     let last_right = [
-        log_after[0] * last.after,
-        log_after[1] * last.after,
-        log_after[2] * last.after,
+        log_after[0] * last.1,
+        log_after[1] * last.1,
+        log_after[2] * last.1,
     ];
     let first_tangent = small_log(composed(small_exp(first_left), small_exp(first_right)).vector);
     let last_tangent = small_log(composed(small_exp(last_left), small_exp(last_right)).vector);
     let outgoing = [
-        first_tangent[0] * first.outgoing,
-        first_tangent[1] * first.outgoing,
-        first_tangent[2] * first.outgoing,
+        first_tangent[0] * first.2,
+        first_tangent[1] * first.2,
+        first_tangent[2] * first.2,
     ];
-    let number_1 = THIRD - last.outgoing;
+    let number_1 = N::all(THIRD) - last.2;
     let incoming = [
         last_tangent[0] * number_1,
         last_tangent[1] * number_1,
         last_tangent[2] * number_1,
     ];
     let parabola = [
-        log[0] * TWO_THIRDS,
-        log[1] * TWO_THIRDS,
-        log[2] * TWO_THIRDS,
+        log[0] * N::all(TWO_THIRDS),
+        log[1] * N::all(TWO_THIRDS),
+        log[2] * N::all(TWO_THIRDS),
     ];
-    let w1 = if first.kind == KEY_AT_END {
-        [
-            parabola[0] - incoming[0],
-            parabola[1] - incoming[1],
-            parabola[2] - incoming[2],
-        ]
-    } else {
-        outgoing
-    };
-    let v3 = if last.kind == KEY_AT_END {
-        [
-            parabola[0] - outgoing[0],
-            parabola[1] - outgoing[1],
-            parabola[2] - outgoing[2],
-        ]
-    } else {
-        incoming
-    };
+    let number_2 = first.3.equals(N::all(KEY_AT_END));
+    let w1 = [
+        N::choose(number_2, parabola[0] - incoming[0], outgoing[0]),
+        N::choose(number_2, parabola[1] - incoming[1], outgoing[1]),
+        N::choose(number_2, parabola[2] - incoming[2], outgoing[2]),
+    ];
+    let number_3 = last.3.equals(N::all(KEY_AT_END));
+    let v3 = [
+        N::choose(number_3, parabola[0] - outgoing[0], incoming[0]),
+        N::choose(number_3, parabola[1] - outgoing[1], incoming[1]),
+        N::choose(number_3, parabola[2] - outgoing[2], incoming[2]),
+    ];
     let whole = FromIdentity {
         vector: step,
-        cosm1: norm_squared(chord) * -0.5,
+        cosm1: norm_squared(chord) * N::all(-0.5),
     };
     let without_first = composed(small_exp([-w1[0], -w1[1], -w1[2]]), whole);
     let w2 = small_log(composed(without_first, small_exp([-v3[0], -v3[1], -v3[2]])).vector);
     let squared_extent = dot3(w1, w1) + dot3(w2, w2) + dot3(v3, v3);
-    let is_valid = (squared_extent <= SMALL_SQUARED_EXTENT)
-        & (norm_squared(chord_before) <= LONGEST_STEP)
-        & (norm_squared(chord) <= LONGEST_STEP)
-        & (norm_squared(chord_after) <= LONGEST_STEP)
-        & (dot3(first_left, first_left) <= LONGEST_TANGENT_PART)
-        & (dot3(first_right, first_right) <= LONGEST_TANGENT_PART)
-        & (dot3(last_left, last_left) <= LONGEST_TANGENT_PART)
-        & (dot3(last_right, last_right) <= LONGEST_TANGENT_PART)
-        & (first.kind != KEY_UNKNOWN)
-        & (last.kind != KEY_UNKNOWN);
-    let third_step = small_exp([v3[0] * 0.125, v3[1] * 0.125, v3[2] * 0.125]);
+    let third_step = small_exp([
+        v3[0] * N::all(0.125),
+        v3[1] * N::all(0.125),
+        v3[2] * N::all(0.125),
+    ]);
     let second_step = composed(
-        small_exp([w2[0] * 0.5, w2[1] * 0.5, w2[2] * 0.5]),
+        small_exp([
+            w2[0] * N::all(0.5),
+            w2[1] * N::all(0.5),
+            w2[2] * N::all(0.5),
+        ]),
         third_step,
     );
     let all_steps = composed(
-        small_exp([w1[0] * 0.875, w1[1] * 0.875, w1[2] * 0.875]),
+        small_exp([
+            w1[0] * N::all(0.875),
+            w1[1] * N::all(0.875),
+            w1[2] * N::all(0.875),
+        ]),
         second_step,
     );
-    let vector_2 = canonical_product(start, all_steps.vector, all_steps.cosm1);
+    let vector_4 = canonical_product(start, all_steps.vector, all_steps.cosm1);
     let m = [
-        vector_2[0] + start[0],
-        vector_2[1] + start[1],
-        vector_2[2] + start[2],
-        vector_2[3] + start[3],
+        vector_4[0] + start[0],
+        vector_4[1] + start[1],
+        vector_4[2] + start[2],
+        vector_4[3] + start[3],
     ];
     let v1 = inverse_rotated(w1, second_step);
     let v2 = inverse_rotated(w2, third_step);
     let outer = [v1[0] + v3[0], v1[1] + v3[1], v1[2] + v3[2]];
     let a = [
-        outer[0] * 0.75 + v2[0] * 1.5,
-        outer[1] * 0.75 + v2[1] * 1.5,
-        outer[2] * 0.75 + v2[2] * 1.5,
+        outer[0] * N::all(0.75) + v2[0] * N::all(1.5),
+        outer[1] * N::all(0.75) + v2[1] * N::all(1.5),
+        outer[2] * N::all(0.75) + v2[2] * N::all(1.5),
     ];
     let b = [
-        (v3[0] - v1[0]) * 1.5,
-        (v3[1] - v1[1]) * 1.5,
-        (v3[2] - v1[2]) * 1.5,
+        (v3[0] - v1[0]) * N::all(1.5),
+        (v3[1] - v1[1]) * N::all(1.5),
+        (v3[2] - v1[2]) * N::all(1.5),
     ];
     let c = [
         outer[0] - (v2[0] + v2[0]),
@@ -857,53 +845,59 @@ pub(crate) fn small_angle_cubic(
     let outward = n1 + n3;
     let difference = n1 - n3;
     let volume = dot3(v1, x23);
-    let number_3 = n1 * B_111_1 + n2 * B_122_1 + n3 * B_133_1 - d23 * B_123_1;
-    let number_4 = n3 * B_111_1 + n2 * B_122_1 + n1 * B_133_1 - d12 * B_123_1;
-    let number_5 = outward * B_211_1 + n2 * B_222_1 + d13 * B_123_1;
+    let number_5 =
+        n1 * N::all(B_111_1) + n2 * N::all(B_122_1) + n3 * N::all(B_133_1) - d23 * N::all(B_123_1);
+    let number_6 =
+        n3 * N::all(B_111_1) + n2 * N::all(B_122_1) + n1 * N::all(B_133_1) - d12 * N::all(B_123_1);
+    let number_7 = outward * N::all(B_211_1) + n2 * N::all(B_222_1) + d13 * N::all(B_123_1);
     let f1 = [
-        v1[0] * number_3 + v3[0] * number_4 + v2[0] * number_5,
-        v1[1] * number_3 + v3[1] * number_4 + v2[1] * number_5,
-        v1[2] * number_3 + v3[2] * number_4 + v2[2] * number_5,
+        v1[0] * number_5 + v3[0] * number_6 + v2[0] * number_7,
+        v1[1] * number_5 + v3[1] * number_6 + v2[1] * number_7,
+        v1[2] * number_5 + v3[2] * number_6 + v2[2] * number_7,
     ];
-    let number_6 = n1 * B_111_2 + n2 * B_122_2 + n3 * B_133_2;
-    let number_7 = n3 * B_111_2 + n2 * B_122_2 + n1 * B_133_2;
-    let number_8 = difference * B_211_2;
+    let number_8 = n1 * N::all(B_111_2) + n2 * N::all(B_122_2) + n3 * N::all(B_133_2);
+    let number_9 = n3 * N::all(B_111_2) + n2 * N::all(B_122_2) + n1 * N::all(B_133_2);
+    let number_10 = difference * N::all(B_211_2);
     let f2 = [
-        v1[0] * number_6 - v3[0] * number_7 + v2[0] * number_8,
-        v1[1] * number_6 - v3[1] * number_7 + v2[1] * number_8,
-        v1[2] * number_6 - v3[2] * number_7 + v2[2] * number_8,
+        v1[0] * number_8 - v3[0] * number_9 + v2[0] * number_10,
+        v1[1] * number_8 - v3[1] * number_9 + v2[1] * number_10,
+        v1[2] * number_8 - v3[2] * number_9 + v2[2] * number_10,
     ];
-    let number_9 = n1 * B_111_3 + n2 * B_122_3 + n3 * B_133_3 - d23 * B_123_3;
-    let number_10 = n3 * B_111_3 + n2 * B_122_3 + n1 * B_133_3 - d12 * B_123_3;
-    let number_11 = outward * B_211_3 + n2 * B_222_3 + d13 * B_123_3;
+    let number_11 =
+        n1 * N::all(B_111_3) + n2 * N::all(B_122_3) + n3 * N::all(B_133_3) - d23 * N::all(B_123_3);
+    let number_12 =
+        n3 * N::all(B_111_3) + n2 * N::all(B_122_3) + n1 * N::all(B_133_3) - d12 * N::all(B_123_3);
+    let number_13 = outward * N::all(B_211_3) + n2 * N::all(B_222_3) + d13 * N::all(B_123_3);
     let f3 = [
-        v1[0] * number_9 + v3[0] * number_10 + v2[0] * number_11,
-        v1[1] * number_9 + v3[1] * number_10 + v2[1] * number_11,
-        v1[2] * number_9 + v3[2] * number_10 + v2[2] * number_11,
+        v1[0] * number_11 + v3[0] * number_12 + v2[0] * number_13,
+        v1[1] * number_11 + v3[1] * number_12 + v2[1] * number_13,
+        v1[2] * number_11 + v3[2] * number_12 + v2[2] * number_13,
     ];
-    let number_12 = n1 * B_111_4 + n2 * B_122_4 + n3 * B_133_4;
-    let number_13 = n3 * B_111_4 + n2 * B_122_4 + n1 * B_133_4;
-    let number_14 = difference * B_211_4;
+    let number_14 = n1 * N::all(B_111_4) + n2 * N::all(B_122_4) + n3 * N::all(B_133_4);
+    let number_15 = n3 * N::all(B_111_4) + n2 * N::all(B_122_4) + n1 * N::all(B_133_4);
+    let number_16 = difference * N::all(B_211_4);
     let f4 = [
-        v1[0] * number_12 - v3[0] * number_13 + v2[0] * number_14,
-        v1[1] * number_12 - v3[1] * number_13 + v2[1] * number_14,
-        v1[2] * number_12 - v3[2] * number_13 + v2[2] * number_14,
+        v1[0] * number_14 - v3[0] * number_15 + v2[0] * number_16,
+        v1[1] * number_14 - v3[1] * number_15 + v2[1] * number_16,
+        v1[2] * number_14 - v3[2] * number_15 + v2[2] * number_16,
     ];
-    let number_15 = n1 * B_111_5 + n2 * B_122_5 + n3 * B_133_5 - d23 * B_123_5;
-    let number_16 = n3 * B_111_5 + n2 * B_122_5 + n1 * B_133_5 - d12 * B_123_5;
-    let number_17 = outward * B_211_5 + n2 * B_222_5 + d13 * B_123_5;
+    let number_17 =
+        n1 * N::all(B_111_5) + n2 * N::all(B_122_5) + n3 * N::all(B_133_5) - d23 * N::all(B_123_5);
+    let number_18 =
+        n3 * N::all(B_111_5) + n2 * N::all(B_122_5) + n1 * N::all(B_133_5) - d12 * N::all(B_123_5);
+    let number_19 = outward * N::all(B_211_5) + n2 * N::all(B_222_5) + d13 * N::all(B_123_5);
     let f5 = [
-        v1[0] * number_15 + v3[0] * number_16 + v2[0] * number_17,
-        v1[1] * number_15 + v3[1] * number_16 + v2[1] * number_17,
-        v1[2] * number_15 + v3[2] * number_16 + v2[2] * number_17,
+        v1[0] * number_17 + v3[0] * number_18 + v2[0] * number_19,
+        v1[1] * number_17 + v3[1] * number_18 + v2[1] * number_19,
+        v1[2] * number_17 + v3[2] * number_18 + v2[2] * number_19,
     ];
-    let number_18 = n1 * B_111_6 + n2 * B_122_6 + n3 * B_133_6;
-    let number_19 = n3 * B_111_6 + n2 * B_122_6 + n1 * B_133_6;
-    let number_20 = difference * B_211_6;
+    let number_20 = n1 * N::all(B_111_6) + n2 * N::all(B_122_6) + n3 * N::all(B_133_6);
+    let number_21 = n3 * N::all(B_111_6) + n2 * N::all(B_122_6) + n1 * N::all(B_133_6);
+    let number_22 = difference * N::all(B_211_6);
     let f6 = [
-        v1[0] * number_18 - v3[0] * number_19 + v2[0] * number_20,
-        v1[1] * number_18 - v3[1] * number_19 + v2[1] * number_20,
-        v1[2] * number_18 - v3[2] * number_19 + v2[2] * number_20,
+        v1[0] * number_20 - v3[0] * number_21 + v2[0] * number_22,
+        v1[1] * number_20 - v3[1] * number_21 + v2[1] * number_22,
+        v1[2] * number_20 - v3[2] * number_21 + v2[2] * number_22,
     ];
     SmallAngleCubic {
         powers: [
@@ -916,43 +910,43 @@ pub(crate) fn small_angle_cubic(
             canonical_product(
                 m,
                 [a[0] + f1[0], a[1] + f1[1], a[2] + f1[2]],
-                -(volume * B_123_1),
+                -(volume * N::all(B_123_1)),
             ),
             canonical_product(
                 m,
                 [
-                    b[0] + (even[0] * 1.125 + x13[0] * 0.5625 + f2[0]),
-                    b[1] + (even[1] * 1.125 + x13[1] * 0.5625 + f2[1]),
-                    b[2] + (even[2] * 1.125 + x13[2] * 0.5625 + f2[2]),
+                    b[0] + (even[0] * N::all(1.125) + x13[0] * N::all(0.5625) + f2[0]),
+                    b[1] + (even[1] * N::all(1.125) + x13[1] * N::all(0.5625) + f2[1]),
+                    b[2] + (even[2] * N::all(1.125) + x13[2] * N::all(0.5625) + f2[2]),
                 ],
-                dot3(a, a) * -0.5,
+                dot3(a, a) * N::all(-0.5),
             ),
             canonical_product(
                 m,
                 [
-                    c[0] + (odd[0] * -2.25 + f3[0]),
-                    c[1] + (odd[1] * -2.25 + f3[1]),
-                    c[2] + (odd[2] * -2.25 + f3[2]),
+                    c[0] + (odd[0] * N::all(-2.25) + f3[0]),
+                    c[1] + (odd[1] * N::all(-2.25) + f3[1]),
+                    c[2] + (odd[2] * N::all(-2.25) + f3[2]),
                 ],
-                -dot3(a, b) - volume * B_123_3,
+                -dot3(a, b) - volume * N::all(B_123_3),
             ),
             canonical_product(
                 m,
                 [
-                    x13[0] * -0.75 + f4[0],
-                    x13[1] * -0.75 + f4[1],
-                    x13[2] * -0.75 + f4[2],
+                    x13[0] * N::all(-0.75) + f4[0],
+                    x13[1] * N::all(-0.75) + f4[1],
+                    x13[2] * N::all(-0.75) + f4[2],
                 ],
-                dot3(b, b) * -0.5 - dot3(a, c),
+                dot3(b, b) * N::all(-0.5) - dot3(a, c),
             ),
             canonical_product(
                 m,
                 [
-                    odd[0] * 3.0 + f5[0],
-                    odd[1] * 3.0 + f5[1],
-                    odd[2] * 3.0 + f5[2],
+                    odd[0] * N::all(3.0) + f5[0],
+                    odd[1] * N::all(3.0) + f5[1],
+                    odd[2] * N::all(3.0) + f5[2],
                 ],
-                -dot3(b, c) - volume * B_123_5,
+                -dot3(b, c) - volume * N::all(B_123_5),
             ),
             canonical_product(
                 m,
@@ -961,9 +955,18 @@ pub(crate) fn small_angle_cubic(
                     x13[1] - (even[1] + even[1]) + f6[1],
                     x13[2] - (even[2] + even[2]) + f6[2],
                 ],
-                dot3(c, c) * -0.5,
+                dot3(c, c) * N::all(-0.5),
             ),
         ],
-        is_valid,
+        is_valid: squared_extent.at_most(N::all(SMALL_SQUARED_EXTENT))
+            & norm_squared(chord_before).at_most(N::all(LONGEST_STEP))
+            & norm_squared(chord).at_most(N::all(LONGEST_STEP))
+            & norm_squared(chord_after).at_most(N::all(LONGEST_STEP))
+            & dot3(first_left, first_left).at_most(N::all(LONGEST_TANGENT_PART))
+            & dot3(first_right, first_right).at_most(N::all(LONGEST_TANGENT_PART))
+            & dot3(last_left, last_left).at_most(N::all(LONGEST_TANGENT_PART))
+            & dot3(last_right, last_right).at_most(N::all(LONGEST_TANGENT_PART))
+            & !first.3.equals(N::all(KEY_UNKNOWN))
+            & !last.3.equals(N::all(KEY_UNKNOWN)),
     }
 }

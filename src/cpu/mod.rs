@@ -23,11 +23,12 @@
 //! | `evaluate_batches` | sets | batch by batch, evaluated at once and forgotten |
 //! | `clip` | clips, and frame by frame | everything, before |
 //! | `sparse_samples` | far fewer samples than keys | the intervals with a sample |
-//! | `from_keys` | fewer samples than keys, arcs and cubics of small angles | nothing; intervals whose angles turn out too large are prepared alone |
+//! | `from_keys` | fewer than eight samples for a key, arcs and cubics of small angles | nothing; intervals whose angles turn out too large are prepared alone |
 //!
 //! All but the last use `CpuEngine::part`, which evaluates a [`Row`](row::Row): the intervals of a part are processed
 //! in blocks, each with its samples, and every run is evaluated when it is found ([`evaluate`]). Samples at listed
-//! times, or in copies of a track, are first listed as runs. The loops are compiled for each vector width; the lanes
+//! times, or in copies of a track, are first listed as runs. [`ShortRuns`](short_runs::ShortRuns) evaluates rows of clips
+//! with few samples between keys. The loops are compiled for each vector width; the lanes
 //! are samples of a run.
 //!
 //! # Memory
@@ -48,4 +49,5 @@ pub(crate) mod engine;
 pub(crate) mod evaluate;
 pub(crate) mod row;
 pub(crate) mod scratch;
+pub(crate) mod short_runs;
 pub(crate) mod streaming;

@@ -70,7 +70,7 @@ impl TwoKeyBlock {
                 let found = if AS_POLYNOMIALS {
                     arcs.at_as_polynomials(vector, parameter)
                 } else {
-                    arcs.at(vector, L::all(1.0), parameter)
+                    arcs.at(vector, parameter)
                 };
                 L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
             }
@@ -105,15 +105,12 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// The rotations on the arcs of a vector, times `sign`, which is 1 or -1.
+    /// The rotations on the arcs of a vector.
     #[inline(always)]
-    fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
+    fn at(&self, vector: usize, parameter: L) -> [L; 4] {
         let middle = self.middles[vector % VECTORS];
         let tangent = self.tangents[vector % VECTORS];
-        let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
-        // Keys of the other sign would only flip the sign of every intermediate result, so the sign
-        // may come last.
-        canonical_rotations([x * sign, y * sign, z * sign, w * sign])
+        canonical_rotations(on_arc(middle, tangent, norm_squared(tangent), parameter))
     }
 
     /// The same by the arcs' polynomials.
@@ -163,56 +160,5 @@ impl TwoKeyBlock {
             *value = rotation;
         }
         self.count = 0;
-    }
-}
-
-/// Samples of one track on arcs between keys with the same sign, evaluated directly into the result.
-pub(crate) struct ArcRun<'a> {
-    pub(crate) samples: &'a [KeySample],
-    pub(crate) keys: &'a [[f32; 4]],
-    pub(crate) sign: f32,
-    pub(crate) output: &'a mut [[f32; 4]],
-    /// How many samples are evaluated: whole vectors only.
-    pub(crate) done: usize,
-}
-
-impl InLanes for ArcRun<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let whole = self.samples.len() / L::COUNT * L::COUNT;
-        let samples = self.samples[..whole].chunks(LANES);
-        let mut arcs = Arcs::<L>::new();
-        let (mut from, mut to, mut parameters) = ([0; LANES], [0; LANES], [0.0; LANES]);
-        for (samples, rotations) in samples.zip(self.output.chunks_mut(LANES)) {
-            let count = samples.len();
-            let mut any = 0;
-            for (j, sample) in samples.iter().enumerate() {
-                any |= sample.key;
-                from[j] = sample.key & !IS_KEY;
-                // A sample that is a key may be the last one, which has no next.
-                to[j] = from[j] + u32::from(sample.key & IS_KEY == 0);
-                parameters[j] = sample.parameter;
-            }
-            let sign = L::all(self.sign);
-            for first in (0..count).step_by(VECTORS * L::COUNT) {
-                let end = count.min(first + VECTORS * L::COUNT);
-                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
-                    let start = L::gather_rotations(self.keys, &from[j..]);
-                    arcs.put(vector, start, L::gather_rotations(self.keys, &to[j..]));
-                }
-                for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
-                    let found = arcs.at(vector, sign, L::load(&parameters[j..]));
-                    L::store_rotations(found, &mut rotations[j..j + L::COUNT]);
-                }
-            }
-            if any & IS_KEY != 0 {
-                for j in 0..count {
-                    if from[j] == to[j] {
-                        rotations[j] = self.keys[from[j] as usize];
-                    }
-                }
-            }
-        }
-        self.done = whole;
     }
 }

@@ -1,16 +1,13 @@
-//! Twin of `shaders/from_keys/cubics.wgsl`: cubics with fewer samples than keys, in lanes.
-// Loops over lanes index many arrays at once.
-#![allow(clippy::needless_range_loop)]
+//! Twin of `shaders/from_keys/cubics.wgsl`: cubics at samples between keys, one in each lane.
 
 use bytemuck::Zeroable;
 
 use crate::from_keys::arcs::{LANES, OutputIter};
-use crate::math::canonical::canonical;
 use crate::shader::{IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::tracks::track_keys::SignedKeys;
-use crate::twin::small_angle::small_angle_cubic;
+use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
 /// Samples that are collected and evaluated together; they are consecutive in the result. A block of zeros is empty;
 /// unused lanes are marked as held before the evaluation.
@@ -27,44 +24,58 @@ pub(crate) struct CubicBlock {
     pub(crate) count: usize,
     /// The results; `UNRESOLVED` if the curve rotates too far for the small-angle series.
     pub(crate) rotations: [[f32; 4]; LANES],
-    /// How many of the samples were unresolved.
-    pub(crate) unresolved: usize,
+    /// Whether any sample was unresolved.
+    pub(crate) has_unresolved: bool,
 }
 
 impl InLanes for CubicBlock {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
-        let mut unresolved = 0;
-        // Whole vectors are computed: the lanes of a partly filled one would be computed one by one.
-        let whole = self.count.next_multiple_of(16).min(LANES);
-        let [before, start, end, after] = &self.keys;
-        let [first, last] = &self.weights;
-        for j in 0..whole {
-            let curve = small_angle_cubic(before[j], start[j], end[j], after[j], first[j], last[j]);
-            let c = &curve.powers;
-            let s = self.parameters[j];
-            let t = s * s;
-            let is_held = self.held[j] == 1.0;
-            let found = if curve.is_valid { 1.0 } else { 0.0 };
-            macro_rules! component {
-                ($c:literal) => {{
-                    let third = c[3][$c] * s + c[2][$c];
-                    let high = c[6][$c] * t + (c[5][$c] * s + c[4][$c]);
-                    let gain = high * (t * t) + (third * t + c[1][$c] * s);
-                    let value = canonical(c[0][$c] + gain);
-                    let value = if curve.is_valid { value } else { 0.0 };
-                    if is_held { start[j][$c] } else { value }
-                }};
-            }
-            (x[j], y[j], z[j], w[j]) = (component!(0), component!(1), component!(2), component!(3));
-            unresolved += u32::from(found + self.held[j] == 0.0);
+        for j in (0..self.count).step_by(L::COUNT) {
+            let [before, start, end, after] = &self.keys;
+            let start = L::load_rotations(&start[j..]);
+            let [first, last] = &self.weights;
+            let curve = small_angle_cubic(
+                L::load_rotations(&before[j..]),
+                start,
+                L::load_rotations(&end[j..]),
+                L::load_rotations(&after[j..]),
+                L::load_rotations(bytemuck::cast_slice(&first[j..])).into(),
+                L::load_rotations(bytemuck::cast_slice(&last[j..])).into(),
+            );
+            let is_held = L::load(&self.held[j..]).equals(L::all(1.0));
+            let found = sample(&curve, L::load(&self.parameters[j..]));
+            // Written out: closures are not always inlined.
+            let found = [
+                L::choose(is_held, start[0], found[0]),
+                L::choose(is_held, start[1], found[1]),
+                L::choose(is_held, start[2], found[2]),
+                L::choose(is_held, start[3], found[3]),
+            ];
+            L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
+            let is_unresolved = !curve.is_valid & !is_held;
+            let resolved = L::choose(is_unresolved, L::all(0.0), L::all(1.0));
+            self.has_unresolved |= resolved.any_at_most(0.0);
         }
-        for j in 0..whole {
-            self.rotations[j] = [x[j], y[j], z[j], w[j]];
-        }
-        self.unresolved += unresolved as usize;
     }
+}
+
+/// The rotation at a parameter of a curve of small angles, as `polynomial` gives it, whose powers above the sixth are
+/// 0; [`UNRESOLVED`](crate::from_keys::UNRESOLVED) if the curve turns too far.
+#[inline(always)]
+pub(super) fn sample<L: Lanes>(curve: &SmallAngleCubic<L>, s: L) -> [L; 4] {
+    let c = &curve.powers;
+    let z = s * s;
+    let zz = z * z;
+    macro_rules! component {
+        ($c:literal) => {{
+            let third = c[3][$c] * s + c[2][$c];
+            let high = c[6][$c] * z + (c[5][$c] * s + c[4][$c]);
+            let gain = high * zz + (third * z + c[1][$c] * s);
+            L::choose(curve.is_valid, (c[0][$c] + gain).canonical(), L::all(0.0))
+        }};
+    }
+    [component!(0), component!(1), component!(2), component!(3)]
 }
 
 impl CubicBlock {

@@ -1,17 +1,19 @@
-//! Evaluation of samples directly from keys, one in each lane, with the operations of preparing and evaluating
-//! segments, and therefore with the same bits. Twin: `shaders/from_keys.wgsl`.
+//! Evaluation of samples directly from keys, with the operations of preparing and evaluating segments, and therefore
+//! with the same bits. Frames of tracks with many keys have a lane for each interval between two keys
+//! ([`intervals`](crate::from_keys::intervals)); others a lane for each sample. Twin: `shaders/from_keys.wgsl`.
 
 use std::ops::Range;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::KeyCurve;
-use crate::from_keys::arcs::{ArcRun, OutputIter, TwoKeyBlock};
+use crate::from_keys::arcs::{OutputIter, TwoKeyBlock};
 use crate::from_keys::cubics::CubicBlock;
+use crate::from_keys::intervals::{IntervalPlan, evaluate_intervals};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::Batch;
-use crate::shader::{Form, IS_KEY, KeySample};
-use crate::simd::dispatch::in_lanes;
+use crate::shader::{Form, IS_KEY, KeySample, TangentWeights};
+use crate::simd::dispatch::VectorWidth;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
@@ -25,6 +27,12 @@ pub(crate) struct KeyEvaluator<'a> {
     curve: KeyCurve,
     block: SampleBlock<'a>,
     plan: FramePlan<'a>,
+    intervals: IntervalPlan,
+    /// A track's keys with their signs for the shortest path, if any sign is changed.
+    signed: Vec<[f32; 4]>,
+    /// The rows of the batch whose samples are in blocks, and those with samples that are not resolved.
+    in_blocks: Vec<usize>,
+    unresolved: Vec<usize>,
 }
 
 enum SampleBlock<'a> {
@@ -47,11 +55,15 @@ impl<'a> KeyEvaluator<'a> {
             curve,
             block,
             plan: FramePlan::new(),
+            intervals: IntervalPlan::new(curve),
+            signed: Vec::new(),
+            in_blocks: Vec::new(),
+            unresolved: Vec::new(),
         }
     }
 
-    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`; returns whether all of them are
-    /// resolved.
+    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`; returns the tracks that may have
+    /// samples that are not resolved, counted in the batch, in order.
     pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,
@@ -59,20 +71,38 @@ impl<'a> KeyEvaluator<'a> {
         timeline: &Timeline,
         window: &Range<usize>,
         output: &mut [[f32; 4]],
-    ) -> Result<bool, SetError> {
+    ) -> Result<&[usize], SetError> {
+        self.in_blocks.clear();
+        self.unresolved.clear();
+        let mut are_blocks_resolved = true;
         let mut output = output.iter_mut();
-        for (index, intervals) in batch.intervals(set) {
+        for (row_index, (index, intervals)) in batch.intervals(set).enumerate() {
             let whole = TrackKeys::whole(set, index);
             self.interpolation.check_track(whole.keys, index)?;
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
                     let clock = FrameClock::new(*rate, *start, false);
                     let keys = whole.around(&intervals, self.curve.beside());
-                    let samples = self.plan.samples(keys, clock, window)?;
-                    let left = self.block.whole_vectors(keys, samples, &mut output);
-                    self.block.push(keys, left.iter().copied(), &mut output);
+                    let (samples, plan) = self.plan.samples(keys, clock, window)?;
+                    let weights = self.block.weights(keys);
+                    self.intervals.find(plan, samples, weights);
+                    if self.intervals.is_short() {
+                        self.in_blocks.push(row_index);
+                        self.block.push(keys, samples.iter().copied(), &mut output);
+                        continue;
+                    }
+                    are_blocks_resolved &= self.block.flush(&mut output);
+                    let left = std::mem::take(&mut output).into_slice();
+                    let (row, left) = left.split_at_mut(samples.len());
+                    output = left.iter_mut();
+                    let width = VectorWidth::widest();
+                    let (keys, signed) = (keys.authored(), keys.signed(&mut self.signed));
+                    if !evaluate_intervals(width, &self.intervals, keys, signed, row) {
+                        self.unresolved.push(row_index);
+                    }
                 }
                 Ticks::Times { times, stride } => {
+                    self.in_blocks.push(row_index);
                     let track_times = &times[index * stride..][window.clone()];
                     let mut near = 0;
                     let samples = track_times.iter().map(|&time| {
@@ -84,38 +114,24 @@ impl<'a> KeyEvaluator<'a> {
                 }
             }
         }
-        Ok(self.block.flush(&mut output))
+        are_blocks_resolved &= self.block.flush(&mut output);
+        if !are_blocks_resolved {
+            self.unresolved.append(&mut self.in_blocks);
+            self.unresolved.sort_unstable();
+        }
+        Ok(&self.unresolved)
     }
 }
 
 impl<'a> SampleBlock<'a> {
-    /// Evaluates whole vectors of samples between keys of one sign directly into the output, if they are on arcs.
-    /// Returns the remaining samples.
-    fn whole_vectors<'s>(
-        &mut self,
-        keys: TrackKeys<'_>,
-        samples: &'s [KeySample],
-        output: &mut OutputIter<'_>,
-    ) -> &'s [KeySample] {
-        let SampleBlock::TwoKeys(block) = self else {
-            return samples;
-        };
-        let (false, Some(sign)) = (block.are_polynomials, keys.signs.shared()) else {
-            return samples;
-        };
-        block.flush(output);
-        let left = std::mem::take(output).into_slice();
-        let mut run = ArcRun {
-            samples,
-            keys: bytemuck::cast_slice(keys.keys),
-            sign,
-            output: &mut *left,
-            done: 0,
-        };
-        in_lanes(&mut run);
-        let done = run.done;
-        *output = left[done..].iter_mut();
-        &samples[done..]
+    /// The tangent weights of these keys, if there are any.
+    fn weights(&mut self, keys: TrackKeys<'a>) -> &[TangentWeights] {
+        match self {
+            SampleBlock::TwoKeys(_) => &[],
+            SampleBlock::Cubics(_, weights) => {
+                weights.weights_of(keys.times, keys.first_key, keys.track_key_count)
+            }
+        }
     }
 
     /// Adds samples between these keys.
@@ -150,7 +166,7 @@ impl<'a> SampleBlock<'a> {
             }
             SampleBlock::Cubics(block, _) => {
                 block.flush(output);
-                std::mem::take(&mut block.unresolved) == 0
+                !std::mem::take(&mut block.has_unresolved)
             }
         }
     }

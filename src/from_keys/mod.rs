@@ -1,14 +1,18 @@
-//! Evaluation directly from keys, for sets with fewer samples than keys: no segment is prepared, and for intervals
+//! Evaluation directly from keys, for sets with few samples between keys: no segment is prepared, and for intervals
 //! without samples only the times are read.
 
 pub(crate) mod arcs;
 pub(crate) mod cubics;
 pub(crate) mod evaluate;
+pub(crate) mod intervals;
+
+use glam::Vec4;
 
 use crate::curve::options::KeySigns;
 use crate::fit::tangent_weights::WeightRule;
+use crate::math::quaternion::dot;
 use crate::prepare::preparation::SetRequest;
-use crate::shader::{Form, LONGEST_STEP};
+use crate::shader::{Form, LONGEST_STEP, SMALL_SQUARED_EXTENT};
 use crate::tracks::set::TrackSet;
 
 /// The value of a sample whose curve rotates too far for the small-angle series; no rotation is 0. Such samples are
@@ -32,14 +36,16 @@ impl KeyCurve {
         usize::from(matches!(self, Self::Cubics(_)))
     }
 
-    /// The curves of a request that can be evaluated from keys: it has fewer samples than keys, and its curves are
-    /// arcs, or cubics most of which have small angles. `None` for any other request.
-    pub(crate) fn of(request: &SetRequest<'_>) -> Option<Self> {
+    /// The curves of a request that can be evaluated from keys: it has fewer samples than `limit` times its keys, and
+    /// its curves are arcs, or cubics most of which have small angles. `None` for any other request.
+    pub(crate) fn of(request: &SetRequest<'_>, limit: usize) -> Option<Self> {
         let (set, interpolation) = (request.set, request.interpolation);
-        let are_fewer = request.len() < set.keys_of(request.tracks.clone());
+        let keys = set.keys_of(request.tracks.clone());
+        let are_fewer = request.len() < keys;
+        let is_short = are_fewer || is_below(request, keys, limit);
         // On the path as authored an arc may exceed half a turn; it is then two segments.
         let arcs_are_short = interpolation.signs == KeySigns::Shortest || set.arcs_are_short();
-        if !are_fewer || !arcs_are_short || !interpolation.wrap().are_held() {
+        if !is_short || !arcs_are_short || !interpolation.wrap().are_held() {
             return None;
         }
         match interpolation.form() {
@@ -49,25 +55,74 @@ impl KeyCurve {
             }
             Form::Polynomial => {
                 let weights = interpolation.plain()?.fast?.weights;
-                has_small_steps(set).then_some(Self::Cubics(weights))
+                let are_small = match are_fewer {
+                    true => has_small_steps(set),
+                    false => has_small_curves(set),
+                };
+                are_small.then_some(Self::Cubics(weights))
             }
         }
     }
 }
 
-/// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With fewer, preparing all
-/// segments takes no longer. Only speed depends on this; the bits do not.
-#[allow(clippy::disallowed_methods)] // as it says
+/// The mean number of keys of a track from which intervals fill vectors.
+const MANY_KEYS: usize = 16;
+
+/// Whether tracks have many keys and fewer samples than `limit` times these.
+fn is_below(request: &SetRequest<'_>, keys: usize, limit: usize) -> bool {
+    keys >= MANY_KEYS * request.tracks.len() && request.len() < keys.saturating_mul(limit)
+}
+
+/// Whether more than two thirds of the keys are within a small angle of the next. With fewer, preparing all segments
+/// takes no longer.
 fn has_small_steps(set: &TrackSet) -> bool {
+    let (small, probes) = probed(set, |[step]| square(step) <= LONGEST_STEP);
+    3 * small > 2 * probes
+}
+
+/// Whether the small-angle series holds for more than four fifths of the curves between keys, if the tangents are means
+/// of steps. Each of the others is prepared, with its neighbours, which takes several times as long as the series.
+fn has_small_curves(set: &TrackSet) -> bool {
+    let is_small = |steps: [Vec4; 3]| {
+        let [before, step, after] = steps;
+        let vectors = [before + step, 4.0 * step - before - after, step + after];
+        let squared_extent: f32 = vectors.map(square).iter().sum();
+        let longest = steps.map(square).into_iter().fold(0.0, f32::max);
+        squared_extent <= 36.0 * SMALL_SQUARED_EXTENT && longest <= LONGEST_STEP
+    };
+    let (small, probes) = probed(set, is_small);
+    5 * small > 4 * probes
+}
+
+fn square(vector: Vec4) -> f32 {
+    dot(vector.to_array(), vector.to_array())
+}
+
+/// Of how many out of at most 64 places the steps between neighbouring keys are small, and the number of places. Only
+/// speed depends on this; the bits do not.
+fn probed<const STEPS: usize>(
+    set: &TrackSet,
+    is_small: impl Fn([Vec4; STEPS]) -> bool,
+) -> (usize, usize) {
     const PROBES: usize = 64;
-    let (mut near, mut probes) = (0, 0);
+    let (mut small, mut probes) = (0, 0);
     for probe in 0..PROBES {
         let (_, keys) = set.times_and_keys(probe * set.track_count() / PROBES);
         let index = keys.len() * probe / PROBES;
-        if let [from, to, ..] = keys[index..] {
+        if let Some(keys) = keys.get(index..=index + STEPS) {
+            let mut from = Vec4::from(keys[0]);
+            let steps = std::array::from_fn(|i| {
+                let to = Vec4::from(keys[i + 1]);
+                let to = if dot(from.to_array(), to.to_array()) < 0.0 {
+                    -to
+                } else {
+                    to
+                };
+                to - std::mem::replace(&mut from, to)
+            });
             probes += 1;
-            near += usize::from(1.0 - from.dot(to).abs() <= 0.5 * LONGEST_STEP);
+            small += usize::from(is_small(steps));
         }
     }
-    3 * near > 2 * probes
+    (small, probes)
 }

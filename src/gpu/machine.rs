@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::cpu::engine::from_keys::UnresolvedRow;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::clip::VulkanClip;
 use crate::gpu::crowd::VulkanCrowd;
@@ -140,8 +141,16 @@ fn evaluate_from_keys(
     }
     let (request, engine) = (job.request, opened.engine());
     let first = request.samples.start;
-    let resolve =
-        |(output, track): (&mut _, _)| (engine.host).resolve(request, track, (first, 0), output);
+    let resolve = |(output, track)| {
+        let key = 0;
+        let row = UnresolvedRow {
+            track,
+            first,
+            key,
+            output,
+        };
+        engine.host.resolve(request, std::iter::once(row))
+    };
     on_threads(|| {
         let rows = output.par_chunks_mut(request.samples.len());
         rows.zip(request.tracks.clone()).try_for_each(resolve)

@@ -132,6 +132,10 @@ pub(crate) fn tracks_at_once(samples: usize) -> usize {
     (GROUP_VALUES / samples.max(1)).max(1)
 }
 
+/// The number of samples for each key from which the CPU prepares segments: a segment's samples side by side in vectors
+/// then cost less than its curve in a lane saves.
+const SAMPLES_OF_A_KEY: usize = 8;
+
 /// Rotations for which another thread is worth waking.
 const SHARE: usize = 16 * 1024;
 
@@ -277,8 +281,12 @@ impl Route {
         let in_order = matches!(request.timeline.ticks, Ticks::Frames { .. });
         let is_sparse =
             matches!(limits.kind, MachineKind::Cpu { .. }) && has_sparse_samples(request);
+        let limit = match limits.kind {
+            MachineKind::Cpu { .. } if in_order => SAMPLES_OF_A_KEY,
+            _ => 1,
+        };
         let curve = match in_rows || is_sparse {
-            true => KeyCurve::of(request),
+            true => KeyCurve::of(request, limit),
             false => None,
         };
         let pieces = Self::Pieces {
@@ -432,13 +440,13 @@ impl fmt::Display for Route {
         f.write_str(match self {
             Self::Nothing => "no samples: nothing is computed",
             Self::Rows(Rows::FromKeys(KeyCurve::Arcs)) => {
-                "fewer samples than keys: each sample is computed from the two keys beside it"
+                "few samples between keys: each sample is computed from the two keys beside it"
             }
             Self::Rows(Rows::FromKeys(KeyCurve::TwoKeys)) => {
                 "fewer samples than keys, two keys per track: each sample is computed from the keys of its track"
             }
             Self::Rows(Rows::FromKeys(KeyCurve::Cubics(_))) => {
-                "fewer samples than keys, with mostly small rotations between them: each sample is computed from the four keys around it; intervals with too large rotations are prepared"
+                "few samples between keys, with mostly small rotations between them: each sample is computed from the four keys around it; intervals with too large rotations are prepared"
             }
             Self::Rows(Rows::Batches { cuts_tracks: false }) => {
                 "in batches: a thread prepares about a thousand keys, evaluates them while their segments are in the cache, and discards the segments"

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::mem::take;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -22,12 +22,16 @@ use crate::shader::Form;
 use crate::threads::{self, OutOfThreadsError, on_threads, stop};
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::{Ticks, Timeline};
+use crate::time::runs::NONE;
 use crate::time::spans::TrackPart;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::{Channel, VectorTrack};
 
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
+
+/// The number of tracks from which it pays to find the samples of their times once for all of them.
+const ALIKE: usize = 4;
 
 /// The prepared tracks on the host, from which the work of every device is computed.
 pub(crate) struct ClipData {
@@ -39,6 +43,8 @@ pub(crate) struct ClipData {
     tracks: Vec<usize>,
     /// The first and the last key time of the set, seconds.
     pub(crate) time_span: Option<(f64, f64)>,
+    /// See [`ClipData::time_classes`].
+    time_classes: OnceLock<Vec<u32>>,
 }
 
 /// A part and the prepared group whose lists it points into.
@@ -154,6 +160,7 @@ impl ClipData {
             parts: Vec::new(),
             tracks: vec![0; set.track_count() + 1],
             time_span: set.time_span(),
+            time_classes: OnceLock::new(),
         })
     }
 
@@ -286,7 +293,45 @@ impl ClipData {
             parts,
             tracks,
             time_span,
+            time_classes: OnceLock::new(),
         }
+    }
+
+    /// For each track a number that consecutive tracks share if their intervals have the same times; [`NONE`] for
+    /// tracks that are not [regular](Prepared::is_regular), or whose arcs are not those between their keys as they are
+    /// stored, and where fewer than [`ALIKE`] tracks in succession have the same times. Found once, when they are asked
+    /// for.
+    pub(crate) fn time_classes(&self) -> &[u32] {
+        self.time_classes.get_or_init(|| {
+            let (mut last, mut class): (&[f64], u32) = (&[], 0);
+            let mut end = f64::NAN;
+            let mut classes: Vec<u32> = (0..self.track_count())
+                .map(|track| {
+                    let Some(PartRef { prepared, part }) = self.only_part(track) else {
+                        return NONE;
+                    };
+                    let segments = &prepared.segments;
+                    if !prepared.is_regular(part)
+                        || segments.are_arcs_listed
+                        || segments.form == Form::Arc && !prepared.has_signs_kept(part)
+                    {
+                        return NONE;
+                    }
+                    let starts = &prepared.spans.starts[part.spans.clone()];
+                    if starts != last || part.end != end {
+                        (last, end) = (starts, part.end);
+                        class += 1;
+                    }
+                    class
+                })
+                .collect();
+            for alike in classes.chunk_by_mut(|one, next| one == next) {
+                if alike.len() < ALIKE {
+                    alike.fill(NONE);
+                }
+            }
+            classes
+        })
     }
 
     /// Takes the groups out, unless a sampler still uses them.

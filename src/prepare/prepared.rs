@@ -17,6 +17,7 @@ use crate::time::runs::{NONE, Parameter};
 use crate::time::spans::{SpanSource, Spans, TrackExtension, TrackPart};
 use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
+use crate::tracks::signs::SignBits;
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 pub(crate) struct Prepared {
@@ -154,6 +155,43 @@ impl Prepared {
         self.segments.polynomials.extend(polynomials);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
+    }
+
+    /// Whether a part has one segment for each interval, in order, passes through its keys, which are constants in order,
+    /// and is held outside them: then samples are found by the interval's index alone.
+    pub(crate) fn is_regular(&self, part: &TrackPart) -> bool {
+        let Some(&SpanSource::Segment(first)) = self.spans.sources.get(part.spans.start) else {
+            return false;
+        };
+        let sources = &self.spans.sources[part.spans.clone()];
+        let keys = &self.spans.keys[part.spans.clone()];
+        let are_segments = (sources.iter().zip(first..))
+            .all(|(source, index)| matches!(*source, SpanSource::Segment(at) if at == index));
+        let are_keys = keys.iter().zip(part.before..).all(|(&key, at)| key == at);
+        let last = part.before.checked_add(part.spans.len() as u32);
+        part.extension.is_none()
+            && !self.spans.steps
+            && are_segments
+            && are_keys
+            && last == Some(part.after)
+    }
+
+    /// The index of the first segment of a regular part.
+    pub(crate) fn first_segment(&self, part: &TrackPart) -> usize {
+        match self.spans.sources[part.spans.start] {
+            SpanSource::Segment(first) => first as usize,
+            SpanSource::Constant(_) | SpanSource::Exact(_) => 0,
+        }
+    }
+
+    /// The keys of a regular part, as they were added.
+    pub(crate) fn keys_of(&self, part: &TrackPart) -> &[[f32; 4]] {
+        &self.constants[part.before as usize..=part.after as usize]
+    }
+
+    /// Whether the keys of a regular part keep their signs on the shortest path.
+    pub(crate) fn has_signs_kept(&self, part: &TrackPart) -> bool {
+        SignBits::are_kept(self.keys_of(part))
     }
 
     /// The value of a sample by the `index`th curve of `exact`, evaluated in f64.

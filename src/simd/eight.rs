@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
 use crate::simd::doubles::doubles;
-use crate::simd::lanes::{Lanes, Number};
+use crate::simd::lanes::{Choice, Lanes, Number};
 
 /// Calls instructions of AVX2.
 macro_rules! avx2 {
@@ -112,6 +112,50 @@ impl Number for Eight {
             let shifted = _mm256_srlv_epi32(bits, _mm256_set1_epi32(shift as i32));
             _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(seed as i32), shifted))
         })
+    }
+}
+
+/// Bits that are all 1 where the answer is yes, else 0.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EightFlags(__m256);
+
+impl std::ops::BitAnd for EightFlags {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(avx2!(_mm256_and_ps(self.0, other.0)))
+    }
+}
+
+impl std::ops::Not for EightFlags {
+    type Output = Self;
+
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(avx2! {
+            let all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            _mm256_xor_ps(self.0, all)
+        })
+    }
+}
+
+impl Choice for Eight {
+    type Flags = EightFlags;
+
+    #[inline(always)]
+    fn at_most(self, limit: Self) -> EightFlags {
+        EightFlags(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0)))
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> EightFlags {
+        EightFlags(avx2!(_mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn choose(flags: EightFlags, accept: Self, reject: Self) -> Self {
+        Self(avx2!(_mm256_blendv_ps(reject.0, accept.0, flags.0)))
     }
 }
 
@@ -231,15 +275,6 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
-        let value = Self::all(value);
-        Self(avx2! {
-            let is_equal = _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, value.0);
-            _mm256_blendv_ps(otherwise.0, then.0, is_equal)
-        })
-    }
-
-    #[inline(always)]
     fn magnitude(self) -> Self {
         let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
         Self(avx2!(_mm256_and_ps(self.0, magnitude.0)))
@@ -247,10 +282,7 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn any_at_most(self, limit: f32) -> bool {
-        let limit = Self::all(limit);
-        avx2! {
-            let within = _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, limit.0);
-            _mm256_movemask_ps(within) != 0
-        }
+        let within = self.at_most(Self::all(limit));
+        avx2!(_mm256_movemask_ps(within.0) != 0)
     }
 }

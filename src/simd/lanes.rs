@@ -1,10 +1,11 @@
 //! The numbers that the twins compute with: an f32 for one sample, or a vector for several.
 
-use std::ops::Neg;
+use std::fmt;
+use std::ops::{BitAnd, Neg, Not};
 use std::slice;
 
 use bytemuck::Pod;
-use glam::{Mat4, Vec4, Vec4Swizzles as _};
+use glam::{BVec4A, Mat4, Vec4, Vec4Swizzles as _};
 
 use crate::math::quaternion::Arithmetic;
 use crate::shader::{PolynomialSegment, TINY_BITS};
@@ -30,6 +31,38 @@ pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The number whose bits are `seed` minus the bits of this one shifted to the right: the initial guess of a
     /// reciprocal or of a root.
     fn guess(self, seed: u32, shift: u32) -> Self;
+}
+
+/// A number that can be compared with others and chosen among them, sample by sample.
+pub(crate) trait Choice: Number {
+    /// The answer to a comparison, for each sample.
+    type Flags: Copy + fmt::Debug + BitAnd<Output = Self::Flags> + Not<Output = Self::Flags>;
+
+    fn at_most(self, limit: Self) -> Self::Flags;
+
+    fn equals(self, other: Self) -> Self::Flags;
+
+    /// `accept` where the answer is yes, else `reject`.
+    fn choose(flags: Self::Flags, accept: Self, reject: Self) -> Self;
+}
+
+impl Choice for f32 {
+    type Flags = bool;
+
+    #[inline(always)]
+    fn at_most(self, limit: Self) -> bool {
+        self <= limit
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> bool {
+        self == other
+    }
+
+    #[inline(always)]
+    fn choose(flags: bool, accept: Self, reject: Self) -> Self {
+        if flags { accept } else { reject }
+    }
 }
 
 impl Number for f32 {
@@ -70,7 +103,7 @@ pub(crate) const MAX_LANES: usize = 16;
 
 /// A vector with the numbers of several consecutive samples. Each width has a different order of lanes;
 /// [`Lanes::load`] and [`Lanes::store`] convert it.
-pub(crate) trait Lanes: Number + Pod {
+pub(crate) trait Lanes: Choice + Pod {
     /// Number of samples.
     const COUNT: usize = size_of::<Self>() / size_of::<f32>();
 
@@ -191,7 +224,10 @@ pub(crate) trait Lanes: Number + Pod {
     fn magnitude(self) -> Self;
 
     /// `then` where a number is `value`, else `otherwise`.
-    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self;
+    #[inline(always)]
+    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
+        Self::choose(self.equals(Self::all(value)), then, otherwise)
+    }
 
     /// The larger of two numbers; `other` if either is NaN.
     fn larger(self, other: Self) -> Self;
@@ -222,6 +258,25 @@ impl Number for Vec4 {
         let of = |number: f32| number.guess(seed, shift);
         let [x, y, z, w] = self.to_array();
         Self::new(of(x), of(y), of(z), of(w))
+    }
+}
+
+impl Choice for Vec4 {
+    type Flags = BVec4A;
+
+    #[inline(always)]
+    fn at_most(self, limit: Self) -> BVec4A {
+        self.cmple(limit)
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> BVec4A {
+        self.cmpeq(other)
+    }
+
+    #[inline(always)]
+    fn choose(flags: BVec4A, accept: Self, reject: Self) -> Self {
+        Self::select(flags, accept, reject)
     }
 }
 
@@ -315,11 +370,6 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
-        Self::select(self.cmpeq(Self::splat(value)), then, otherwise)
-    }
-
-    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Self::select(self.cmpgt(other), self, other)
     }
@@ -385,6 +435,10 @@ mod tests {
             assert!(stored.iter().copied().eq(signs));
             let least = columns[c].iter().copied().fold(f32::MAX, f32::min);
             assert!(loaded[c].any_at_most(least) && !loaded[c].any_at_most(least.next_down()));
+            let within = loaded[c].at_most(two) & !loaded[c].equals(L::all(0.0));
+            L::choose(within, one, two).store(&mut stored);
+            let chosen = (columns[c].iter()).map(|&v| if v <= 2.0 && v != 0.0 { 1.0 } else { 2.0 });
+            assert!(stored.iter().copied().eq(chosen));
         }
         for k in 0..L::COUNT {
             for c in 0..4 {

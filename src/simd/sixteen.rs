@@ -9,7 +9,7 @@ use crate::shader::PolynomialSegment;
 use crate::simd::cache_line::CacheLine;
 use crate::simd::doubles::doubles;
 use crate::simd::eight::{Eight, alike_at_any_width};
-use crate::simd::lanes::{Lanes, Number};
+use crate::simd::lanes::{Choice, Lanes, Number};
 
 /// Calls instructions of AVX-512.
 macro_rules! avx512 {
@@ -64,6 +64,25 @@ impl Number for Sixteen {
             let shifted = _mm512_srlv_epi32(bits, _mm512_set1_epi32(shift as i32));
             _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(seed as i32), shifted))
         })
+    }
+}
+
+impl Choice for Sixteen {
+    type Flags = __mmask16;
+
+    #[inline(always)]
+    fn at_most(self, limit: Self) -> __mmask16 {
+        avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, limit.0))
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> __mmask16 {
+        avx512!(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn choose(flags: __mmask16, accept: Self, reject: Self) -> Self {
+        Self(avx512!(_mm512_mask_blend_ps(flags, reject.0, accept.0)))
     }
 }
 
@@ -230,22 +249,12 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
-        let value = Self::all(value);
-        Self(avx512! {
-            let is_equal = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, value.0);
-            _mm512_mask_blend_ps(is_equal, otherwise.0, then.0)
-        })
-    }
-
-    #[inline(always)]
     fn magnitude(self) -> Self {
         Self(avx512!(_mm512_abs_ps(self.0)))
     }
 
     #[inline(always)]
     fn any_at_most(self, limit: f32) -> bool {
-        let limit = Self::all(limit);
-        avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, limit.0) != 0)
+        self.at_most(Self::all(limit)) != 0
     }
 }

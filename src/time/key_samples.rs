@@ -18,6 +18,8 @@ pub(crate) struct FramePlan<'a> {
     clock: Option<FrameClock>,
     window: Range<usize>,
     samples: Vec<KeySample>,
+    /// How often samples were computed.
+    number: usize,
     block: IntervalBlock,
 }
 
@@ -28,37 +30,54 @@ impl<'a> FramePlan<'a> {
             clock: None,
             window: 0..0,
             samples: Vec::new(),
+            number: 0,
             block: IntervalBlock::zeroed(),
         }
     }
 
     /// The samples of a window; their keys are counted from the first of `of`. They are computed only if times, clock
-    /// or window differ from the last call's.
+    /// or window differ from the last call's; the number is another one then.
     pub(crate) fn samples(
         &mut self,
         of: TrackKeys<'a>,
         clock: FrameClock,
         window: &Range<usize>,
-    ) -> Result<&[KeySample], SampleTimesError> {
+    ) -> Result<(&[KeySample], usize), SampleTimesError> {
         let times = of.times;
         if std::ptr::eq(self.times, times) && self.clock == Some(clock) && self.window == *window {
-            return Ok(&self.samples);
+            return Ok((&self.samples, self.number));
         }
         self.times = &[];
         let last = times.len() - 1;
+        let gap_too_long = |(key, frames)| SampleTimesError::GapTooLong {
+            track: of.index,
+            key: of.first_key + key,
+            frames,
+        };
+        (self.find(&times[..last], times[last], clock, window)).map_err(gap_too_long)?;
+        (self.times, self.clock, self.window) = (times, Some(clock), window.clone());
+        Ok((&self.samples, self.number))
+    }
+
+    /// Finds the samples of a window among intervals with these starts, the last of which ends at `end`. Fails with the
+    /// index and the length in frames of an interval with too many frames to count.
+    pub(crate) fn find(
+        &mut self,
+        starts: &[f64],
+        end: f64,
+        clock: FrameClock,
+        window: &Range<usize>,
+    ) -> Result<(&[KeySample], usize), (usize, f64)> {
+        self.number += 1;
         self.samples.clear();
         self.samples.resize(window.len(), held(0));
-        let mut intervals = IntervalBlocks::new(&times[..last], times[last], clock, window.clone());
+        let mut intervals = IntervalBlocks::new(starts, end, clock, window.clone());
         while let Some(filled) = intervals.fill(&mut self.block) {
             let block = &self.block;
             for j in block.occupied {
                 let key = filled.start + j;
                 if !block.are_near && !block.is_countable(j) {
-                    return Err(SampleTimesError::GapTooLong {
-                        track: of.index,
-                        key: of.first_key + key,
-                        frames: block.frame[j + 1] - block.frame[j],
-                    });
+                    return Err((key, block.frame[j + 1] - block.frame[j]));
                 }
                 let samples = block.first[j]..block.first[j + 1];
                 let (whole, scale, offset) = (block.whole[j], block.scale[j], block.offset[j]);
@@ -80,12 +99,11 @@ impl<'a> FramePlan<'a> {
                 }
             }
         }
-        let end = clock.first_frame(times[last]) as usize;
+        let end = clock.first_frame(end) as usize;
         if end < window.end {
-            self.samples[end.max(window.start) - window.start..].fill(held(last));
+            self.samples[end.max(window.start) - window.start..].fill(held(starts.len()));
         }
-        (self.times, self.clock, self.window) = (times, Some(clock), window.clone());
-        Ok(&self.samples)
+        Ok((&self.samples, self.number))
     }
 }
 

@@ -45,6 +45,11 @@ impl SignBits {
         }
     }
 
+    /// Whether certainly no sign is changed between these keys.
+    pub(crate) fn are_kept(keys: &[[f32; 4]]) -> bool {
+        keys.windows(2).all(|pair| dot(pair[0], pair[1]) > IN_DOUBT)
+    }
+
     /// The signs of consecutive keys, by their indices in the set.
     #[inline]
     pub(crate) fn of(&self, keys: Range<usize>) -> Signs<'_> {
@@ -101,17 +106,6 @@ impl Signs<'_> {
         !self.bits.is_empty() && self.words().any(|(word, mask)| word & mask != 0)
     }
 
-    /// The common factor of all keys, or `None` if they differ.
-    pub(crate) fn shared(self) -> Option<f32> {
-        if !self.any() {
-            return Some(1.0);
-        }
-        let end = self.first.saturating_add(self.count);
-        let all =
-            end <= self.bits.len() * BITS && self.words().all(|(word, mask)| word & mask == mask);
-        all.then_some(-1.0)
-    }
-
     /// The stored words that contain bits of these keys, each with a mask of these bits.
     #[inline]
     fn words(self) -> impl Iterator<Item = (u64, u64)> {
@@ -154,12 +148,6 @@ mod tests {
         let each: Vec<f32> = (0..keys.len()).map(|i| signs.sign(i)).collect();
         let is_negated = |sign: &f32| *sign < 0.0;
         assert_eq!(signs.any(), each.iter().any(is_negated));
-        let shared = match () {
-            () if !each.iter().any(is_negated) => Some(1.0),
-            () if each.iter().all(is_negated) => Some(-1.0),
-            () => None,
-        };
-        assert_eq!(signs.shared(), shared);
         for from in 0..keys.len() {
             for to in from..=keys.len() {
                 let part = signs.between(from..to);
@@ -168,9 +156,6 @@ mod tests {
                     each[from..to].iter().any(is_negated),
                     "{from}..{to}"
                 );
-                if from < to && each[from..to].iter().all(is_negated) {
-                    assert_eq!(part.shared(), Some(-1.0), "{from}..{to}");
-                }
             }
         }
         each

@@ -49,6 +49,24 @@ impl<'a> TrackKeys<'a> {
             ..self
         }
     }
+
+    /// The keys as they were added.
+    pub(crate) fn authored(self) -> &'a [[f32; 4]] {
+        bytemuck::cast_slice(self.keys)
+    }
+
+    /// The keys with their signs for the shortest path: in `room` if any sign is changed.
+    pub(crate) fn signed<'r>(self, room: &'r mut Vec<[f32; 4]>) -> &'r [[f32; 4]]
+    where
+        'a: 'r,
+    {
+        if !self.signs.any() {
+            return self.authored();
+        }
+        room.resize(self.keys.len(), [0.0; 4]);
+        (self.signs).copy(self.authored(), 0..self.keys.len(), room);
+        room
+    }
 }
 
 /// Keys of a track with their signs; `signs` is `None` if no sign is changed.
@@ -62,7 +80,7 @@ impl<'a> SignedKeys<'a> {
     #[inline]
     pub(crate) fn new(keys: TrackKeys<'a>) -> Self {
         Self {
-            authored: bytemuck::cast_slice(keys.keys),
+            authored: keys.authored(),
             signs: Some(keys.signs).filter(|signs| signs.any()),
         }
     }

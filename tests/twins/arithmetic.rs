@@ -376,6 +376,7 @@ functions! { on, r:
             valid(curve.powers, curve.is_valid, Number)
         },
         {
+            let [first, last] = [first, last].map(|weights| bytemuck::cast::<_, [f32; 4]>(weights).into());
             let curve = cpu::small_angle_cubic(before, start, end, after, first, last);
             valid(curve.powers, curve.is_valid, |flag| flag)
         };

@@ -501,7 +501,7 @@ fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     let interpolation = Interpolation::from(method);
     let timeline: Timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
     let request = SetRequest::whole(set, &interpolation, &timeline);
-    let curve = KeyCurve::of(&request).expect("fewer samples than keys");
+    let curve = KeyCurve::of(&request, 1).expect("fewer samples than keys");
     let job = KeyJob {
         request: &request,
         curve,

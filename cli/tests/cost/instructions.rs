@@ -166,6 +166,33 @@ fn samples_straight_from_keys_cost_no_more_than_they_did() {
     }
 }
 
+/// Keys at 30 Hz at 60 frames a second, as most motion is played: every other frame is a key, and the curve to the
+/// next key is for one frame alone. Catches curves that are prepared as segments, and lanes that become scalar.
+#[test]
+fn frames_between_neighbouring_keys_cost_no_more_than_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let motion = generate(folder.path(), 600, &[]);
+    let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
+    for (width, bounds) in [("baseline", [165.0, 900.0]), ("avx2", [105.0, 390.0])] {
+        if width == "avx2" && !has_avx2 {
+            eprintln!("no AVX2 here: not counted");
+            continue;
+        }
+        for (method, bound) in ["slerp", "bessel-overhauser"].into_iter().zip(bounds) {
+            let count = |fps| instructions(&motion, method, fps, width);
+            let (Some(keys), Some(between)) = (count(30), count(60)) else {
+                return;
+            };
+            let each = (between - keys) as f64 / (TRACKS * 20 * 30) as f64;
+            println!("{width}, {method}: {each:.1} instructions a frame between keys");
+            assert!(
+                each < bound,
+                "{width}, {method}: {each:.1} a frame between keys"
+            );
+        }
+    }
+}
+
 /// Catches velocities of few samples for which more is prepared than these samples take: whole tracks, or
 /// curves one by one instead of beside each other.
 #[test]

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, one};
+use crate::cpu::short_runs::ShortRuns;
 use crate::cpu::streaming::{RowOutput, Stage};
 use crate::output::encoded::EncodedOutput;
 use crate::output::rotations::Layout;
@@ -143,8 +144,14 @@ impl CpuEngine {
                 let rotations = rotations.unwrap_or_default();
                 let mut stage =
                     Stage::new(self.width, streams, rotations, samples, of_a_run, output);
+                let mut short = ShortRuns::new(clip, timeline, &window.samples, self.width);
                 for track in window.tracks.clone() {
                     stage.row(samples, |samples, output| {
+                        if let (Some(short), RowOutput::Here(row)) = (&mut short, &mut *output)
+                            && short.row(track, row)
+                        {
+                            return Ok(());
+                        }
                         let first = window.samples.start + samples.start;
                         self.row(clip, track, timeline, first, output)
                     })?;
@@ -170,12 +177,15 @@ impl CpuEngine {
     ) -> Result<(), SampleTimesError> {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
         let mut rows = vec![[0.0; 4]; samples * TILE.min(tracks)];
+        let mut short = ShortRuns::new(clip, timeline, &window.samples, self.width);
         for first in (0..tracks).step_by(TILE) {
             let tile = first..(first + TILE).min(tracks);
             for (row, row_index) in rows.chunks_mut(samples).zip(tile.clone()) {
                 let track = window.tracks.start + row_index;
                 let first = window.samples.start;
-                self.row(clip, track, timeline, first, &mut RowOutput::Here(row))?;
+                if !short.as_mut().is_some_and(|short| short.row(track, row)) {
+                    self.row(clip, track, timeline, first, &mut RowOutput::Here(row))?;
+                }
             }
             for (sample, frame) in frames.iter_mut().enumerate() {
                 let column = rows[sample..].iter().step_by(samples);

@@ -1,4 +1,4 @@
-//! Sets with fewer samples than keys, evaluated directly from the keys. A sample whose curve rotates too far for the
+//! Sets with few samples between keys, evaluated directly from the keys. A sample whose curve rotates too far for the
 //! small-angle series is marked as `UNRESOLVED`; then only the intervals of such samples are prepared, and the
 //! samples are overwritten.
 
@@ -39,17 +39,23 @@ impl CpuEngine {
         let values = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
             stop::check_of(stop.as_ref())?;
             let window = request.samples_of(batch);
-            let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
-            if is_resolved || window.is_empty() {
+            let rows = evaluator.evaluate(set, batch, timeline, &window, output)?;
+            if rows.is_empty() || window.is_empty() {
                 return Ok(());
             }
-            let rows = output.chunks_mut(window.len());
-            batch
-                .intervals(set)
-                .zip(rows)
-                .try_for_each(|((track, intervals), output)| {
-                    self.resolve(request, track, (window.start, intervals.start), output)
-                })
+            let mut rows = rows.iter().peekable();
+            let all = batch.intervals(set).zip(output.chunks_mut(window.len()));
+            let unresolved = all
+                .enumerate()
+                .filter_map(|(i, ((track, intervals), output))| {
+                    rows.next_if_eq(&&i).map(|_| UnresolvedRow {
+                        track,
+                        first: window.start,
+                        key: intervals.start,
+                        output,
+                    })
+                });
+            self.resolve(request, unresolved)
         };
         let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: EncodedOutput<'_>| {
             output.fill(|output| values(evaluator, batch, output))
@@ -67,54 +73,62 @@ impl CpuEngine {
     }
 }
 
-/// Groups that are prepared together, each with its samples in the result.
-type FallbackBatch<'o> = Vec<(Group, &'o mut [[f32; 4]])>;
+/// Consecutive samples of a track, some of which may be unresolved.
+pub(crate) struct UnresolvedRow<'o> {
+    pub(crate) track: usize,
+    /// The index of the first sample.
+    pub(crate) first: usize,
+    /// The index of a key at or before all samples that are between keys.
+    pub(crate) key: usize,
+    pub(crate) output: &'o mut [[f32; 4]],
+}
+
+/// Groups of tracks that are prepared together, each with its samples in the result.
+type FallbackBatch<'o> = Vec<(usize, Group, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
-    /// Evaluates the unresolved ones of a track's consecutive samples from `first` on, by segments. Resolved samples
-    /// between them are evaluated again, with the same bits. `key` is the index of a key at or before all samples
-    /// that are between keys.
-    pub(crate) fn resolve(
+    /// Evaluates the unresolved samples of some rows by segments, which are prepared together. Resolved samples between
+    /// them are evaluated again, with the same bits.
+    pub(crate) fn resolve<'o>(
         &self,
         request: &SetRequest<'_>,
-        track: usize,
-        (first, key): (usize, usize),
-        mut output: &mut [[f32; 4]],
+        rows: impl Iterator<Item = UnresolvedRow<'o>>,
     ) -> Result<(), SetError> {
-        if let Ticks::Times { .. } = request.timeline.ticks {
-            // In any order, and all samples of the track.
-            if output.contains(&UNRESOLVED) {
-                let tracks = track..track + 1;
-                let request = SetRequest {
-                    tracks,
-                    ..request.clone()
-                };
-                self.evaluate_sparse(&request, EncodedOutput::of_values(output))?;
-            }
-            return Ok(());
-        }
-        let all = unresolved(request, track, (first, key), output);
-        let mut from = first;
         let mut batches: Vec<FallbackBatch<'_>> = Vec::new();
         let mut intervals = PART_INTERVALS;
-        for one in all {
-            let others = &mut output[one.samples.start - from..];
-            let (values, others) = others.split_at_mut(one.samples.len());
-            (from, output) = (one.samples.end, others);
-            if intervals >= PART_INTERVALS {
-                batches.push(Vec::new());
-                intervals = 0;
+        for row in rows {
+            if let Ticks::Times { .. } = request.timeline.ticks {
+                // In any order, and all samples of the track.
+                if row.output.contains(&UNRESOLVED) {
+                    let request = SetRequest {
+                        tracks: row.track..row.track + 1,
+                        ..request.clone()
+                    };
+                    self.evaluate_sparse(&request, EncodedOutput::of_values(row.output))?;
+                }
+                continue;
             }
-            intervals += one.intervals.len();
-            if let Some(batch) = batches.last_mut() {
-                batch.push((one, values));
+            let all = unresolved(request, &row);
+            let (mut from, mut output) = (row.first, row.output);
+            for one in all {
+                let others = &mut output[one.samples.start - from..];
+                let (values, others) = others.split_at_mut(one.samples.len());
+                (from, output) = (one.samples.end, others);
+                if intervals >= PART_INTERVALS {
+                    batches.push(Vec::new());
+                    intervals = 0;
+                }
+                intervals += one.intervals.len();
+                if let Some(batch) = batches.last_mut() {
+                    batch.push((row.track, one, values));
+                }
             }
         }
         let resolve = |batch: FallbackBatch<'_>| -> Result<(), SetError> {
             let mut memory = self.scratch_pool.take(request);
-            let intervals = (batch.iter()).map(|(one, _)| (track, one.intervals.clone()));
+            let intervals = (batch.iter()).map(|(track, one, _)| (*track, one.intervals.clone()));
             memory.prepare(request.set, intervals)?;
-            for (part, (one, values)) in memory.parts().zip(batch) {
+            for (part, (_, one, values)) in memory.parts().zip(batch) {
                 let (copy, values) = (
                     TrackCopy::of_track(one.samples),
                     &mut RowOutput::Here(values),
@@ -131,14 +145,14 @@ impl CpuEngine {
     }
 }
 
-/// The unresolved ones of some samples; the arguments are those of [`CpuEngine::resolve`].
-fn unresolved(
-    request: &SetRequest<'_>,
-    track: usize,
-    (first, key): (usize, usize),
-    output: &[[f32; 4]],
-) -> Vec<Group> {
-    let samples = (first..).zip(output);
+/// The groups of the unresolved samples of a row.
+fn unresolved(request: &SetRequest<'_>, row: &UnresolvedRow<'_>) -> Vec<Group> {
+    let samples = (row.first..).zip(&*row.output);
     let samples = samples.filter(|(_, rotation)| **rotation == UNRESOLVED);
-    intervals_of_frames(request, track, key, samples.map(|(sample, _)| sample))
+    intervals_of_frames(
+        request,
+        row.track,
+        row.key,
+        samples.map(|(sample, _)| sample),
+    )
 }

@@ -1,7 +1,5 @@
 //! Curves of small angles, in vector lanes of f32: the coefficients for the kernels are computed directly from the
 //! keys; nothing is sampled or fitted.
-// Loops over lanes index many arrays at once.
-#![allow(clippy::needless_range_loop)]
 
 use bytemuck::Zeroable;
 
@@ -9,7 +7,7 @@ use crate::fit::block::{Intervals, LANES, ROW_LEN, TrackStretch};
 use crate::fit::tangent_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Lanes, MAX_LANES};
+use crate::simd::lanes::{Choice, Lanes, MAX_LANES};
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
 /// The maximum number of curves that are computed one by one, because most lanes of vectors would be unused.
@@ -60,7 +58,7 @@ impl SmallAngleLanes {
             return;
         }
         for lane in near {
-            let curve = curves.curve(lane - 1, curves.neighbours(lane - 1));
+            let curve = curves.curve(lane);
             let found = &mut *curves.lanes;
             for (powers, power) in found.powers.iter_mut().zip(curve.powers) {
                 powers[lane] = power;
@@ -87,65 +85,52 @@ struct SmallAnglePass<'a> {
 }
 
 impl SmallAnglePass<'_> {
-    /// The curve of lane `j + 1`, between the keys before and after it.
-    #[inline(always)]
-    fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic<f32> {
+    /// The curve of a lane, between the keys before and after it.
+    fn curve(&self, lane: usize) -> SmallAngleCubic<f32> {
         let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
-        small_angle_cubic(before, from[j + 1], to[j + 1], after, first, last)
-    }
-
-    /// The keys before and after lane `j + 1`; a missing neighbour is replaced by the key itself.
-    #[inline(always)]
-    fn neighbours(&self, j: usize) -> [[f32; 4]; 2] {
-        let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
-        [
-            either(first.kind == KEY_INNER, from[j], from[j + 1]),
-            either(last.kind == KEY_INNER, to[j + 2], to[j + 1]),
-        ]
+        let [first, last] = [lane, lane + 1].map(|key| bytemuck::cast(self.weights.keys[key]));
+        let [start, end] = [from[lane], to[lane]];
+        let before = inner_or(first, from[lane - 1], start);
+        let after = inner_or(last, to[lane + 1], end);
+        small_angle_cubic(before, start, end, after, first.into(), last.into())
     }
 }
 
 impl InLanes for SmallAnglePass<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let mut powers = [[[0.0; ROW_LEN]; 4]; 7];
-        let mut is_valid = [false; ROW_LEN];
+        let Intervals { from, to, .. } = self.intervals;
+        let mut is_valid = [0.0; ROW_LEN];
         // Lane 0 is context, or a track's only interval, which has no such curve: the first curve is in
         // lane 1.
-        let count = self.count.min(LANES);
-        // Chosen in a loop of their own: a choice between two keys in memory would keep the
-        // compiler from making vectors of the loop behind it, which then costs twice as much.
-        let mut neighbours = [[[0.0; 4]; 2]; LANES];
-        for j in 0..count {
-            neighbours[j] = self.neighbours(j);
-        }
-        for j in 0..count {
-            let curve = self.curve(j, neighbours[j]);
-            for power in 0..7 {
-                for c in 0..4 {
-                    powers[power][c][j + 1] = curve.powers[power][c];
-                }
+        for j in (0..self.count.min(LANES)).step_by(L::COUNT) {
+            let lanes = j + 1..j + 1 + L::COUNT;
+            let [first, last]: [[L; 4]; 2] = [self.weights.load(j + 1), self.weights.load(j + 2)];
+            let start = L::load_rotations(&from[j + 1..]);
+            let end = L::load_rotations(&to[j + 1..]);
+            let before = inner_or(first, L::load_rotations(&from[j..]), start);
+            let after = inner_or(last, L::load_rotations(&to[j + 2..]), end);
+            let curve = small_angle_cubic(before, start, end, after, first.into(), last.into());
+            for (powers, power) in self.lanes.powers.iter_mut().zip(curve.powers) {
+                L::store_rotations(power, &mut powers[lanes.clone()]);
             }
-            is_valid[j + 1] = curve.is_valid;
+            let flags = L::choose(curve.is_valid, L::all(1.0), L::all(0.0));
+            flags.store(&mut is_valid[lanes]);
         }
-        self.lanes.is_valid = is_valid;
-        for power in 0..7 {
-            let [x, y, z, w] = &powers[power];
-            for j in 0..ROW_LEN {
-                self.lanes.powers[power][j] = [x[j], y[j], z[j], w[j]];
-            }
+        for (is_valid, flag) in self.lanes.is_valid.iter_mut().zip(is_valid) {
+            *is_valid = flag == 1.0;
         }
     }
 }
 
+/// The neighbour of a key with these weights, if it has one, else the key itself.
 #[inline(always)]
-fn either(first: bool, a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+pub(crate) fn inner_or<N: Choice>(weights: [N; 4], neighbour: [N; 4], key: [N; 4]) -> [N; 4] {
+    let is_inner = weights[3].equals(N::all(KEY_INNER));
     [
-        if first { a[0] } else { b[0] },
-        if first { a[1] } else { b[1] },
-        if first { a[2] } else { b[2] },
-        if first { a[3] } else { b[3] },
+        N::choose(is_inner, neighbour[0], key[0]),
+        N::choose(is_inner, neighbour[1], key[1]),
+        N::choose(is_inner, neighbour[2], key[2]),
+        N::choose(is_inner, neighbour[3], key[3]),
     ]
 }

@@ -314,7 +314,7 @@ impl KeyDispatch<'_, '_> {
             && let Some(clock) = self.job.clock()
         {
             let written_samples = take_first(&mut written.samples, task.samples.len());
-            let found = known.frames.samples(track, clock, &task.samples)?;
+            let (found, _) = known.frames.samples(track, clock, &task.samples)?;
             for (to, sample) in written_samples.iter_mut().zip(found) {
                 *to = KeySample {
                     key: sample.key + first_key,

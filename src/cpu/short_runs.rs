@@ -1,0 +1,122 @@
+//! Rows of kept clips with few samples between keys, as keys at 30 Hz have at 60 frames a second. The samples of such a
+//! row, their intervals and parameters, are found once for all tracks in succession with the same key times: to find
+//! them takes longer than to evaluate them. Arcs are computed from their keys again, in a lane for each interval, which
+//! takes less time than to read them from memory.
+
+use std::ops::Range;
+
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, at_parameter};
+use crate::from_keys::KeyCurve;
+use crate::from_keys::intervals::{IntervalPlan, MIN_LANES, evaluate_intervals};
+use crate::prepare::clip_data::{ClipData, PartRef};
+use crate::shader::{Form, PolynomialSegment};
+use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
+use crate::simd::lanes::Lanes;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::key_samples::FramePlan;
+use crate::time::runs::NONE;
+
+/// The mean number of samples of an arc from which its run is evaluated in vectors of its own.
+const SAMPLES_OF_AN_ARC: usize = 8;
+
+/// Evaluates rows of some samples of a clip.
+pub(crate) struct ShortRuns<'a> {
+    clip: &'a ClipData,
+    clock: FrameClock,
+    samples: Range<usize>,
+    width: VectorWidth,
+    /// The tracks for which samples were found, of [`ClipData::time_classes`].
+    class: u32,
+    frames: FramePlan<'static>,
+    plan: IntervalPlan,
+}
+
+impl<'a> ShortRuns<'a> {
+    /// `None` if a clip's runs are long at this timeline, or its tracks repeat.
+    pub(crate) fn new(
+        clip: &'a ClipData,
+        timeline: &Timeline,
+        samples: &Range<usize>,
+        width: VectorWidth,
+    ) -> Option<Self> {
+        let &Ticks::Frames { rate, start } = &timeline.ticks else {
+            return None;
+        };
+        let limit = match clip.interpolation.form() {
+            Form::Arc => SAMPLES_OF_AN_ARC,
+            // One by one, as they are in runs.
+            Form::Polynomial => SAMPLES_ONE_BY_ONE,
+        };
+        let is_short = samples.len() > SAMPLES_ONE_BY_ONE
+            && !clip.interpolation.wrap().repeats()
+            && clip.samples_of_a_run(timeline) < limit;
+        is_short.then(|| Self {
+            clip,
+            clock: FrameClock::new(rate, start, false),
+            samples: samples.clone(),
+            width,
+            class: NONE,
+            frames: FramePlan::new(),
+            plan: IntervalPlan::new(KeyCurve::Arcs),
+        })
+    }
+
+    /// Evaluates the samples of a track; returns whether it can be evaluated so.
+    pub(crate) fn row(&mut self, track: usize, output: &mut [[f32; 4]]) -> bool {
+        let class = self.clip.time_classes()[track];
+        let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
+            return false;
+        };
+        let is_short = part.spans.len() < MIN_LANES;
+        if class == NONE || is_short || output.len() != self.samples.len() {
+            return false;
+        }
+        if class != self.class {
+            let starts = &prepared.spans.starts[part.spans.clone()];
+            let found = (self.frames).find(starts, part.end, self.clock, &self.samples);
+            // Who evaluates the row otherwise reports an interval with too many frames.
+            let Ok((samples, number)) = found else {
+                return false;
+            };
+            self.plan.find(number, samples, &[]);
+            self.class = class;
+        }
+        if self.plan.is_short() {
+            return false;
+        }
+        let (segments, keys) = (&prepared.segments, prepared.keys_of(part));
+        match segments.form {
+            Form::Arc => {
+                evaluate_intervals(self.width, &self.plan, keys, keys, output);
+            }
+            Form::Polynomial => {
+                self.plan.store_keys(keys, output);
+                let first = prepared.first_segment(part);
+                let segments = &segments.polynomials[first..first + part.spans.len()];
+                in_lanes_into(self.width, &Polynomials(&self.plan), segments, output);
+            }
+        }
+        true
+    }
+}
+
+/// Evaluates samples of polynomials one by one, all of a segment in succession.
+struct Polynomials<'a>(&'a IntervalPlan);
+
+impl InLanesInto<[PolynomialSegment], [[f32; 4]]> for Polynomials<'_> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, segments: &[PolynomialSegment], output: &mut [[f32; 4]]) {
+        for lanes in self.0.vectors() {
+            for (lane, (interval, samples)) in lanes.intervals().enumerate() {
+                let segment = &segments[interval];
+                let parameters = self.0.parameters_of(lanes, lane);
+                for (value, parameter) in output[samples].iter_mut().zip(parameters) {
+                    *value = at_parameter(segment, parameter);
+                }
+            }
+        }
+    }
+}
