@@ -417,9 +417,9 @@ impl Bench<'_> {
                 ..today.variant
             };
             if let Some(index) = variants.iter().position(|one| *one == variant) {
-                let [least, most] = self.twice(dispatch(index), between)?.microseconds;
+                let [shorter, longer] = self.twice(dispatch(index), between)?.microseconds;
                 let of_today = today.time.best().max(f64::MIN_POSITIVE);
-                of_lanes.push(Timed::new(least / of_today, most / of_today));
+                of_lanes.push(Timed::new(shorter / of_today, longer / of_today));
             }
         }
         let row = LabRow {

@@ -117,16 +117,14 @@ pub struct Decision {
     pub result: String,
 }
 
-impl Engine {
-    /// Compares all variants of the kernels over spread runs with their twins, and measures them. `None` on the CPU.
-    /// Without a clock on the device, nothing is timed.
-    ///
-    /// # Errors
-    /// When the device fails, or has no memory for the test.
-    pub fn lab(&self, options: &LabOptions) -> Result<Option<LabReport>, Error> {
-        let Some(opened) = self.opened() else {
-            return Ok(None);
-        };
-        Ok(Some(bench::run(&opened.engine(), options)?))
-    }
+/// Compares all variants of the kernels over spread runs with their twins, and measures them. `None` on the CPU. Without
+/// a clock on the device, nothing is timed.
+///
+/// # Errors
+/// When the device fails, or has no memory for the test.
+pub fn lab(engine: &Engine, options: &LabOptions) -> Result<Option<LabReport>, Error> {
+    let Some(opened) = engine.opened() else {
+        return Ok(None);
+    };
+    Ok(Some(bench::run(&opened.engine(), options)?))
 }

@@ -10,7 +10,7 @@ const MARGIN: f64 = 0.02;
 /// Linear stores are near the rate of filling, and stores of eight lanes far apart are not: on an H200, which fills 79 MB
 /// in 18.7 µs, below 20.5 µs and from 23 µs on.
 const NEAR_FILL: f64 = 20.5 / 18.7;
-const FAR_FROM_FILL: f64 = 23.0 / 18.7;
+const ABOVE_FILL: f64 = 23.0 / 18.7;
 
 /// What stores past the caches must gain.
 const GAIN_OF_STREAMING: f64 = 1.1;
@@ -40,8 +40,8 @@ impl Timed {
 
     /// What two measurements differ, as a share of the shorter.
     fn spread(&self) -> f64 {
-        let [least, most] = self.microseconds;
-        (most - least) / least.max(f64::MIN_POSITIVE)
+        let [shorter, longer] = self.microseconds;
+        (longer - shorter) / shorter.max(f64::MIN_POSITIVE)
     }
 
     /// Whether it is shorter than another time by more than the margin and what either was measured to vary.
@@ -74,7 +74,7 @@ pub(super) fn winner(candidates: &[(Timed, usize)]) -> usize {
 
 /// Whether 32 lanes store a long run rather than eight.
 pub(super) fn needs_wide_runs(fill: f64, linear: f64, strided: f64) -> bool {
-    linear < NEAR_FILL * fill && strided >= FAR_FROM_FILL * fill
+    linear < NEAR_FILL * fill && strided >= ABOVE_FILL * fill
 }
 
 /// Whether results go past the caches, by the times of kernels that keep them there and of those that do not.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use tumble::verify::lab::{LabOptions, LabReport};
+use tumble::verify::lab::{LabOptions, LabReport, lab};
 use tumble::vulkan::DeviceInfo;
 use tumble::vulkan::tuning::RunLanes;
 use tumble::{Engine, EngineOptions};
@@ -89,10 +89,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut options = EngineOptions::default();
     options.allow_inexact = true;
     let engine = Engine::with_options(vulkan, &options).map_err(|error| refused(&error))?;
-    let lab = engine.lab(&LabOptions {
+    let options = LabOptions {
         bits_only: arguments.bits,
         budget: Duration::from_secs(arguments.time_limit),
-    });
+    };
+    let lab = lab(&engine, &options);
     let (Some(lab), Some(info)) = (lab.map_err(|error| refused(&error))?, engine.device_info())
     else {
         return Err(Failure::new(DEVICE, "the device is no Vulkan device"));

@@ -55,7 +55,7 @@ pub(super) fn page(device: &str, seconds: f64, lab: &LabReport) -> String {
             format!("  {applies:3}  {}: {}", decision.rule, decision.result)
         })
         .collect();
-    let room = MAX_LINES.saturating_sub(lines.len() + decided.len() + 4);
+    let room = MAX_LINES.saturating_sub(lines.len() + decided.len() + 3);
     if !lab.rows.is_empty() {
         lines.push(
             "kernels: samples of a run, today's time, the best variant's, its share of filling"
@@ -80,8 +80,8 @@ pub(super) fn page(device: &str, seconds: f64, lab: &LabReport) -> String {
 }
 
 fn times(time: Timed) -> String {
-    let [least, most] = time.microseconds;
-    format!("{least:8.2} to {most:8.2} µs")
+    let [shorter, longer] = time.microseconds;
+    format!("{shorter:8.2} to {longer:8.2} µs")
 }
 
 fn kernel(row: &LabRow) -> String {
