@@ -59,6 +59,11 @@ fn expect_proof(run: &Run, proof: &Value, name: &str) {
     assert!(number("/golden/cases") > 360, "{page}");
     assert_eq!(number("/golden/cases_compared"), number("/golden/cases"));
     assert!(number("/random/crowds") >= 1 && number("/random/values") > 10_000);
+    // Crowds and clips whose result stays on the device, in rows too; slower drivers may have no time for all.
+    let cases = proof["figures"]["cases"].as_array().unwrap();
+    let rows = cases.iter().filter(|case| case["row_seconds"].is_f64());
+    let crowds = rows.filter(|case| case["case"] == "crowd").count();
+    assert!(name != "llvmpipe" || crowds == 6, "{page}");
     assert_eq!(faults(&schema("proof"), proof), Vec::<String>::new());
 }
 

@@ -673,9 +673,12 @@ pub(crate) struct Spread {
     pub(crate) first_output: u32,
     pub(crate) lanes_log2: u32,
     pub(crate) line_mask: u32,
+    pub(crate) segments: u32,
+    pub(crate) constants: u32,
+    pub(crate) outputs: u32,
 }
 
-stored!(Spread, (), 6, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, line_mask 5);
+stored!(Spread, (), 9, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, line_mask 5, segments 6, constants 7, outputs 8);
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SpreadRun<F> {
@@ -1055,6 +1058,14 @@ pub(crate) fn constant_of_polynomial_segment<M: Machine>(
     segment: PolynomialSegment<M::F>,
 ) -> M::F {
     M::F::of(0.0)
+}
+
+/// A constant of a run, in a repetition.
+pub(crate) fn constant_of_run<M: Machine>(machine: &M, index: u32, repetition: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let result = constant_at(machine, index.wrapping_add(repetition.wrapping_mul(loaded)));
+    result
 }
 
 /// The coefficients of 1, s, s², … s¹⁰.
@@ -2004,6 +2015,16 @@ pub(crate) async fn finish_2_of_together_3<M: Machine>(
     barrier().await;
 }
 
+/// Where the first sample of a run is stored, in a repetition.
+pub(crate) fn first_of_run<M: Machine>(machine: &M, item: SpreadRun<M::F>, repetition: u32) -> u32 {
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
+    item.output
+        .wrapping_add(loaded)
+        .wrapping_add(repetition.wrapping_mul(loaded_2))
+}
+
 /// 0 where the magnitude is below 2^-50.
 pub(crate) fn flushed<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 4);
@@ -2684,83 +2705,83 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
     let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
     let count = sample_count(machine, item);
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = item.output.wrapping_add(loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_6;
+    let first = first_of_run(machine, item, group[2]);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_5;
     j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
     if item.count != count {
         let _block = machine.block(line!(), 2);
-        let loaded_7 = j;
-        store_with_care(machine, item, first, count, loaded_7, lanes);
+        let loaded_6 = j;
+        store_with_care(machine, item, first, count, loaded_6, lanes, group[2]);
         return;
     }
-    let segment = segment_at_arc_segment(machine, item.source);
+    let result = segment_of_run(machine, item, group[2]);
+    let segment = segment_at_arc_segment(machine, result);
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_8 = j;
-    if loaded_8 < count {
+    let loaded_7 = j;
+    if loaded_7 < count {
         let _block = machine.block(line!(), 12);
+        let loaded_8 = j;
+        let result_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_8);
+        rotation = result_2;
         let loaded_9 = j;
-        let result = evaluate_near_arc_segment(machine, item, segment, constant, loaded_9);
-        rotation = result;
-        let loaded_10 = j;
-        if (loaded_10 == 0u32) & (item.key != NO_KEY) {
+        if (loaded_9 == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, item.key);
-            rotation = result_2;
+            let result_3 = constant_of_run(machine, item.key, group[2]);
+            rotation = result_3;
         }
-        let loaded_11 = j;
-        let loaded_12 = rotation;
-        store(machine, first.wrapping_add(loaded_11), loaded_12);
+        let loaded_10 = j;
+        let loaded_11 = rotation;
+        store(machine, first.wrapping_add(loaded_10), loaded_11);
     }
-    let loaded_13 = j;
-    j = loaded_13.wrapping_add(lanes);
+    let loaded_12 = j;
+    j = loaded_12.wrapping_add(lanes);
     let end = count.wrapping_add(idle);
     pair_end = 3u32.wrapping_mul(lanes);
-    let loaded_14 = pair_end;
-    if loaded_14 <= end {
+    let loaded_13 = pair_end;
+    if loaded_13 <= end {
         loop {
             let _block = machine.block(line!(), 23);
+            let loaded_14 = j;
+            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_14);
             let loaded_15 = j;
-            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_15);
-            let loaded_16 = j;
             let next = evaluate_near_arc_segment(
                 machine,
                 item,
                 segment,
                 constant,
-                loaded_16.wrapping_add(lanes),
+                loaded_15.wrapping_add(lanes),
             );
+            let loaded_16 = j;
+            store(machine, first.wrapping_add(loaded_16), rotation_2);
             let loaded_17 = j;
-            store(machine, first.wrapping_add(loaded_17), rotation_2);
-            let loaded_18 = j;
             store(
                 machine,
-                first.wrapping_add(loaded_18).wrapping_add(lanes),
+                first.wrapping_add(loaded_17).wrapping_add(lanes),
                 next,
             );
-            let loaded_19 = j;
-            j = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_18 = j;
+            j = loaded_18.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_19 = pair_end;
+            pair_end = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
             let loaded_20 = pair_end;
-            pair_end = loaded_20.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_21 = pair_end;
-            if loaded_21 > end {
+            if loaded_20 > end {
                 break;
             }
         }
     }
-    let loaded_22 = j;
-    if loaded_22 < count {
+    let loaded_21 = j;
+    if loaded_21 < count {
         loop {
             let _block = machine.block(line!(), 11);
+            let loaded_22 = j;
             let loaded_23 = j;
+            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_23);
+            store(machine, first.wrapping_add(loaded_22), result_4);
             let loaded_24 = j;
-            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_24);
-            store(machine, first.wrapping_add(loaded_23), result_3);
+            j = loaded_24.wrapping_add(lanes);
             let loaded_25 = j;
-            j = loaded_25.wrapping_add(lanes);
-            let loaded_26 = j;
-            if loaded_26 >= count {
+            if loaded_25 >= count {
                 break;
             }
         }
@@ -2803,98 +2824,98 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_1(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 3u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 3u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_19) as usize,
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize,
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            let loaded_29 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize,
-                loaded_30,
+                first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize,
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -2931,98 +2952,98 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_2(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 9u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 9u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_19) as usize,
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize,
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(9u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(9u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(9u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(9u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(9u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(9u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            let loaded_29 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_28) as usize,
-                loaded_30,
+                first.wrapping_mul(9u32).wrapping_add(loaded_27) as usize,
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -3059,98 +3080,98 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_3(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 3u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 3u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_19) as usize),
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize),
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_29) as usize));
+            let loaded_29 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_28) as usize));
             machine.store::<[M::F; 4]>(
                 Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize),
-                loaded_30,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize),
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -3335,85 +3356,85 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
     let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
     let count = sample_count(machine, item);
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = item.output.wrapping_add(loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_6;
+    let first = first_of_run(machine, item, group[2]);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_5;
     j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
     if item.count != count {
         let _block = machine.block(line!(), 2);
-        let loaded_7 = j;
-        store_with_care(machine, item, first, count, loaded_7, lanes);
+        let loaded_6 = j;
+        store_with_care(machine, item, first, count, loaded_6, lanes, group[2]);
         return;
     }
-    let segment = segment_at_polynomial_segment(machine, item.source);
+    let result = segment_of_run(machine, item, group[2]);
+    let segment = segment_at_polynomial_segment(machine, result);
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_8 = j;
-    if loaded_8 < count {
+    let loaded_7 = j;
+    if loaded_7 < count {
         let _block = machine.block(line!(), 12);
+        let loaded_8 = j;
+        let result_2 = evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_8);
+        rotation = result_2;
         let loaded_9 = j;
-        let result = evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_9);
-        rotation = result;
-        let loaded_10 = j;
-        if (loaded_10 == 0u32) & (item.key != NO_KEY) {
+        if (loaded_9 == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, item.key);
-            rotation = result_2;
+            let result_3 = constant_of_run(machine, item.key, group[2]);
+            rotation = result_3;
         }
-        let loaded_11 = j;
-        let loaded_12 = rotation;
-        store(machine, first.wrapping_add(loaded_11), loaded_12);
+        let loaded_10 = j;
+        let loaded_11 = rotation;
+        store(machine, first.wrapping_add(loaded_10), loaded_11);
     }
-    let loaded_13 = j;
-    j = loaded_13.wrapping_add(lanes);
+    let loaded_12 = j;
+    j = loaded_12.wrapping_add(lanes);
     let end = count.wrapping_add(idle);
     pair_end = 3u32.wrapping_mul(lanes);
-    let loaded_14 = pair_end;
-    if loaded_14 <= end {
+    let loaded_13 = pair_end;
+    if loaded_13 <= end {
         loop {
             let _block = machine.block(line!(), 23);
-            let loaded_15 = j;
+            let loaded_14 = j;
             let rotation_2 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_15);
-            let loaded_16 = j;
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_14);
+            let loaded_15 = j;
             let next = evaluate_near_polynomial_segment(
                 machine,
                 item,
                 segment,
                 constant,
-                loaded_16.wrapping_add(lanes),
+                loaded_15.wrapping_add(lanes),
             );
+            let loaded_16 = j;
+            store(machine, first.wrapping_add(loaded_16), rotation_2);
             let loaded_17 = j;
-            store(machine, first.wrapping_add(loaded_17), rotation_2);
-            let loaded_18 = j;
             store(
                 machine,
-                first.wrapping_add(loaded_18).wrapping_add(lanes),
+                first.wrapping_add(loaded_17).wrapping_add(lanes),
                 next,
             );
-            let loaded_19 = j;
-            j = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_18 = j;
+            j = loaded_18.wrapping_add(2u32.wrapping_mul(lanes));
+            let loaded_19 = pair_end;
+            pair_end = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
             let loaded_20 = pair_end;
-            pair_end = loaded_20.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_21 = pair_end;
-            if loaded_21 > end {
+            if loaded_20 > end {
                 break;
             }
         }
     }
-    let loaded_22 = j;
-    if loaded_22 < count {
+    let loaded_21 = j;
+    if loaded_21 < count {
         loop {
             let _block = machine.block(line!(), 11);
+            let loaded_22 = j;
             let loaded_23 = j;
+            let result_4 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_23);
+            store(machine, first.wrapping_add(loaded_22), result_4);
             let loaded_24 = j;
-            let result_3 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_24);
-            store(machine, first.wrapping_add(loaded_23), result_3);
+            j = loaded_24.wrapping_add(lanes);
             let loaded_25 = j;
-            j = loaded_25.wrapping_add(lanes);
-            let loaded_26 = j;
-            if loaded_26 >= count {
+            if loaded_25 >= count {
                 break;
             }
         }
@@ -3456,98 +3477,98 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_1(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 3u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 3u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_19) as usize,
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize,
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            let loaded_29 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize,
-                loaded_30,
+                first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize,
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -3584,98 +3605,98 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_2(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 9u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 9u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_19) as usize,
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize,
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(9u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(9u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(9u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(9u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(9u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(9u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_29) as usize);
+            let loaded_29 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_28) as usize,
-                loaded_30,
+                first.wrapping_mul(9u32).wrapping_add(loaded_27) as usize,
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -3712,98 +3733,98 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
         let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item.source;
+    let loaded_8 = item;
+    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            loaded_8
+            index_of_segment
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item.output;
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 3);
-    let first = loaded_11.wrapping_add(loaded_12);
-    let loaded_13 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_13;
+    let loaded_11 = item;
+    let first = first_of_run(machine, loaded_11, group[2]);
+    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_12;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_14 = iteration;
-        if !(loaded_14 < iterations) {
+        let loaded_13 = iteration;
+        if !(loaded_13 < iterations) {
             break;
         }
-        let loaded_15 = iteration;
-        let values = (loaded_15 & 1u32)
+        let loaded_14 = iteration;
+        let values = (loaded_14 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_16 = end;
-        let j = loaded_16.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_15 = end;
+        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_17 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_17, segment, j);
+            let loaded_16 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
             let result_4 = parts_3(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_18 = part;
-                if !(loaded_18 < 3u32) {
+                let loaded_17 = part;
+                if !(loaded_17 < 3u32) {
                     break;
                 }
+                let loaded_18 = part;
                 let loaded_19 = part;
-                let loaded_20 = part;
-                let loaded_21 = all[loaded_20 as usize];
+                let loaded_20 = all[loaded_19 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_19) as usize),
-                    loaded_21,
+                        .wrapping_add(loaded_18) as usize),
+                    loaded_20,
                 );
-                let loaded_22 = part;
-                part = loaded_22.wrapping_add(1u32);
+                let loaded_21 = part;
+                part = loaded_21.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_22 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_23).wrapping_mul(3u32));
         let loaded_24 = end;
-        let loaded_25 = end;
-        let parts_end = (if count < loaded_25 { count } else { loaded_24 }).wrapping_mul(3u32);
-        let loaded_26 = begin;
-        part_2 = loaded_26.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
+        let loaded_25 = begin;
+        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_27 = part_2;
-            if !(loaded_27 < parts_end) {
+            let loaded_26 = part_2;
+            if !(loaded_26 < parts_end) {
                 break;
             }
+            let loaded_27 = part_2;
             let loaded_28 = part_2;
-            let loaded_29 = part_2;
-            let loaded_30 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_29) as usize));
+            let loaded_29 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_28) as usize));
             machine.store::<[M::F; 4]>(
                 Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_28) as usize),
-                loaded_30,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize),
+                loaded_29,
             );
-            let loaded_31 = part_2;
-            part_2 = loaded_31.wrapping_add(lanes);
+            let loaded_30 = part_2;
+            part_2 = loaded_30.wrapping_add(lanes);
         }
+        let loaded_31 = end;
+        begin = loaded_31;
         let loaded_32 = end;
-        begin = loaded_32;
-        let loaded_33 = end;
-        end = loaded_33.wrapping_add(lanes);
-        let loaded_34 = iteration;
-        iteration = loaded_34.wrapping_add(1u32);
+        end = loaded_32.wrapping_add(lanes);
+        let loaded_33 = iteration;
+        iteration = loaded_33.wrapping_add(1u32);
     }
 }
 
@@ -5352,18 +5373,17 @@ pub(crate) fn sample_of_arc_segment<M: Machine>(
     item: SpreadRun<M::F>,
     segment: ArcSegment<M::F>,
     j: u32,
+    repetition: u32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 14);
     if (item.count & IS_CONSTANT != 0u32) | ((j == 0u32) & (item.key != NO_KEY)) {
         let _block = machine.block(line!(), 4);
-        let result = constant_at(
-            machine,
-            if item.count & IS_CONSTANT != 0u32 {
-                item.source
-            } else {
-                item.key
-            },
-        );
+        let index = if item.count & IS_CONSTANT != 0u32 {
+            item.source
+        } else {
+            item.key
+        };
+        let result = constant_of_run(machine, index, repetition);
         return result;
     }
     let distance = distance_from_middle(machine, item.first, j);
@@ -5382,18 +5402,17 @@ pub(crate) fn sample_of_polynomial_segment<M: Machine>(
     item: SpreadRun<M::F>,
     segment: PolynomialSegment<M::F>,
     j: u32,
+    repetition: u32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 14);
     if (item.count & IS_CONSTANT != 0u32) | ((j == 0u32) & (item.key != NO_KEY)) {
         let _block = machine.block(line!(), 4);
-        let result = constant_at(
-            machine,
-            if item.count & IS_CONSTANT != 0u32 {
-                item.source
-            } else {
-                item.key
-            },
-        );
+        let index = if item.count & IS_CONSTANT != 0u32 {
+            item.source
+        } else {
+            item.key
+        };
+        let result = constant_of_run(machine, index, repetition);
         return result;
     }
     let distance = distance_from_middle(machine, item.first, j);
@@ -5632,6 +5651,17 @@ pub(crate) fn segment_of_polynomial_segment<M: Machine>(
         },
     );
     result
+}
+
+/// The index of a run's segment, in a repetition.
+pub(crate) fn segment_of_run<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    repetition: u32,
+) -> u32 {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::Dispatch, 6);
+    item.source.wrapping_add(repetition.wrapping_mul(loaded))
 }
 
 /// Sine (x) and cosine (y).
@@ -6227,6 +6257,7 @@ pub(crate) fn store_with_care<M: Machine>(
     count: u32,
     first_j: u32,
     lanes: u32,
+    repetition: u32,
 ) {
     const OF_KERNELS: [u8; 193] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6238,8 +6269,8 @@ pub(crate) fn store_with_care<M: Machine>(
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => store_with_care_of_alone(machine, item, first, count, first_j, lanes),
-        _ => store_with_care_of_alone_2(machine, item, first, count, first_j, lanes),
+        0 => store_with_care_of_alone(machine, item, first, count, first_j, lanes, repetition),
+        _ => store_with_care_of_alone_2(machine, item, first, count, first_j, lanes, repetition),
     }
 }
 
@@ -6251,13 +6282,14 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
     count: u32,
     first_j: u32,
     lanes: u32,
+    repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 11);
+    let _block = machine.block(line!(), 12);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
-        let constant = constant_at(machine, item.source);
+        let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
             let _block = machine.block(line!(), 3);
@@ -6279,14 +6311,15 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         }
         return;
     }
-    let segment = segment_at_arc_segment(machine, item.source);
+    let result = segment_of_run(machine, item, repetition);
+    let segment = segment_at_arc_segment(machine, result);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);
         let loaded_8 = j;
         let loaded_9 = j;
-        let result = sample_of_arc_segment(machine, item, segment, loaded_9);
-        store(machine, first.wrapping_add(loaded_8), result);
+        let result_2 = sample_of_arc_segment(machine, item, segment, loaded_9, repetition);
+        store(machine, first.wrapping_add(loaded_8), result_2);
     }
     let loaded_10 = j;
     j = loaded_10.wrapping_add(lanes);
@@ -6298,8 +6331,8 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         }
         let loaded_12 = j;
         let loaded_13 = j;
-        let result_2 = sample_of_arc_segment(machine, item, segment, loaded_13);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        let result_3 = sample_of_arc_segment(machine, item, segment, loaded_13, repetition);
+        store(machine, first.wrapping_add(loaded_12), result_3);
         let loaded_14 = j;
         j = loaded_14.wrapping_add(lanes);
     }
@@ -6313,13 +6346,14 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     count: u32,
     first_j: u32,
     lanes: u32,
+    repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 11);
+    let _block = machine.block(line!(), 12);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
-        let constant = constant_at(machine, item.source);
+        let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
             let _block = machine.block(line!(), 3);
@@ -6341,14 +6375,15 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         }
         return;
     }
-    let segment = segment_at_polynomial_segment(machine, item.source);
+    let result = segment_of_run(machine, item, repetition);
+    let segment = segment_at_polynomial_segment(machine, result);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);
         let loaded_8 = j;
         let loaded_9 = j;
-        let result = sample_of_polynomial_segment(machine, item, segment, loaded_9);
-        store(machine, first.wrapping_add(loaded_8), result);
+        let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_9, repetition);
+        store(machine, first.wrapping_add(loaded_8), result_2);
     }
     let loaded_10 = j;
     j = loaded_10.wrapping_add(lanes);
@@ -6360,8 +6395,8 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         }
         let loaded_12 = j;
         let loaded_13 = j;
-        let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_13);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        let result_3 = sample_of_polynomial_segment(machine, item, segment, loaded_13, repetition);
+        store(machine, first.wrapping_add(loaded_12), result_3);
         let loaded_14 = j;
         j = loaded_14.wrapping_add(lanes);
     }

@@ -14,6 +14,13 @@ struct Spread {
     lanes_log2: u32,
     /// The invocations that store one line of memory, less one.
     line_mask: u32,
+    /// How many segments the runs of the next repetition are further on, where tracks with the same times share their
+    /// runs. A repetition is a layer of workgroups.
+    segments: u32,
+    /// How many constants they are further on.
+    constants: u32,
+    /// How many values they are further on in the result.
+    outputs: u32,
 }
 
 /// Consecutive samples of one track that lie in one segment, or hold one constant. Its invocations take
@@ -50,14 +57,30 @@ const NO_KEY: u32 = 0xffffffff;
 
 var<immediate> dispatch: Spread;
 
+// Where the first sample of a run is stored, in a repetition.
+fn first_of_run(item: SpreadRun, repetition: u32) -> u32 {
+    return item.output + dispatch.first_output + repetition * dispatch.outputs;
+}
+
+// The index of a run's segment, in a repetition.
+fn segment_of_run(item: SpreadRun, repetition: u32) -> u32 {
+    return item.source + repetition * dispatch.segments;
+}
+
+// A constant of a run, in a repetition.
+fn constant_of_run(index: u32, repetition: u32) -> vec4f {
+    return constant_at(index + repetition * dispatch.constants);
+}
+
 fn sample_count(item: SpreadRun) -> u32 {
     return item.count & ~(IS_CONSTANT | NEEDS_CARE);
 }
 
 // What any run has at its `j`th sample.
-fn sample_of(item: SpreadRun, segment: Segment, j: u32) -> vec4f {
+fn sample_of(item: SpreadRun, segment: Segment, j: u32, repetition: u32) -> vec4f {
     if ((item.count & IS_CONSTANT) != 0u) | ((j == 0u) & (item.key != NO_KEY)) {
-        return constant_at(select(item.key, item.source, (item.count & IS_CONSTANT) != 0u));
+        let index = select(item.key, item.source, (item.count & IS_CONSTANT) != 0u);
+        return constant_of_run(index, repetition);
     }
     let distance = distance_from_middle(item.first, j);
     let rotation = evaluate(segment, distance * item.scale + item.offset);

@@ -18,21 +18,21 @@ fn main(
     }
     let item = item_at(dispatch.first_item + index);
     let count = sample_count(item);
-    let first = item.output + dispatch.first_output;
+    let first = first_of_run(item, group.z);
     // The first iteration begins where the line of the first sample does. What lies before that sample wraps to a
     // large number.
     let idle = first & dispatch.line_mask;
     var j = (invocation & (lanes - 1u)) - idle;
     if item.count != count {
-        store_with_care(item, first, count, j, lanes);
+        store_with_care(item, first, count, j, lanes, group.z);
         return;
     }
-    let segment = segment_at(item.source);
+    let segment = segment_at(segment_of_run(item, group.z));
     let constant = constant_of(segment);
     if j < count {
         var rotation = evaluate_near(item, segment, constant, j);
         if (j == 0u) & (item.key != NO_KEY) {
-            rotation = constant_at(item.key);
+            rotation = constant_of_run(item.key, group.z);
         }
         store(first + j, rotation);
     }
@@ -70,10 +70,17 @@ fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> ve
 }
 
 // A constant, or a run whose samples are not all simple, which is rare.
-fn store_with_care(item: SpreadRun, first: u32, count: u32, first_j: u32, lanes: u32) {
+fn store_with_care(
+    item: SpreadRun,
+    first: u32,
+    count: u32,
+    first_j: u32,
+    lanes: u32,
+    repetition: u32,
+) {
     var j = first_j;
     if (item.count & IS_CONSTANT) != 0u {
-        let constant = constant_at(item.source);
+        let constant = constant_of_run(item.source, repetition);
         if j < count {
             store(first + j, constant);
         }
@@ -82,11 +89,11 @@ fn store_with_care(item: SpreadRun, first: u32, count: u32, first_j: u32, lanes:
         }
         return;
     }
-    let segment = segment_at(item.source);
+    let segment = segment_at(segment_of_run(item, repetition));
     if j < count {
-        store(first + j, sample_of(item, segment, j));
+        store(first + j, sample_of(item, segment, j, repetition));
     }
     for (j += lanes; j < count; j += lanes) {
-        store(first + j, sample_of(item, segment, j));
+        store(first + j, sample_of(item, segment, j, repetition));
     }
 }

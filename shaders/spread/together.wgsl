@@ -26,9 +26,10 @@ fn main(
         item = item_at(dispatch.first_item + index);
     }
     // Constants have no segment; the first one exists in any case.
-    let segment = segment_at(select(item.source, 0u, (item.count & IS_CONSTANT) != 0u));
+    let index_of_segment = segment_of_run(item, group.z);
+    let segment = segment_at(select(index_of_segment, 0u, (item.count & IS_CONSTANT) != 0u));
     let count = sample_count(item);
-    let first = item.output + dispatch.first_output;
+    let first = first_of_run(item, group.z);
     let idle = first & dispatch.line_mask;
     let lane = invocation & (lanes - 1u);
     // The samples of an iteration: the first iteration begins where the line of the first sample does.
@@ -39,7 +40,7 @@ fn main(
         let values = ((iteration & 1u) * SPREAD_WORKGROUP + invocation - lane) * PARTS;
         let j = end - lanes + lane;
         if j < count {
-            var all = parts(sample_of(item, segment, j));
+            var all = parts(sample_of(item, segment, j, group.z));
             for (var part = 0u; part < PARTS; part++) {
                 tile[values + lane * PARTS + part] = all[part];
             }

@@ -3,6 +3,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::crowd::layer::CrowdLayer;
+use crate::crowd::library::CrowdLibrary;
 use crate::device::VulkanDevice;
 use crate::engine::Engine;
 use crate::error::Error;
@@ -15,14 +17,19 @@ use crate::output::rotations::Layout;
 use crate::time::frames::SampleTimes;
 use crate::verify::application::{ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::verify::golden::GoldenError;
-use crate::verify::renderer::{Renderer, record, record_clip};
-use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, shared_set};
+use crate::verify::renderer::{Renderer, record, record_clip, record_clip_in_row, record_in_row};
+use crate::verify::sets::{
+    SeededRandom, crowd_layer, crowd_library, shared_set, typical_layer, typical_library,
+};
 
 /// The duration of the keys of the cases, seconds: 26 keys, 0.8 s apart.
 const SECONDS: f64 = 20.0;
 
-/// The calls of a row.
-const ROW: u32 = 32;
+/// The rows of a crowd.
+const CROWD_ROWS: usize = 3;
+
+/// The joints of an instance of a crowd.
+const JOINTS: usize = 60;
 
 /// Measured speeds. Rates are bytes per second. Each figure is the median of several runs after a run that is
 /// ignored.
@@ -65,7 +72,7 @@ pub struct FigureCase {
     pub host_seconds: f64,
     /// The time in which the host recorded a later call into commands, seconds; `None` if the case is not recorded.
     pub record_seconds: Option<f64>,
-    /// The time of one of a row of calls that are recorded one after another, with a barrier between them, seconds;
+    /// The time of one of a row of calls that are recorded one after another, with a barrier between kernels, seconds;
     /// `None` if the case is not recorded, or the device has no time stamps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_seconds: Option<f64>,
@@ -265,6 +272,19 @@ impl Bench {
         }
     }
 
+    /// The calls of a row: few on software devices, where a call takes as long in a row as alone.
+    fn row(&self) -> u32 {
+        if self.is_software { 2 } else { 32 }
+    }
+
+    /// Sets the time of one call of a row, by rows of the last case.
+    fn in_rows(&mut self, rows: &[Elapsed]) {
+        let ((on_device, _), row) = (seconds(rows), self.row());
+        if let Some(case) = self.figures.cases.last_mut() {
+            case.row_seconds = on_device.map(|seconds| seconds / f64::from(row));
+        }
+    }
+
     /// A clip on the device whose result stays there.
     fn kept(
         &mut self,
@@ -282,7 +302,7 @@ impl Bench {
         let frames = SampleTimes::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
         let samples = frames.resolve(tracks, set.time_span())?.len();
         let bytes = (tracks * samples * encoding.bytes()) as u64;
-        let buffer = self.device_buffer(bytes)?;
+        let (buffer, row) = (self.device_buffer(bytes)?, self.row());
         let started = Instant::now();
         let clip = self.renderer.engine.upload(&set, method)?;
         let target = Renderer::clip_target(&clip, &frames, (layout, encoding), (&buffer, 0))?;
@@ -301,10 +321,10 @@ impl Bench {
         })?;
         application.forget_commands();
         let (_, rows) = measured(|| {
-            let row = application.recorded(true, |commands| {
-                (0..ROW).try_for_each(|_| record_clip(&target, commands, 0))
+            let commands = application.recorded(true, |commands| {
+                (0..row).try_for_each(|_| record_clip_in_row(&target, commands))
             })?;
-            Ok(application.timed(row)?)
+            Ok(application.timed(commands)?)
         })?;
         application.forget_commands();
         drop(target);
@@ -313,10 +333,7 @@ impl Bench {
         let first_call = first_call.unwrap_or_default();
         self.add((case, name), (values, bytes), first_call, &runs, "fill");
         self.recorded_in(recording);
-        if let (Some(case), (Some(on_device), _)) = (self.figures.cases.last_mut(), seconds(&rows))
-        {
-            case.row_seconds = Some(on_device / f64::from(ROW));
-        }
+        self.in_rows(&rows);
         Ok(())
     }
 
@@ -373,12 +390,24 @@ impl Bench {
         Ok(())
     }
 
-    /// 10 000 characters of 60 joints, recorded; 500 on software devices.
+    /// 10 000 characters of 60 joints, recorded; 500 on software devices. They play clips of few keys at any speeds and
+    /// wraps, which is hard; then clips as most are.
     fn crowds(&mut self) -> Result<(), GoldenError> {
-        const JOINTS: usize = 60;
+        let random = &mut SeededRandom(61);
+        let library = crowd_library(random, JOINTS, &[method::SLERP, method::SLERP])?;
+        self.crowd("", &library, &mut || crowd_layer(random, &library))?;
+        let library = typical_library(random, JOINTS)?;
+        let name = "8 looped clips × 61 keys, ";
+        self.crowd(name, &library, &mut || typical_layer(random, &library))
+    }
+
+    fn crowd(
+        &mut self,
+        library_name: &str,
+        library: &CrowdLibrary,
+        layer: &mut dyn FnMut() -> CrowdLayer,
+    ) -> Result<(), GoldenError> {
         let instances = if self.is_software { 500 } else { 10_000 };
-        let mut random = SeededRandom(61);
-        let library = crowd_library(&mut random, JOINTS, &[method::SLERP, method::SLERP])?;
         for values in [
             CrowdValues::Rotations,
             CrowdValues::Local,
@@ -391,9 +420,9 @@ impl Bench {
             let size = (instances * JOINTS * output.bytes()) as u64;
             let buffer = self.device_buffer(size)?;
             let started = Instant::now();
-            let mut crowd = self.renderer.engine.crowd(&library, instances, 1)?;
+            let mut crowd = self.renderer.engine.crowd(library, instances, 1)?;
             for instance in 0..instances {
-                crowd.set(instance, 0, crowd_layer(&mut random, &library))?;
+                crowd.set(instance, 0, layer())?;
             }
             let target = Renderer::target(&crowd, output, &buffer)?;
             let (mut runs, mut recording) = (Vec::new(), Vec::new());
@@ -419,13 +448,25 @@ impl Bench {
                     ..ran
                 });
             }
+            let (row, mut rows) = (self.row(), Vec::new());
+            for _ in 0..CROWD_ROWS {
+                let commands = self.renderer.application.recorded(true, |commands| {
+                    (0..row).try_for_each(|_| {
+                        crowd.advance_ticks(11_760)?;
+                        record_in_row(&mut crowd, &target, commands)
+                    })
+                })?;
+                let ran = self.renderer.application.timed(commands);
+                rows.push(ran.map_err(Error::from)?);
+            }
             drop(target);
             self.renderer.application.forget_commands();
             let joints = (instances * JOINTS) as u64;
-            let name = format!("{instances} instances × {JOINTS} joints, {values:?}");
+            let name = format!("{instances} instances × {JOINTS} joints, {library_name}{values:?}");
             let first_call = first_call.unwrap_or_default();
             self.add(("crowd", name), (joints, size), first_call, &runs, "fill");
             self.recorded_in(recording);
+            self.in_rows(&rows);
         }
         Ok(())
     }

@@ -172,6 +172,31 @@ pub(crate) fn record(
     unsafe { crowd.record(target, commands) }
 }
 
+/// What is recorded of a target between others of the same.
+const IN_ROW: CommandScopes = CommandScopes {
+    before: CommandUsers::KernelsAndCopies,
+    after: CommandUsers::KernelsAndCopies,
+};
+
+/// As [`record_clip`], between recordings of the same target.
+pub(crate) fn record_clip_in_row(
+    target: &ClipTarget,
+    commands: ash::vk::CommandBuffer,
+) -> Result<(), Error> {
+    // SAFETY: as in `record_clip`; nobody else uses the result's memory.
+    Ok(unsafe { target.record_between(commands, 0, IN_ROW) }?)
+}
+
+/// As [`record`], between recordings of the same target.
+pub(crate) fn record_in_row(
+    crowd: &mut Crowd,
+    target: &CrowdTarget,
+    commands: ash::vk::CommandBuffer,
+) -> Result<(), CrowdError> {
+    // SAFETY: as in `record`; nobody else uses the result's memory.
+    unsafe { crowd.record_between(target, commands, IN_ROW) }
+}
+
 /// Records a pass.
 fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
     // Clips were evaluated into its inputs.

@@ -7,6 +7,8 @@ use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd_error::CrowdError;
 use crate::method::Method;
+#[cfg(feature = "prove")]
+use crate::method::slerp::SLERP;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
 use crate::time::wrap::WrapMode;
@@ -355,6 +357,34 @@ pub(crate) fn crowd_library(
     let bind: Vec<Affine3A> = (0..joints).map(bind).collect();
     library.set_inverse_bind(&bind)?;
     Ok(library)
+}
+
+/// A library as games have them: eight clips of two seconds, with a key every thirtieth of a second.
+#[cfg(feature = "prove")]
+pub(crate) fn typical_library(
+    random: &mut SeededRandom,
+    joints: usize,
+) -> Result<CrowdLibrary, CrowdError> {
+    let mut library = CrowdLibrary::new(&skeleton(random, joints))?;
+    for _ in 0..8 {
+        let set = shared_set(random.next(), joints, 61, 1.0 / 30.0, 0.05, 0);
+        library.push(&set, SLERP, VectorMethod::CatmullRom)?;
+    }
+    Ok(library)
+}
+
+/// A layer that plays a clip of [`typical_library`], from anywhere in it.
+#[cfg(feature = "prove")]
+pub(crate) fn typical_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
+    CrowdLayer {
+        clip: random.below(library.clip_count()),
+        time: random.between(0.0, 1e6) as i64,
+        speed: random.pick(&[0.9, 1.0, 1.0, 1.1]),
+        wrap: WrapMode::Loop,
+        weight: 1.0,
+        additive: false,
+        mask: None,
+    }
 }
 
 /// A random layer of an instance.

@@ -11,7 +11,7 @@ use crate::shader::{
 use crate::twin::Evaluate;
 use crate::twin::arc_between::arc_between;
 use crate::work::lists::WorkChunk;
-use crate::work::lists::spread::{NO_RUN, SpreadLanes};
+use crate::work::lists::spread::{NO_RUN, RunRepetitions, SpreadLanes};
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
@@ -86,23 +86,37 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
                 List::FramesSpread | List::TimesSpread => {
                     let lanes_log2 = random.below(2) + if first { 2 } else { 4 };
                     let lanes = SpreadLanes::new(lanes_log2);
-                    scene.spread(random, matches!(list, List::TimesSpread), lanes)
+                    let repetitions = if first { 1 } else { 3 };
+                    let is_listed = matches!(list, List::TimesSpread);
+                    scene.spread(random, is_listed, lanes, repetitions)
                 }
             }
         })
         .collect()
 }
 
-/// A trial of the kernel over spread runs of frames in an encoding: the same samples for any lanes and workgroups.
+/// A trial of the kernel over spread runs of frames in an encoding: the same samples for any lanes and workgroups, so
+/// often repeated.
 #[cfg(feature = "prove")]
-pub(crate) fn spread_trial(form: Form, encoding: Encoding, lanes: SpreadLanes) -> Trial {
-    fn of_form<S: Segment>(encoding: Encoding, lanes: SpreadLanes) -> Trial {
-        let random = &mut Random::canonical();
-        SegmentInputs::<S>::new(random, encoding).spread(random, false, lanes)
-    }
+pub(crate) fn spread_trial(
+    (form, encoding): (Form, Encoding),
+    lanes: SpreadLanes,
+    repetitions: u32,
+) -> Trial {
+    let random = &mut Random::canonical();
     match form {
-        Form::Arc => of_form::<ArcSegment>(encoding, lanes),
-        Form::Polynomial => of_form::<PolynomialSegment>(encoding, lanes),
+        Form::Arc => SegmentInputs::<ArcSegment>::new(random, encoding).spread(
+            random,
+            false,
+            lanes,
+            repetitions,
+        ),
+        Form::Polynomial => SegmentInputs::<PolynomialSegment>::new(random, encoding).spread(
+            random,
+            false,
+            lanes,
+            repetitions,
+        ),
     }
 }
 
@@ -299,9 +313,27 @@ impl<S: Segment> SegmentInputs<S> {
     }
 
     /// Runs of contiguous samples, between some of which there are samples of no run; each run has a number of lanes.
-    fn spread(mut self, random: &mut Random, is_listed: bool, lanes: SpreadLanes) -> Trial {
+    /// Each repetition is of segments and constants further on.
+    fn spread(
+        mut self,
+        random: &mut Random,
+        is_listed: bool,
+        lanes: SpreadLanes,
+        count: u32,
+    ) -> Trial {
         const RUNS: usize = 60;
         const FIRST: u32 = 3;
+        let mut repetitions = RunRepetitions {
+            count,
+            segments: 2,
+            constants: 1,
+            outputs: 0,
+        };
+        for _ in 1..count {
+            let more = (0..repetitions.segments).map(|_| S::between(random.pair()));
+            self.segments.extend(more);
+            self.constants.push(random.rotation());
+        }
         let mut chunk = WorkChunk::default();
         let mut output = 0;
         for _ in 0..RUNS {
@@ -312,24 +344,31 @@ impl<S: Segment> SegmentInputs<S> {
             chunk.runs.extend(
                 self.items
                     .pop()
-                    .map(|item| self.run(random, is_listed, item)),
+                    .map(|item| self.run(random, is_listed, item, repetitions)),
             );
             output += length;
         }
+        repetitions.outputs = output + 1;
         let mut list = vec![NO_RUN; lanes.entries(&chunk)];
         lanes.write_chunk(&chunk, 0, &mut list);
         // Another dispatch has the first entry.
         let entries = list.len() as u32;
         list.insert(0, SpreadRun { count: 9, ..NO_RUN });
-        let dispatch = lanes.dispatch([1, entries], self.detail(), FIRST);
+        let dispatch = lanes.dispatch_repeated([1, entries], repetitions, self.detail(), FIRST);
         let [workgroups, ..] = lanes.workgroups(entries);
         let mut listed = vec![bytes(&list)];
         listed.extend(is_listed.then(|| bytes(&self.distances)));
-        self.finish(listed, &dispatch, [2, workgroups.div_ceil(2), 1])
+        self.finish(listed, &dispatch, [2, workgroups.div_ceil(2), count])
     }
 
     /// The run of an item, which may begin with a key; in frames far from the middle, it says so.
-    fn run(&self, random: &mut Random, is_listed: bool, item: Item) -> SpreadRun {
+    fn run(
+        &self,
+        random: &mut Random,
+        is_listed: bool,
+        item: Item,
+        repetitions: RunRepetitions,
+    ) -> SpreadRun {
         let mut run = SpreadRun {
             source: item.source,
             output: item.output,
@@ -345,7 +384,11 @@ impl<S: Segment> SegmentInputs<S> {
         if random.once_in(3) {
             run.key = random.below(CONSTANTS as u32);
         }
-        let mut needs_care = !self.segments[run.source as usize].is_canonical();
+        let segments = self.segments[run.source as usize..].iter();
+        let mut repeated = segments
+            .step_by(repetitions.segments as usize)
+            .take(repetitions.count as usize);
+        let mut needs_care = repeated.any(|segment| !segment.is_canonical());
         if !is_listed && random.once_in(6) {
             (run.first, run.scale) = (random.word() as i32 >> 2, 0.25 / (1 << 30) as f32);
             needs_care = true;

@@ -15,12 +15,12 @@ use crate::machine::options::RunLanes;
 use crate::output::encoding::Encoding;
 use crate::shader::{Form, IS_CONSTANT, Kernel, NO_KEY, Spread, SpreadRun, Variants};
 use crate::verify::lab::rules::{self, ROW, Timed};
-use crate::verify::lab::variant::{KernelVariant, LabKernel};
+use crate::verify::lab::variant::{KernelVariant, LabKernel, RunList};
 use crate::verify::lab::{
     Ceiling, Decision, LabOptions, LabReport, LabRow, RejectedVariant, VariantTime,
 };
 use crate::work::lists::WorkChunk;
-use crate::work::lists::spread::{NO_RUN, SpreadLanes};
+use crate::work::lists::spread::{NO_RUN, RunRepetitions, SpreadLanes};
 use crate::work::recording::Users;
 
 /// Samples of a measured dispatch: 4096 tracks of 1200 frames, or fewer on software devices.
@@ -39,7 +39,14 @@ const RUNS: [(u32, bool); 7] = [
 ];
 
 /// Segments that runs share in turn, more than a cache has.
-const SEGMENTS: u32 = 1 << 18;
+const SEGMENTS: u32 = 1 << 20;
+
+/// The samples of a track, and the tracks of a list that is repeated.
+const TRACK_SAMPLES: u32 = 1200;
+const LISTED_TRACKS: u32 = 4;
+
+/// The repetitions that are compared with twins.
+const REPETITIONS: u32 = 3;
 
 /// The lanes whose numbers decide for a class of runs.
 const LANES: [u32; 4] = [4, 8, 16, 32];
@@ -84,10 +91,23 @@ struct RowDispatch<'a> {
 
 /// A list of runs on the device, for some lanes and a workgroup.
 struct ListedRuns {
-    lanes: u32,
-    workgroup: u32,
+    lanes: SpreadLanes,
+    list: RunList,
     entries: u32,
+    repetitions: RunRepetitions,
     buffer: Buffer,
+}
+
+impl ListedRuns {
+    /// The push constants and the workgroups of a dispatch over all runs.
+    fn dispatch(&self, detail: u32) -> (Spread, [u32; 3]) {
+        let Self {
+            lanes, repetitions, ..
+        } = *self;
+        let push = lanes.dispatch_repeated([0, self.entries], repetitions, detail, 0);
+        let [x, y, _] = lanes.workgroups(self.entries);
+        (push, [x, y, repetitions.count])
+    }
 }
 
 pub(super) fn run(engine: &VulkanEngine, options: &LabOptions) -> Result<LabReport, VulkanError> {
@@ -161,14 +181,26 @@ impl Bench<'_> {
         for lab_kernel in LabKernel::all() {
             let LabKernel { form, encoding } = lab_kernel;
             let kernel = lab_kernel.kernel();
-            let expected = spread_trial(form, encoding, SpreadLanes::new(3)).expected(kernel);
+            let trial = |lanes, list| {
+                let repetitions = match list {
+                    RunList::EachTrack => 1,
+                    RunList::Shared => REPETITIONS,
+                };
+                spread_trial((form, encoding), lanes, repetitions)
+            };
+            let [each, shared] = [RunList::EachTrack, RunList::Shared]
+                .map(|list| trial(SpreadLanes::new(3), list).expected(kernel));
             for variant in self.variants(lab_kernel, 8) {
                 if self.is_software && !variant.is_typical() {
                     continue;
                 }
                 let pipeline = self.pipeline(kernel, variant)?;
-                let trial = spread_trial(form, encoding, variant.spread_lanes());
-                let [differing, words] = trial.differing_from(expected.clone(), &pipeline)?;
+                let expected = match variant.list {
+                    RunList::EachTrack => each.clone(),
+                    RunList::Shared => shared.clone(),
+                };
+                let trial = trial(variant.spread_lanes(), variant.list);
+                let [differing, words] = trial.differing_from(expected, &pipeline)?;
                 self.report.variants_compared += 1;
                 self.report.words_compared += words as u64;
                 if differing > 0 {
@@ -262,17 +294,34 @@ impl Bench<'_> {
         Buffer::new(&self.engine.device, "tumble lab", bytes, Residence::Results)
     }
 
-    /// Lists runs that follow each other, for some lanes and a workgroup.
+    /// Lists runs that follow each other, for some lanes and a workgroup: all, or those of a few tracks, which are
+    /// repeated.
     fn listed(
         &self,
         run: SpreadRun,
         count: u32,
         lanes: SpreadLanes,
-    ) -> Result<(Buffer, u32), VulkanError> {
+        list: RunList,
+    ) -> Result<ListedRuns, VulkanError> {
+        let runs_of_track = TRACK_SAMPLES.div_ceil(count);
+        let (track, listed, repetitions) = match list {
+            RunList::EachTrack => (self.samples, self.samples, RunRepetitions::ONE),
+            RunList::Shared => (
+                TRACK_SAMPLES,
+                TRACK_SAMPLES * LISTED_TRACKS,
+                RunRepetitions {
+                    count: self.samples / TRACK_SAMPLES / LISTED_TRACKS,
+                    segments: runs_of_track * LISTED_TRACKS,
+                    constants: 0,
+                    outputs: TRACK_SAMPLES * LISTED_TRACKS,
+                },
+            ),
+        };
         let mut chunk = WorkChunk::default();
         let mut output = 0;
-        while output < self.samples {
-            let source = chunk.runs.len() as u32 % SEGMENTS;
+        while output < listed {
+            let source = chunk.runs.len() as u32 % SEGMENTS.min(self.samples / 4);
+            let count = count.min(track - output % track);
             chunk.runs.push(SpreadRun {
                 source: if run.count & IS_CONSTANT != 0 {
                     0
@@ -280,17 +329,27 @@ impl Bench<'_> {
                     source
                 },
                 output,
-                count: count.min(self.samples - output) | run.count,
+                count: count | run.count,
                 ..run
             });
             output += count;
         }
-        let mut list = vec![NO_RUN; lanes.entries(&chunk)];
-        lanes.write_chunk(&chunk, 0, &mut list);
-        Ok((
-            self.resident(bytemuck::cast_slice(&list))?,
-            list.len() as u32,
-        ))
+        let mut written = vec![NO_RUN; lanes.entries(&chunk)];
+        lanes.write_chunk(&chunk, 0, &mut written);
+        Ok(ListedRuns {
+            lanes,
+            list,
+            entries: written.len() as u32,
+            repetitions,
+            buffer: self.resident(bytemuck::cast_slice(&written))?,
+        })
+    }
+
+    /// Whether the segments are enough for runs of so many samples in a list of a kind.
+    fn has_segments(&self, run: u32, list: RunList) -> bool {
+        let tracks = u64::from(self.samples / TRACK_SAMPLES);
+        let needed = tracks * u64::from(TRACK_SAMPLES.div_ceil(run));
+        list == RunList::EachTrack || needed <= u64::from(SEGMENTS.min(self.samples / 4))
     }
 
     fn measure(&mut self) -> Result<(), VulkanError> {
@@ -354,7 +413,7 @@ impl Bench<'_> {
             let is_rejected = |one: &RejectedVariant| {
                 one.variant == *variant && one.kernel == variant_name(kernel, *variant)
             };
-            !rejected.any(is_rejected)
+            !rejected.any(is_rejected) && self.has_segments(run, variant.list)
         });
         let like = SpreadRun {
             first: -(run as i32 / 2),
@@ -364,18 +423,10 @@ impl Bench<'_> {
         };
         let mut prepared = Vec::new();
         for &variant in &variants {
-            let KernelVariant {
-                lanes, workgroup, ..
-            } = variant;
-            let is_listed = |list: &ListedRuns| (list.lanes, list.workgroup) == (lanes, workgroup);
+            let lanes = variant.spread_lanes();
+            let is_listed = |list: &ListedRuns| (list.lanes, list.list) == (lanes, variant.list);
             if !lists.iter().any(is_listed) {
-                let (buffer, entries) = self.listed(like, run, variant.spread_lanes())?;
-                lists.push(ListedRuns {
-                    lanes,
-                    workgroup,
-                    entries,
-                    buffer,
-                });
+                lists.push(self.listed(like, run, lanes, variant.list)?);
             }
             let index = lists.iter().position(is_listed).unwrap_or_default();
             prepared.push((self.pipeline(kernel, variant)?, index));
@@ -383,12 +434,12 @@ impl Bench<'_> {
         let dispatch = |index: usize| {
             let (pipeline, list) = &prepared[index];
             let list = &lists[*list];
-            let lanes = variants[index].spread_lanes();
+            let (push, groups) = list.dispatch(detail);
             RowDispatch {
                 pipeline,
                 buffers: [read[0], read[1], &list.buffer, results],
-                push: lanes.dispatch([0, list.entries], detail, 0),
-                groups: lanes.workgroups(list.entries),
+                push,
+                groups,
             }
         };
         let between = Some(BETWEEN_KERNELS);
@@ -467,12 +518,13 @@ impl Bench<'_> {
             ("store, a workgroup in line", 7, 2048),
         ] {
             let lanes = SpreadLanes::new(lanes_log2);
-            let (list, entries) = self.listed(constant, run, lanes)?;
+            let list = self.listed(constant, run, lanes, RunList::EachTrack)?;
+            let (push, groups) = list.dispatch(0);
             let dispatch = RowDispatch {
                 pipeline: &pipeline,
-                buffers: [constants, constants, &list, results],
-                push: lanes.dispatch([0, entries], 0, 0),
-                groups: lanes.workgroups(entries),
+                buffers: [constants, constants, &list.buffer, results],
+                push,
+                groups,
             };
             add(
                 name,

@@ -14,7 +14,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::machine::options::RunLanes;
 pub use crate::verify::lab::rules::Timed;
-pub use crate::verify::lab::variant::{HalfConversion, KernelVariant, StoreCaching};
+pub use crate::verify::lab::variant::{HalfConversion, KernelVariant, RunList, StoreCaching};
 
 /// What the lab does.
 #[derive(Debug, Clone, Copy)]

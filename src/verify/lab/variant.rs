@@ -26,6 +26,16 @@ pub enum HalfConversion {
     Device,
 }
 
+/// How runs are listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunList {
+    /// The runs of every track.
+    EachTrack,
+    /// The runs of a few tracks, which are repeated for others with the same times.
+    Shared,
+}
+
 /// One way to run a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct KernelVariant {
@@ -37,12 +47,18 @@ pub struct KernelVariant {
     pub stores: StoreCaching,
     /// How numbers become halves; `None` where the kernel stores none.
     pub halves: Option<HalfConversion>,
+    /// How runs are listed.
+    pub list: RunList,
 }
 
 impl KernelVariant {
-    /// What distinguishes pipelines: all but the lanes, which come with a dispatch.
+    /// What distinguishes pipelines: all but the lanes and the list, which come with a dispatch.
     pub(super) fn code(self) -> Self {
-        Self { lanes: 0, ..self }
+        Self {
+            lanes: 0,
+            list: RunList::EachTrack,
+            ..self
+        }
     }
 
     /// The same with stores through the caches.
@@ -131,6 +147,7 @@ impl LabKernel {
             workgroup: SPREAD_WORKGROUP,
             stores: StoreCaching::Streamed,
             halves: conversions[0],
+            list: RunList::EachTrack,
         };
         let mut all = vec![today];
         for &halves in conversions {
@@ -145,12 +162,18 @@ impl LabKernel {
                             workgroup,
                             stores,
                             halves,
+                            list: RunList::EachTrack,
                         };
                         all.extend((variant != today).then_some(variant));
                     }
                 }
             }
         }
+        all.extend([4, 8, 16, 32].map(|lanes| KernelVariant {
+            lanes,
+            list: RunList::Shared,
+            ..today
+        }));
         all
     }
 }
@@ -169,13 +192,16 @@ mod tests {
             .find(|one| one.encoding == Encoding::F16)
             .unwrap();
         for (kernel, converts, count) in
-            [(&kernels[0], true, 24), (f16, false, 24), (f16, true, 48)]
+            [(&kernels[0], true, 28), (f16, false, 28), (f16, true, 52)]
         {
             let all = kernel.variants(8, converts, 1024);
             assert_eq!(all.len(), count);
             assert!((1..count).all(|i| !all[..i].contains(&all[i])));
             assert_eq!((all[0].lanes, all[0].workgroup), (8, 128));
-            assert_eq!(kernel.variants(8, converts, 128).len(), count / 3 * 2);
+            assert_eq!(
+                kernel.variants(8, converts, 128).len(),
+                (count - 4) / 3 * 2 + 4
+            );
         }
     }
 

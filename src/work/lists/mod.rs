@@ -3,6 +3,7 @@
 pub(crate) mod grid;
 pub(crate) mod keys;
 pub(crate) mod sample_list;
+pub(crate) mod shared;
 pub(crate) mod spread;
 
 use bytemuck::Zeroable as _;
@@ -27,7 +28,8 @@ use crate::time::spans::TrackPart;
 use crate::twin::{COARSE, Evaluate as _};
 use crate::work::lists::grid::{GridRows, GroupGrid, write_blocks};
 use crate::work::lists::sample_list::{KeyDensity, SampleList};
-use crate::work::lists::spread::{NO_RUN, RunCounts, SpreadLanes};
+use crate::work::lists::shared::SharedRuns;
+use crate::work::lists::spread::{NO_RUN, RunCounts, RunRepetitions, SpreadLanes};
 use crate::work::recording::{Recording, Resource, Set, workgroups};
 
 /// The work of the device and of the host in a window.
@@ -66,10 +68,12 @@ impl Work {
                     recording.dispatch(set, &grid, of_group.workgroups());
                     continue;
                 }
-                WorkShape::Spread(lanes) => {
+                WorkShape::Spread(lanes, repetitions) => {
                     let entries = [group.first_item, group.items];
-                    let dispatch = lanes.dispatch(entries, detail, stored.first);
-                    recording.dispatch(set, &dispatch, lanes.workgroups(group.items));
+                    let first = group.first_output + stored.first;
+                    let dispatch = lanes.dispatch_repeated(entries, repetitions, detail, first);
+                    let [x, y, _] = lanes.workgroups(group.items);
+                    recording.dispatch(set, &dispatch, [x, y, repetitions.count]);
                     continue;
                 }
             }
@@ -137,7 +141,7 @@ pub(crate) struct GroupItems {
     pub(crate) first_item: u32,
     /// The number of items, or of samples of a sample list.
     pub(crate) items: u32,
-    /// The offset of the first sample of a sample list.
+    /// The offset of the first sample of a sample list, or what is added to the offsets of spread runs.
     pub(crate) first_output: u32,
     pub(crate) shape: WorkShape,
 }
@@ -150,7 +154,7 @@ pub(crate) enum WorkShape {
     /// Neighbours evaluate neighbouring tracks.
     Grid(GroupGrid),
     /// Neighbours evaluate neighbouring samples of a run.
-    Spread(SpreadLanes),
+    Spread(SpreadLanes, RunRepetitions),
 }
 
 /// An offset in the window, and the rotation there.
@@ -309,6 +313,9 @@ impl Lister {
         memory: R,
     ) -> Result<Work, R::Error> {
         let ListRequest { clip, timeline, .. } = request;
+        if let Some(shared) = SharedRuns::new(request, window)? {
+            return shared.write(memory);
+        }
         let lists = work(clip, timeline, window, Cut::Spread, &mut self.spare)?;
         let counts = RunCounts::of_lists(&lists);
         let lanes = SpreadLanes::of_runs(counts, request.run_lanes);
@@ -327,7 +334,7 @@ impl Lister {
                 first_item: first_item - items,
                 items,
                 first_output: 0,
-                shape: WorkShape::Spread(lanes),
+                shape: WorkShape::Spread(lanes, RunRepetitions::ONE),
             }
         });
         let groups = groups.collect();
@@ -342,10 +349,7 @@ impl Lister {
         let distances = bytemuck::cast_slice_mut(distances);
         lanes.write(&lists, bytemuck::cast_slice_mut(runs), distances);
         Ok(Work {
-            list: match timeline.ticks {
-                Ticks::Frames { .. } => List::FramesSpread,
-                Ticks::Times { .. } => List::TimesSpread,
-            },
+            list: spread_list(timeline),
             groups,
             patches: self.take_back(lists),
         })
@@ -362,6 +366,14 @@ impl Lister {
             self.spare.push(chunk);
         }
         patches
+    }
+}
+
+/// The list of spread runs of samples.
+fn spread_list(timeline: &Timeline) -> List {
+    match timeline.ticks {
+        Ticks::Frames { .. } => List::FramesSpread,
+        Ticks::Times { .. } => List::TimesSpread,
     }
 }
 
@@ -432,10 +444,7 @@ pub(crate) fn work(
             .collect();
         let chunks: Vec<WorkChunk> = listings
             .into_par_iter()
-            .map(|mut listing| {
-                in_lanes(&mut listing);
-                listing.listed.map(|()| listing.chunk)
-            })
+            .map(PartsList::list)
             .collect::<Result<_, SampleTimesError>>()?;
         if !parts.is_empty() {
             all.push(GroupWork { group, chunks });
@@ -455,6 +464,31 @@ struct PartsList<'a> {
     track: usize,
     chunk: WorkChunk,
     listed: Result<(), SampleTimesError>,
+}
+
+impl<'a> PartsList<'a> {
+    /// Lists the runs of parts, each whole.
+    fn of_runs(
+        (prepared, parts): (&'a Prepared, &'a [TrackPart]),
+        timeline: &'a Timeline,
+        window: &'a Window,
+    ) -> Self {
+        Self {
+            prepared,
+            parts,
+            timeline,
+            window,
+            cut: Cut::Spread,
+            track: 0,
+            chunk: WorkChunk::default(),
+            listed: Ok(()),
+        }
+    }
+
+    fn list(mut self) -> Result<WorkChunk, SampleTimesError> {
+        in_lanes(&mut self);
+        self.listed.map(|()| self.chunk)
+    }
 }
 
 impl InLanes for PartsList<'_> {

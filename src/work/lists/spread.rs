@@ -43,11 +43,26 @@ pub(crate) struct RunCounts {
 
 impl RunCounts {
     pub(crate) fn of_lists(lists: &[GroupWork]) -> Self {
-        let runs = || lists.iter().flat_map(|list| &list.chunks);
-        let runs = || runs().flat_map(|chunk| &chunk.runs);
+        Self::of_chunks(lists.iter().flat_map(|list| &list.chunks), 1)
+    }
+
+    /// Those of chunks that are repeated.
+    pub(crate) fn of_chunks<'a>(
+        chunks: impl Iterator<Item = &'a WorkChunk> + Clone,
+        repetitions: u64,
+    ) -> Self {
+        let runs = || chunks.clone().flat_map(|chunk| &chunk.runs);
+        let samples: u64 = runs().map(|run| u64::from(sample_count(run))).sum();
         Self {
-            runs: runs().count() as u64,
-            samples: runs().map(|run| u64::from(sample_count(run))).sum(),
+            runs: runs().count() as u64 * repetitions,
+            samples: samples * repetitions,
+        }
+    }
+
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            runs: self.runs + other.runs,
+            samples: self.samples + other.samples,
         }
     }
 
@@ -56,6 +71,25 @@ impl RunCounts {
         const TOO_SHORT: u64 = 4;
         self.samples < TOO_SHORT * self.runs
     }
+}
+
+/// How often the entries of a list are evaluated, and how much further on each time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RunRepetitions {
+    pub(crate) count: u32,
+    pub(crate) segments: u32,
+    pub(crate) constants: u32,
+    pub(crate) outputs: u32,
+}
+
+impl RunRepetitions {
+    /// Once.
+    pub(crate) const ONE: Self = Self {
+        count: 1,
+        segments: 0,
+        constants: 0,
+        outputs: 0,
+    };
 }
 
 /// The number of lanes of a run, a power of two from 4 to 32, and the invocations of a workgroup.
@@ -94,7 +128,7 @@ impl SpreadLanes {
         self.lanes().min(LINE) - 1
     }
 
-    fn runs_of_workgroup(self) -> usize {
+    pub(crate) fn runs_of_workgroup(self) -> usize {
         (self.workgroup >> self.log2) as usize
     }
 
@@ -118,12 +152,16 @@ impl SpreadLanes {
             })
     }
 
-    /// The number of entries of a chunk in the list: whole workgroups.
-    pub(crate) fn entries(self, chunk: &WorkChunk) -> usize {
+    /// The number of pieces of a chunk's runs.
+    pub(crate) fn piece_count(self, chunk: &WorkChunk) -> usize {
         let each = MAX_ITERATIONS * self.lanes();
         let pieces = |run| sample_count(run).div_ceil(each) as usize;
-        let pieces: usize = chunk.runs.iter().map(pieces).sum();
-        pieces.next_multiple_of(self.runs_of_workgroup())
+        chunk.runs.iter().map(pieces).sum()
+    }
+
+    /// The number of entries of a chunk in the list: whole workgroups.
+    pub(crate) fn entries(self, chunk: &WorkChunk) -> usize {
+        (self.piece_count(chunk)).next_multiple_of(self.runs_of_workgroup())
     }
 
     /// The number of entries of a group in the list.
@@ -177,7 +215,18 @@ impl SpreadLanes {
     }
 
     /// The push constants of a dispatch, whose values are stored from an index on.
-    pub(crate) fn dispatch(self, [first, count]: [u32; 2], detail: u32, output: u32) -> Spread {
+    pub(crate) fn dispatch(self, entries: [u32; 2], detail: u32, output: u32) -> Spread {
+        self.dispatch_repeated(entries, RunRepetitions::ONE, detail, output)
+    }
+
+    /// As [`SpreadLanes::dispatch`], for entries that are repeated.
+    pub(crate) fn dispatch_repeated(
+        self,
+        [first, count]: [u32; 2],
+        repetitions: RunRepetitions,
+        detail: u32,
+        output: u32,
+    ) -> Spread {
         Spread {
             detail,
             first_item: first,
@@ -185,6 +234,9 @@ impl SpreadLanes {
             first_output: output,
             lanes_log2: self.log2,
             line_mask: self.line_mask(),
+            segments: repetitions.segments,
+            constants: repetitions.constants,
+            outputs: repetitions.outputs,
         }
     }
 

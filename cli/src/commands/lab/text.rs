@@ -1,6 +1,8 @@
 //! The page of a lab, for people: at most [`MAX_LINES`] lines. The JSON has everything.
 
-use tumble::verify::lab::{HalfConversion, KernelVariant, LabReport, LabRow, StoreCaching, Timed};
+use tumble::verify::lab::{
+    HalfConversion, KernelVariant, LabReport, LabRow, RunList, StoreCaching, Timed,
+};
 
 use crate::commands::prove::text::grouped;
 
@@ -109,6 +111,7 @@ fn described(variant: KernelVariant) -> String {
         workgroup,
         stores,
         halves,
+        list,
     } = variant;
     let stores = match stores {
         StoreCaching::Streamed => "",
@@ -118,7 +121,11 @@ fn described(variant: KernelVariant) -> String {
         None | Some(HalfConversion::Device) => "",
         Some(HalfConversion::Integers) => ", halves by integers",
     };
-    format!("{lanes} lanes, workgroups of {workgroup}{stores}{halves}")
+    let list = match list {
+        RunList::EachTrack => "",
+        RunList::Shared => ", one list for all tracks",
+    };
+    format!("{lanes} lanes, workgroups of {workgroup}{stores}{halves}{list}")
 }
 
 #[cfg(test)]
@@ -138,6 +145,7 @@ mod tests {
             workgroup: 128,
             stores: StoreCaching::Streamed,
             halves: None,
+            list: RunList::EachTrack,
         };
         let other = KernelVariant {
             lanes: 16,
