@@ -20,6 +20,7 @@ pub mod request;
 pub mod result;
 pub mod sampler;
 pub mod samples;
+pub mod scalars;
 pub mod set;
 pub mod set_vectors;
 mod skeleton;

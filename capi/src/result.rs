@@ -240,7 +240,7 @@ fn remember(message: &str) {
 
 /// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
-    // What a panic leaves half done is dropped, or lies behind a lock that is then poisoned.
+    // Values that a panic leaves half done are dropped, or lie behind a lock that is then poisoned.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
     done.map_err(|failure| {
         remember(&failure.message);

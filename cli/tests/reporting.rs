@@ -90,6 +90,16 @@ fn a_dry_run_lists_results_and_writes_none() {
     assert!(run.words.contains("--overwrite"), "{}", run.words);
 }
 
+/// As `plot` and `info`: an input that fails does not take the others away.
+#[test]
+fn a_page_has_the_inputs_that_can_be_read() {
+    let folder = sample_folder();
+    let run = run(folder.path(), &words("view bad.dat a.dat -o page.html --device cpu"));
+    assert_eq!(run.code, 3, "{}", run.words);
+    assert!(run.words.contains("1 of 2 inputs failed"), "{}", run.words);
+    assert!(folder.path().join("page.html").exists());
+}
+
 #[test]
 fn colours_and_threads_are_chosen() {
     let folder = sample_folder();

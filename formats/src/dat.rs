@@ -228,7 +228,7 @@ impl DatKeys {
             lines.warn(1, Code::BlankLine, message);
         }
         self.read_numbers(lines, line).or_else(|error| {
-            // What is wrong with the line as a whole explains more.
+            // A fault of the whole line explains more.
             self.check_columns(lines, line)?;
             Err(error)
         })

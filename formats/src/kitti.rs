@@ -203,7 +203,7 @@ fn read_rows<R: BufRead>(
     let mut rows = [[0.0; 4]; 3];
     let mut after = Vec::new();
     for (index, (column, token)) in tokens(line).enumerate() {
-        // What is left out may be anything, unless it may be a fourth row.
+        // The other numbers may be anything, unless they may be a fourth row.
         let read = match number::parse(token) {
             Ok(read) => read.value,
             Err(_) if index >= NUMBERS => f64::NAN,

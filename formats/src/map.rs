@@ -156,7 +156,7 @@ impl FromStr for Entry {
         };
         let mut degrees = false;
         let mut words = words.split(':');
-        // What stands before the first colon is glued to the bracket.
+        // The text before the first colon belongs to the bracket.
         let glued = words.next().filter(|glued| !glued.is_empty());
         let unknown = |word: &str| MapError::Word {
             entry: entry(),

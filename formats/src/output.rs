@@ -529,7 +529,7 @@ impl Write for Temporary {
 fn named_in(parent: &Folder, mark: &str) -> io::Result<Temporary> {
     loop {
         let (name, file) = TemporaryName::new(parent, mark, |name| parent.create_new(name))?;
-        // Whoever looks for abandoned files may have met it before it was locked.
+        // Another process that looks for abandoned files may have met it before it was locked.
         let is_locked = matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock));
         if !is_locked && is_there(&file) {
             return Ok(Temporary::Named { file, name });

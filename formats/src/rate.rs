@@ -343,7 +343,7 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let step = steps().fold(f64::INFINITY, f64::min);
     let (first, last) = (times[0], times[times.len() - 1]);
-    // What is written may be what is meant.
+    // The written rate may be the intended one.
     let exact = Precision::F64.rounding(first.abs().max(last.abs()));
     // Times may have been added up, key by key.
     let added = |keys: usize| exact * (2.0 + keys as f64 / 8.0);
@@ -473,7 +473,7 @@ impl StepRates {
         if widest > 0.5 * step {
             return None;
         }
-        // What one step leaves open, the following ones narrow.
+        // Each step narrows the rates that the step before it leaves.
         let mut all = Self {
             low: 1.0 / (step + widest),
             high: 1.0 / (step - widest),

@@ -496,7 +496,7 @@ impl Pairs {
             if self.source_of[joint].is_none() {
                 continue;
             }
-            // What is below a part of a limb, such as a hand, stands as the part does.
+            // Joints below a part of a limb, such as a hand, are oriented as the part is.
             let above = self.above(to, joint).map(|above| alignments[above]);
             alignments[joint] = found[joint].or(above).unwrap_or_default();
         }

@@ -1,4 +1,4 @@
-//! What comes in: arrays of NumPy's, whatever they look like in memory, lists, and objects that
+//! Arguments: arrays of NumPy with any layout in memory, lists, and objects that
 //! NumPy makes arrays of.
 
 use glam::{DQuat, DVec3, Quat};

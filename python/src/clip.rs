@@ -59,7 +59,7 @@ pub(crate) struct Source {
     /// How many clips the file has, those that cannot be read too.
     pub(crate) clips: usize,
     pub(crate) box_length: Option<f64>,
-    /// What was said of it when it was read.
+    /// The warnings of reading it.
     pub(crate) warnings: Vec<Diagnostic>,
     /// How the clip differs from the file in its units, axes or offsets.
     pub(crate) adjustment: Option<Adjustment>,

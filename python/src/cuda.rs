@@ -394,7 +394,7 @@ impl Mapping {
         Ok(())
     }
 
-    /// What says that the result is written, and the value that says it; none where the device exports none.
+    /// The semaphore that says that the result is written, and its value then; none where the device exports none.
     #[cfg(unix)]
     fn import_semaphore(&self) -> Result<Option<(Semaphore, u64)>, CudaError> {
         use std::os::fd::{AsRawFd, IntoRawFd};
@@ -485,7 +485,7 @@ impl Mapping {
         let (cuda, functions) = (self.cuda, &self.cuda.functions);
         if let Some(address) = self.address.take() {
             if *self.is_known.get_mut() {
-                // Whoever imported it may have let go of it while their work was still queued.
+                // The library that imported it may have released it while its work was still queued.
                 // SAFETY: the context is the current one.
                 cuda.checked("cuCtxSynchronize", unsafe { (functions.synchronize)() })?;
             }

@@ -140,7 +140,7 @@ impl DeviceArray {
         (CUDA, self.mapping.ordinal)
     }
 
-    /// Numba's interface, version 3. Whoever takes it lets its stream wait for the one that is named there.
+    /// Numba's interface, version 3. The library that takes the array lets its stream wait for the one that is named there.
     #[getter]
     fn __cuda_array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.order(None)?;

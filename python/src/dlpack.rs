@@ -70,7 +70,7 @@ struct Version {
     minor: u32,
 }
 
-/// What the pointers of a tensor point to.
+/// The memory behind the pointers of a tensor.
 struct TensorBuffers {
     shape: Box<[i64]>,
     strides: Box<[i64]>,

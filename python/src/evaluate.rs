@@ -386,7 +386,7 @@ impl OutputForm {
         Ok(())
     }
 
-    /// What the engine does not do: the other order of components, and radians.
+    /// Changes that the engine does not make: the other order of components, and radians.
     fn finish(&self, bytes: &mut [u8]) {
         if self.order == Order::Wxyz {
             match self.encoding.component_type() {

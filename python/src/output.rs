@@ -1,4 +1,4 @@
-//! What goes out: numbers in NumPy's own memory.
+//! Results as arrays of NumPy.
 
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods};
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};

@@ -103,7 +103,7 @@ pub(crate) struct Smooth<'a> {
     pub(crate) ends: &'a str,
 }
 
-/// What cannot be had of a kernel.
+/// Why a kernel cannot be made.
 fn of_kernel(name: &str, error: &SmoothingError) -> PyErr {
     input(format!("{name}: {error}"))
 }

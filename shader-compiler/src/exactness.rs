@@ -246,7 +246,7 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     // RowMajor, ColMajor, ArrayStride, MatrixStride, Offset
     const LAYOUT: [u32; 5] = [4, 5, 6, 7, 35];
     let code = instructions(module)?;
-    // What a type consists of is declared before it, and what points to it after it.
+    // The parts of a type are declared before it, and pointers to it after it.
     let mut parts = BTreeMap::<u32, &[u32]>::new();
     let (mut shared, mut laid_out) = (BTreeSet::new(), BTreeSet::new());
     for instruction in &code {

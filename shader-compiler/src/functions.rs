@@ -75,7 +75,7 @@ const BY_HAND: [(&str, &str); 4] = [
 /// stay functions of f32, whose `if` evaluates one side only.
 const CHOOSING: [&str; 1] = ["small_angle_cubic"];
 
-/// What a function cannot be written as, and why.
+/// Why a function cannot be written in a form.
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// What numbers a function takes.
@@ -515,7 +515,7 @@ impl<'a> Writer<'a> {
         };
         let result = self.types.name(result.ty)?;
         for (_, variable) in self.function.local_variables.iter() {
-            // What naga adds for `||` and `&&` has no name.
+            // The variables that naga adds for `||` and `&&` have no name.
             let Some(name) = &variable.name else { continue };
             let value = match variable.init {
                 Some(init) => self.whole(init)?,
@@ -1376,7 +1376,7 @@ fn prune(lines: &mut Vec<Line>) {
             lines.remove(i);
         }
     }
-    // What is returned at once needs no name.
+    // A value that is returned at once needs no name.
     let count = lines.len();
     if let [.., Line::Let(name, value), Line::Other(last)] = &lines[..]
         && name == last

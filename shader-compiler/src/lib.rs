@@ -300,7 +300,7 @@ impl Module {
             // Loops here end: their bounds are data that the host wrote.
             force_loop_bounding: false,
             flags: spv::WriterFlags::empty(),
-            // What a workgroup shares is written before it is read.
+            // Memory that a workgroup shares is written before it is read.
             use_storage_input_output_16: false,
             zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
             ..spv::Options::default()

@@ -141,7 +141,7 @@ fn matrices(
                     *matrix = affine_product(matrix, bind);
                 }
             }
-            // Whoever takes the result rounds it.
+            // The caller rounds the result.
             FrameStep::Half => {}
         }
     }
@@ -165,7 +165,7 @@ fn rotations<L: Lanes>(
 ) {
     let first = instance * context.layers as usize;
     let mut layers = first + 1..first + context.layers as usize;
-    // What lies below a layer that hides it is not seen.
+    // Layers below one that hides them have no effect.
     let hides = |layer: &usize| context.entries[*layer].hides_lower_layers();
     let lowest = layers.clone().rfind(hides).unwrap_or(first);
     layers.start = lowest + 1;

@@ -47,7 +47,7 @@ pub(crate) enum Uploaded {
 /// A set without segments.
 pub(crate) struct UnpreparedSet {
     set: TrackSet,
-    /// What is known without segments.
+    /// The parts of a clip that are known without its segments.
     data: ClipData,
 }
 

@@ -129,7 +129,7 @@ impl Buffer {
         };
         buffer.is_incoherent = kind.mapped && !physical.is_coherent(memory_type);
         if buffer.is_incoherent {
-            // What is made visible in one buffer must not be part of another.
+            // A range that is made visible in one buffer must not be part of another.
             let atom = physical.non_coherent_atom;
             needs.alignment = needs.alignment.max(atom);
             needs.size = needs.size.next_multiple_of(atom);

@@ -161,7 +161,7 @@ pub struct ClipTarget {
     bound: u64,
     /// The length of the result, bytes.
     bytes: u64,
-    // The sets lead to it. Whoever records promises that no work that uses it is in flight when the target is
+    // The sets lead to it. The caller who records promises that no work that uses it is in flight when the target is
     // dropped.
     _segments: Arc<ClipBuffers>,
 }

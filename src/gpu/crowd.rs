@@ -160,7 +160,7 @@ pub struct CrowdTarget {
     frames: Frames,
     /// The recording of a frame, which the next frame fills again.
     work: Mutex<Recorded>,
-    // The sets lead to them. Whoever records promises that no work that uses them is in flight when the target is
+    // The sets lead to them. The caller who records promises that no work that uses them is in flight when the target is
     // dropped.
     _buffers: Vec<Buffer>,
 }

@@ -101,7 +101,7 @@ impl Exported {
 
 impl Drop for Exported {
     fn drop(&mut self) {
-        // Nobody else waits for the work before the memory is freed. That of a lost device has ended; after
+        // The memory is freed next, and no other code waits for the work before that. That of a lost device has ended; after
         // another error it may not have.
         if let Err(error) = self.wait()
             && !error.is_lost()

@@ -56,7 +56,7 @@ pub struct PassTarget {
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     bytes: u64,
-    // The sets lead to them. Whoever records promises that no work that uses them is in flight when the target is
+    // The sets lead to them. The caller who records promises that no work that uses them is in flight when the target is
     // dropped.
     _buffers: Vec<Buffer>,
 }

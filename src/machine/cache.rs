@@ -49,7 +49,7 @@ impl Cache {
     /// may come from another version or another machine; the caller must check them.
     pub(crate) fn read(&self, name: &str, max_bytes: usize) -> Option<Vec<u8>> {
         let path = self.path(name)?;
-        // What is no file might never end.
+        // A pipe or a device might never end.
         if !fs::metadata(&path).ok()?.is_file() {
             return None;
         }

@@ -90,7 +90,7 @@ impl TrackSet {
     /// Reserves memory for `tracks` more tracks with `keys` keys in total, if there is enough, so that the set does
     /// not grow step by step.
     pub fn reserve(&mut self, tracks: usize, keys: usize) {
-        // What there is no memory for fails when it is pushed.
+        // Where there is too little memory, pushing fails.
         let _ = self.tracks.try_reserve(tracks);
         let _ = self.keys.try_reserve(keys);
     }

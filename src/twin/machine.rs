@@ -11,7 +11,7 @@ use std::task::{Context, Poll, Waker};
 use crate::shader::Kernel;
 use crate::twin::entries::{ENTRIES, GLOBALS, Global, PRIVATE, main};
 
-/// What memory holds that nobody has written.
+/// The bits of memory that has not been written.
 pub(crate) const UNTOUCHED: u32 = u32::MAX;
 
 /// The entry point of a kernel.

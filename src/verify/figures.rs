@@ -239,7 +239,7 @@ impl Bench {
     ) {
         let (on_device, on_host) = seconds(runs);
         let seconds = match limit {
-            // What the bus takes is on the way until the host has it.
+            // The time on the bus counts until the host has the bytes.
             "download" => on_host,
             _ => self.clocked((on_device, on_host)),
         };

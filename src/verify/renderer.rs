@@ -307,7 +307,7 @@ fn buffer_to_buffer(
                     let recorded = renderer.application.recorded(false, |commands| {
                         record_clip(&target, commands, further as u64)
                     })?;
-                    // What is listed anew, what was kept from then on, and what was recorded.
+                    // Samples that are listed anew, those that were kept from then on, and recorded ones.
                     for attempt in 0..4 {
                         match attempt {
                             0 | 1 => {

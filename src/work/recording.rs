@@ -438,7 +438,7 @@ pub(crate) mod tests {
         dispatch(&mut all, Kernel::CrowdWalk, &[links, matrices]);
         dispatch(&mut all, Kernel::CrowdHalf, &[local, matrices]);
         dispatch(&mut all, Kernel::CrowdHalf, &[local, matrices]);
-        // What was read is overwritten.
+        // The values that were read are overwritten.
         dispatch(&mut all, Kernel::CrowdHalf, &[matrices, local]);
         let order = "[Kernel>Kernel]";
         assert_eq!(
@@ -486,7 +486,7 @@ pub(crate) mod tests {
         assert_eq!(all.all_sets().collect::<Vec<_>>(), [set]);
     }
 
-    /// What another recording of the same commands wrote is waited for.
+    /// Waits for the writes of another recording of the same commands.
     #[test]
     fn earlier_kernels_are_waited_for() {
         let (mut all, [result, host]) = recording();

@@ -2,7 +2,7 @@
 //! others; between slashes `**` is any folders.
 //!
 //! A match takes at most the pattern's length times the name's: after a `*` nothing before it is tried
-//! again. Whoever tries every split of a name at every star needs longer than anybody waits for
+//! again. To try every split of a name at every star would take longer than a user waits for
 //! `*a*a*a*a*a*a*b`.
 
 use std::path::{Component, Path, PathBuf};

@@ -133,7 +133,7 @@ impl FrameKeys {
         let mut origins = vec![DVec3::ZERO; hierarchy.joints.len()];
         let mut set = TrackSet::new();
         let mut skeleton = Vec::with_capacity(hierarchy.joints.len());
-        // What was read is unit and in order; a set refuses what slipped through.
+        // Rotations are unit and times in order here; the set checks both again.
         let refuse =
             |error: tumble::TrackError| lines.refuse_whole(Code::BvhRow, error.to_string());
         for (track, joint) in hierarchy.joints.iter().enumerate() {
@@ -345,7 +345,7 @@ fn read_row<R: BufRead>(
             Err((code, message)) if tokens(line).count() == columns => {
                 return Err(lines.refuse(column, code, message));
             }
-            // What is wrong with the row as a whole explains more.
+            // A fault of the whole row explains more.
             _ => return Err(wrong_count(lines, line, columns)),
         };
         if number.vanished {

@@ -925,7 +925,7 @@ fn stop(
             ChannelKind::Rotation if value.dot(at) < 0.0 => -value,
             _ => value,
         };
-        // What a curve does in 1e-10 s is no jump.
+        // A change within 1e-10 s is that of a curve, not a jump.
         let is_same = (value - at).abs().max_element() <= 1e-7 * at.abs().max_element().max(1e-3);
         if is_same { at } else { value }
     };

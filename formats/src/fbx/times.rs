@@ -375,7 +375,7 @@ impl ChannelTimes {
             };
             let periods = (overflow / duration).ceil().min(max_periods);
             let count = periods * keys.len() as f64;
-            // What is refused here is refused by the number of bytes.
+            // Refused by the number of bytes, before anything is allocated.
             let bytes = if count > REPEATED {
                 usize::MAX
             } else {

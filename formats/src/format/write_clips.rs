@@ -195,7 +195,7 @@ fn loss(
     let joints = || clip.skeleton.iter();
     let (has_it, loss) = match feature {
         Feature::TrackNames => {
-            // What a trajectory is called when it is read is no name that it had.
+            // Readers of trajectories make up this name, so that nothing is lost with it.
             let named = |name: Option<&str>| {
                 name.is_some_and(|name| !name.is_empty() && name != TRAJECTORY_TRACK)
             };

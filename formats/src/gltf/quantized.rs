@@ -59,7 +59,7 @@ pub(crate) fn filtered(rotation: [f32; 4], steps: u16) -> [u8; 8] {
         let component = rotation[(largest + offset) % 4] * std::f32::consts::SQRT_2 * sign;
         (component.clamp(-1.0, 1.0) * one).round_ties_even() as i16
     };
-    // What is left out is said in the two lowest bits.
+    // The two lowest bits say which component is left out.
     let last = (steps & !3) as i16 | largest as i16;
     let mut element = [0; 8];
     for (bytes, component) in element

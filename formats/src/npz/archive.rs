@@ -369,7 +369,7 @@ impl Member {
         }
         let mut start = Vec::new();
         let mut unpacked = DeflateDecoder::new(packed).take(LONGEST_START as u64);
-        // What cannot be unpacked ends early, and its header is cut.
+        // A member that cannot be unpacked ends early, and its header is cut.
         let _ = unpacked.read_to_end(&mut start);
         Cow::Owned(start)
     }

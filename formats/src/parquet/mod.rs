@@ -188,7 +188,7 @@ fn read_table(
         metadata,
         name,
     };
-    // What is wrong with a file is found by reading its columns side by side.
+    // Faults between columns are found by reading them side by side.
     let table = match file.read_apart(&requested) {
         Some(table) => table,
         None => file.read_together(&requested, gather)?,

@@ -96,7 +96,7 @@ impl Gather {
                     message,
                 ));
             }
-            // What stands in memory for a null may be any number.
+            // The number in memory at a null is arbitrary.
             let nulls = (0..rows).filter(|&row| array.null_count() > 0 && array.is_null(row));
             match &mut column.values {
                 ColumnValues::Numbers(ColumnNumbers::F32(list)) => {
@@ -239,7 +239,7 @@ fn append_numbers(numbers: &mut ColumnNumbers, array: &dyn Array) -> Option<()> 
             DataType::UInt16 => extend::<UInt16Type>(list, array)?,
             DataType::UInt32 => extend::<UInt32Type>(list, array)?,
             DataType::UInt64 => {
-                // What is beyond an i64 is no time and no count; it stays out of range.
+                // A number beyond i64 is no time and no count; it stays out of range, and is refused later.
                 let all = array.as_primitive_opt::<UInt64Type>()?.values();
                 list.extend(
                     all.iter()

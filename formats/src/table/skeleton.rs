@@ -49,7 +49,7 @@ pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String
 pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(String, String)]) {
     let find = |key: &str| notes.iter().find(|(known, _)| known == key);
     let note = find(&format!("{KEY}.{index}")).or_else(|| find(KEY));
-    // What others call a skeleton is none of this form.
+    // A `skeleton` of another program has another form.
     let hierarchy = note.and_then(|(_, text)| serde_json::from_str::<SkeletonNote>(text).ok());
     let Some(SkeletonNote {
         tracks,

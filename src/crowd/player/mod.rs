@@ -283,7 +283,7 @@ impl Crowd {
             Some(device) if len > 0 => {
                 let layers = self.arguments.layers as usize;
                 if let Err(error) = device.submit(output, &self.instances.take_frame(layers)) {
-                    // What was recorded may never have reached the device.
+                    // The recorded commands may never have reached the device.
                     self.instances.forget();
                     return Err(error.into());
                 }

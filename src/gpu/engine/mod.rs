@@ -154,7 +154,7 @@ impl VulkanEngine {
         physical.queue_family = handles.queue_family;
         physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
         if let Some(copies) = &handles.copy_queue {
-            // Whoever computes or draws can copy.
+            // A queue that computes or draws can copy.
             let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
             physical.check_family(copies.family, can_copy, "copy")?;
             if copies.queue == handles.queue {
@@ -202,7 +202,7 @@ impl VulkanEngine {
         if let Some(pipeline) = kept() {
             return Ok(pipeline);
         }
-        // Drivers take up to seconds for it. Nobody who wants another waits meanwhile; of several callers
+        // Made outside the lock, because drivers take up to seconds for it; of several callers
         // who make this one, the first one's is kept.
         let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
         self.trust(kernel, &made)?;

@@ -204,7 +204,7 @@ mod tests {
         assert!([&one, &two, &three].into_iter().all(|pass| next.has(pass)));
     }
 
-    /// Whoever wrote the file: what is no line of ours means nothing, and the others count.
+    /// Lines that this version does not know are skipped, because another version may have written the file.
     #[test]
     fn a_line_of_another_kind_means_nothing() {
         let folder = tempfile::tempdir().unwrap();

@@ -76,7 +76,7 @@ pub(crate) fn copy_queue(
         if family == compute {
             return (properties.queue_count > 1).then_some(2);
         }
-        // Whoever computes or draws can copy, also where the flag for it is not set.
+        // A queue that computes or draws can copy, also where the flag for it is not set.
         match (has(Flags::GRAPHICS), has(Flags::COMPUTE)) {
             _ if properties.queue_count == 0 || has(OTHER_WORK) => None,
             (false, false) => has(Flags::TRANSFER).then_some(0),

@@ -16,7 +16,7 @@ use crate::machine::options::RunLanes;
 pub use crate::verify::lab::rules::Timed;
 pub use crate::verify::lab::variant::{HalfConversion, KernelVariant, RunList, StoreCaching};
 
-/// What the lab does.
+/// How much the lab does.
 #[derive(Debug, Clone, Copy)]
 pub struct LabOptions {
     /// Compare bits only: nothing is timed.
@@ -36,7 +36,7 @@ pub struct LabReport {
     pub rejected: Vec<RejectedVariant>,
     /// The samples of each measured dispatch.
     pub samples: u32,
-    /// What no kernel exceeds. Empty if nothing was timed.
+    /// Rates that no kernel exceeds. Empty if nothing was timed.
     pub ceilings: Vec<Ceiling>,
     /// Each kernel over runs of each length.
     pub rows: Vec<LabRow>,
@@ -64,7 +64,7 @@ pub struct RejectedVariant {
 /// A time that no kernel can go below.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Ceiling {
-    /// What was done: one of a row.
+    /// The work that was timed: one of a row.
     pub name: &'static str,
     /// The time of one, measured twice.
     #[serde(flatten)]

@@ -12,10 +12,10 @@ const MARGIN: f64 = 0.02;
 const NEAR_FILL: f64 = 20.5 / 18.7;
 const ABOVE_FILL: f64 = 23.0 / 18.7;
 
-/// What stores past the caches must gain.
+/// The gain from which stores past the caches are chosen.
 const GAIN_OF_STREAMING: f64 = 1.1;
 
-/// What barriers between kernels alone must save, microseconds.
+/// The microseconds that barriers between kernels alone must save to be chosen.
 const SAVED_BY_SCOPES: f64 = 2.0;
 
 /// A time that was measured twice, microseconds.
@@ -38,7 +38,7 @@ impl Timed {
         self.microseconds[0]
     }
 
-    /// What two measurements differ, as a share of the shorter.
+    /// The difference of two measurements, as a share of the shorter.
     fn spread(&self) -> f64 {
         let [shorter, longer] = self.microseconds;
         (longer - shorter) / shorter.max(f64::MIN_POSITIVE)

@@ -3,7 +3,7 @@
 //!
 //! `manifest.d` in the directory of results records the plan (`plan.json`) and which shards are done:
 //! each writes its lines of the manifest to its own file, completely, after its results have
-//! their names. Whoever evaluates a shard writes the same bytes, so that two who do so at once do no
+//! their names. Every process that evaluates a shard writes the same bytes, so that two that do so at once do no
 //! harm, and nobody locks anything.
 
 pub(crate) mod merge;

@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         drivers::devices().unwrap_or_default()
     };
-    // What others would write uses rayon's own threads.
+    // The loop that a user would write uses rayon's own threads.
     if let Err(error) = rayon::ThreadPoolBuilder::new().build_global()
         && error.source().is_some()
     {

@@ -21,7 +21,7 @@ const NO_CACHES: [(&str, &str); 5] = [
     ("TUMBLE_CACHE_DIR", ""),
 ];
 
-/// What stands on the last line.
+/// The last line that the process prints.
 const END: &str = "end";
 
 /// The process that compiles: a line of JSON for each kernel, then [`END`].

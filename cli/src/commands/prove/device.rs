@@ -1,4 +1,4 @@
-//! Who runs: the program, the host, and how the device is connected.
+//! What a proof was made on: the program, the host, and how the device is connected.
 
 use std::fs;
 use std::path::Path;

@@ -79,7 +79,7 @@ pub(crate) struct Arguments {
     compile_kernels: bool,
 }
 
-/// What a report goes to.
+/// Where a report is written.
 #[derive(Debug, Args)]
 pub(crate) struct ReportOutput {
     /// Where to write: the report, as JSON

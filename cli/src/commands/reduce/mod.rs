@@ -326,7 +326,7 @@ impl Arguments {
                 ..ends.of(&reduced.clip, None, &[])
             }];
             let mut bytes = Vec::new();
-            // What cannot be written is a warning of the writer.
+            // The writer warns of data that cannot be written.
             let written = format.map(|format| format.write_clips(&sampled, &options, &mut bytes));
             Ok(written
                 .and_then(Result::ok)

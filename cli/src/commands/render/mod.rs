@@ -148,7 +148,7 @@ fn view(text: &str) -> Result<CameraView, String> {
     }
 }
 
-/// What comes out.
+/// The form of the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum RenderOutput {
     Gif,

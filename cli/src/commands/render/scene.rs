@@ -99,7 +99,7 @@ impl Actor {
     }
 }
 
-/// What there is beside actors.
+/// Everything in a scene besides the actors.
 pub(crate) struct Surroundings {
     /// The ground, instead of a floor.
     pub(crate) ground: Vec<Face>,

@@ -10,7 +10,7 @@ use crate::messages::{names, words};
 pub(crate) struct FoundGhosts {
     /// The index of a clip, and a ghost of it.
     ghosts: Vec<(usize, Ghost)>,
-    /// What is to be known about them.
+    /// Notes for the user about them.
     notes: Vec<String>,
 }
 

@@ -117,7 +117,7 @@ impl Reduction<'_> {
         for &joint in &self.order {
             let parent = self.parents[joint];
             let sampler = self.sampler(joint).rotation;
-            // What steps or rests stays as it is; all else makes up for what its parent has become.
+            // Joints that step or rest stay as they are; the others make up for the change of their parents.
             let target: Vec<DQuat> = match parent {
                 Some(parent) if !matches!(sampler, None | Some(ChannelInterpolation::Step)) => {
                     let poses = self.poses.iter().skip(joint).step_by(joints);

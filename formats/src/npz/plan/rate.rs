@@ -66,7 +66,7 @@ impl ArchivePlan {
         let Some(rate) = self.rate else {
             return;
         };
-        // What is not a length says nothing.
+        // An array that is not a length is ignored.
         let member = archive.find(name);
         self.compared.extend(member);
         let numbers = member.and_then(|member| read_numbers(archive, member).ok());
