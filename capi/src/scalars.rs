@@ -27,14 +27,13 @@ pub enum TumbleScalarQuantity {
 
 /// Appends a scalar of `key_count` keys, at least one, to a set. A set may have scalars without tracks.
 ///
-/// `name` is its name in UTF-8, unique among the scalars of the set. `times` are the key times in seconds, strictly
+/// `name` is its name in UTF-8. `times` are the key times in seconds, strictly
 /// increasing, and `keys` a number for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers
 /// for each time, the incoming tangent and the outgoing one, in units per second. Arrays and name are copied.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, a number is
-/// not finite or exceeds 1e30 in magnitude, or the set has a scalar of that name. After any error the set is
-/// unchanged.
+/// `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a number
+/// is not finite or exceeds 1e30 in magnitude. After any error the set is unchanged.
 ///
 /// # Safety
 /// `name` must be a text that ends with a zero byte; `times` and `keys` must have `key_count` numbers; `tangents` must

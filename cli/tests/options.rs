@@ -116,6 +116,10 @@ impl Results {
         for word in &line {
             words.push(file(word).map_or_else(|| word.into(), PathBuf::into_os_string));
         }
+        // Between the keys, where curves differ: the frames of the source are its keys.
+        if !line.contains(&"--fps") && !line.contains(&"--times") {
+            words.extend(["--fps".into(), "25".into()]);
+        }
         words.extend(["-o".into(), out.clone().into_os_string()]);
         let code = tumble_cli::host::run(words);
         let result = match code {

@@ -94,7 +94,10 @@ fn a_dry_run_lists_results_and_writes_none() {
 #[test]
 fn a_page_has_the_inputs_that_can_be_read() {
     let folder = sample_folder();
-    let run = run(folder.path(), &words("view bad.dat a.dat -o page.html --device cpu"));
+    let run = run(
+        folder.path(),
+        &words("view bad.dat a.dat -o page.html --device cpu"),
+    );
     assert_eq!(run.code, 3, "{}", run.words);
     assert!(run.words.contains("1 of 2 inputs failed"), "{}", run.words);
     assert!(folder.path().join("page.html").exists());

@@ -3,6 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
+use tumble::trees::BodyOrder;
 use tumble::{
     Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, ScalarQuantity, Skeleton,
 };
@@ -144,6 +145,15 @@ pub(crate) fn component_order() -> impl TypedValueParser<Value = ComponentOrder>
         ComponentOrder::Wxyz => "as in .dat files",
     };
     one_of(ComponentOrder::ALL.map(|order| (order.name(), help(order), order)))
+}
+
+/// Parses the name of an order of bodies.
+pub(crate) fn body_order() -> impl TypedValueParser<Value = BodyOrder> {
+    let help = |order| match order {
+        BodyOrder::DepthFirst => "a body, then the whole branch of its first child: MuJoCo, mjlab",
+        BodyOrder::BreadthFirst => "level by level: PhysX, IsaacLab, BeyondMimic",
+    };
+    one_of(BodyOrder::ALL.map(|order| (order.name(), help(order), order)))
 }
 
 /// The kinds of whole poses.

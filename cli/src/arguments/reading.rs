@@ -18,8 +18,7 @@ use tumble_formats::robot::Robot;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::options::{AppliesTo, OPTIONS};
-use crate::arguments::output::{component_order, one_of};
-use crate::arguments::robot::body_order;
+use crate::arguments::output::{body_order, component_order, one_of};
 use crate::messages::exit::{self, Failure};
 use crate::messages::{names, words};
 

@@ -16,7 +16,7 @@ use tumble_formats::robot::{
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::{Code, Diagnostic};
 
-use crate::arguments::output::one_of;
+use crate::arguments::output::{body_order, one_of};
 use crate::arguments::results::ResultArguments;
 use crate::batch::pipeline::ClipWork;
 use crate::batch::target::WrittenFile;
@@ -60,15 +60,6 @@ fn dialect() -> impl TypedValueParser<Value = &'static WrittenDialect> {
         all.map(|dialect| (dialect.name, dialect.summary, dialect))
             .collect::<Vec<_>>(),
     )
-}
-
-/// Parses the name of an order of bodies.
-pub(crate) fn body_order() -> impl TypedValueParser<Value = BodyOrder> {
-    let help = |order| match order {
-        BodyOrder::DepthFirst => "a body, then the whole branch of its first child: MuJoCo, mjlab",
-        BodyOrder::BreadthFirst => "level by level: PhysX, IsaacLab, BeyondMimic",
-    };
-    one_of(BodyOrder::ALL.map(|order| (order.name(), help(order), order)))
 }
 
 fn siblings() -> impl TypedValueParser<Value = Siblings> {

@@ -729,6 +729,8 @@ mod tests {
                 }
             });
         }
-        assert!(create_folder(&directory.path().join("no/such")).is_err());
+        assert!(create_folder(&directory.path().join("several/at/once")).is_ok());
+        std::fs::write(directory.path().join("file"), "").unwrap();
+        assert!(create_folder(&directory.path().join("file/below")).is_err());
     }
 }

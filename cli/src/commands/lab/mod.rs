@@ -2,21 +2,19 @@
 
 mod text;
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
 use tumble::verify::lab::{LabOptions, LabReport, lab};
 use tumble::vulkan::DeviceInfo;
-use tumble::vulkan::tuning::RunLanes;
 use tumble::{Engine, EngineOptions};
 
 use crate::arguments::device::{refused, vulkan_device};
 use crate::commands::prove::ReportOutput;
 use crate::commands::prove::device;
-use crate::commands::prove::report::{Host, Program, read_report};
-use crate::messages::exit::{ALL_INPUTS, DEVICE, DIFFERENCE, Failure};
+use crate::commands::prove::report::{Host, LAB_FORMAT, LAB_FORMAT_VERSION, Program};
+use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 
 /// Compare every variant of the kernels for cards with the CPU, measure them, and say which follow by rules
 #[derive(Debug, Args)]
@@ -69,12 +67,6 @@ struct LabFile {
     lab: LabReport,
 }
 
-/// The value of `format` in the JSON.
-const FORMAT: &str = "tumble-lab";
-
-/// The form of the JSON; another number where names or meanings change.
-const FORMAT_VERSION: u64 = 1;
-
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let started = Instant::now();
     let Some(vulkan) = vulkan_device(arguments.device.as_deref())? else {
@@ -99,8 +91,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::new(DEVICE, "the device is no Vulkan device"));
     };
     let file = LabFile {
-        format: FORMAT,
-        format_version: FORMAT_VERSION,
+        format: LAB_FORMAT,
+        format_version: LAB_FORMAT_VERSION,
         program: device::program(),
         date,
         seconds: started.elapsed().as_secs_f64(),
@@ -117,18 +109,4 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             format!("bits differ in {count} variants"),
         )),
     }
-}
-
-/// The lanes of runs that the report of a lab chose.
-pub(crate) fn run_lanes(path: &Path) -> Result<RunLanes, Failure> {
-    let called = [FORMAT, "the report of a lab", "tumble lab"];
-    let file = read_report(path, called, FORMAT_VERSION)?;
-    let lanes = serde_json::from_value(file["lab"]["run_lanes"].clone());
-    lanes.map(RunLanes).map_err(|_| {
-        let name = path.display();
-        Failure::new(
-            ALL_INPUTS,
-            format!("{name}: it has no `run_lanes`; without --bits `tumble lab` chooses some"),
-        )
-    })
 }

@@ -13,7 +13,6 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::arguments::device::vulkan_device;
-use crate::commands::lab;
 use crate::commands::prove::report::Verdict;
 use crate::commands::prove::steps::ProofOptions;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
@@ -131,7 +130,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     arguments.output.check()?;
     let lab = arguments.lab.as_deref();
-    let run_lanes = lab.map(lab::run_lanes).transpose()?;
+    let run_lanes = lab.map(report::run_lanes).transpose()?;
     let proof = steps::prove(&ProofOptions {
         device,
         seconds: arguments.time_limit,

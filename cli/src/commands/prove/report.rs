@@ -9,6 +9,7 @@ use sha2::{Digest as _, Sha256};
 use tumble::verify::figures::Figures;
 use tumble::verify::random::RandomRound;
 use tumble::verify::renderer::{RendererCheck, RendererReport};
+use tumble::vulkan::tuning::RunLanes;
 use tumble::vulkan::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
 
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -501,6 +502,26 @@ pub(crate) fn check_output(path: &Path, overwrite: bool) -> Result<(), Failure> 
 /// The lower-case digits of a hash.
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The value of `format` in the report of a lab (`tumble lab`).
+pub(crate) const LAB_FORMAT: &str = "tumble-lab";
+
+/// The form of that report; another number where names or meanings change.
+pub(crate) const LAB_FORMAT_VERSION: u64 = 1;
+
+/// The lanes of runs that the report of a lab chose.
+pub(crate) fn run_lanes(path: &Path) -> Result<RunLanes, Failure> {
+    let called = [LAB_FORMAT, "the report of a lab", "tumble lab"];
+    let file = read_report(path, called, LAB_FORMAT_VERSION)?;
+    let lanes = serde_json::from_value(file["lab"]["run_lanes"].clone());
+    lanes.map(RunLanes).map_err(|_| {
+        let name = path.display();
+        Failure::new(
+            ALL_INPUTS,
+            format!("{name}: it has no `run_lanes`; without --bits `tumble lab` chooses some"),
+        )
+    })
 }
 
 #[cfg(test)]
