@@ -160,6 +160,7 @@ impl RunLanes {
     }
 
     /// The number of invocations for runs of a class.
+    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn of_class(self, class: usize) -> u32 {
         let lanes = self.0[class].clamp(4, 32);
         1 << lanes.ilog2()

@@ -1,5 +1,5 @@
 //! The lab of `tumble lab`: measures on a card what the engine might do otherwise, and says what follows by rules that
-//! were written before ([`rules`]). A card can be had rarely and for minutes, so nothing is decided by hand.
+//! were written before (`rules.rs`). A card can be had rarely and for minutes, so nothing is decided by hand.
 //!
 //! Every variant of a kernel ([`KernelVariant`]) is first compared with the kernel's twin; one that differs is rejected.
 //! Then the ceilings are measured, which no kernel exceeds, and rows of dispatches of the variants.
