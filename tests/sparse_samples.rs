@@ -108,7 +108,9 @@ fn few_samples_have_the_bits_of_many() {
         // c2 solves for windows of keys, which pays for longer tracks only (see the next test).
         if method.name != "c2" {
             assert!(
-                route(&sparse_times).contains("few"),
+                ["few samples between keys", "fewer samples"]
+                    .iter()
+                    .any(|words| route(&sparse_times).contains(words)),
                 "{}",
                 route(&sparse_times)
             );

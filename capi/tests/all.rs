@@ -105,9 +105,8 @@ fn libraries() -> PathBuf {
     folder
 }
 
-/// What the example must print: the bits that the engine gives to Rust.
-fn expected() -> String {
-    let engine = Engine::new(Device::Cpu).unwrap();
+/// The track of the examples.
+fn elbow() -> TrackSet {
     let keys = [
         [0.0, 0.0, 0.0, 1.0],
         [0.0, 0.0, 0.6, 0.8],
@@ -115,6 +114,13 @@ fn expected() -> String {
     ];
     let mut set = TrackSet::new();
     set.push("elbow", &[0.0, 0.5, 1.25], &keys).unwrap();
+    set
+}
+
+/// What the example must print: the bits that the engine gives to Rust.
+fn expected() -> String {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let set = elbow();
     let elbow = engine.evaluate(&set, method::SLERP, &SampleTimes::fps(60));
     let elbow = elbow.unwrap();
     let loaded = Format::open_detected(&pendulum(), &ReadOptions::default()).unwrap();
@@ -202,13 +208,7 @@ fn the_example_in_c_prints_the_engines_bits() {
 #[test]
 fn handles_of_cpp_free_themselves_and_have_the_engines_bits() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let keys = [
-        [0.0, 0.0, 0.0, 1.0],
-        [0.0, 0.0, 0.6, 0.8],
-        [0.0, 0.0, 0.8, 0.6],
-    ];
-    let mut set = TrackSet::new();
-    set.push("elbow", &[0.0, 0.5, 1.25], &keys).unwrap();
+    let set = elbow();
     let times = SampleTimes::at(vec![0.0, 0.25, 0.5]);
     let expected = engine.evaluate(&set, method::SLERP, &times).unwrap();
     let expected: Vec<f32> = expected
