@@ -149,7 +149,7 @@ pub fn page(
         #[command(flatten)]
         view: view::Arguments,
     }
-    let fixed = ["view", "-", "--out", "-"].map(str::to_owned);
+    let fixed = ["view", "-", "--output", "-"].map(str::to_owned);
     let parsed = Options::try_parse_from(fixed.iter().chain(options)).map_err(|error| Refused {
         message: error.to_string(),
         is_usage: true,

@@ -161,9 +161,36 @@ mod tests {
                 "",
             ),
             (
-                "plot a -o b --format png".into(),
                 "plot a -o b --picture-format png".into(),
+                "plot a -o b --format png".into(),
                 "",
+            ),
+            (
+                "eval a -o b --path shortest".into(),
+                "eval a -o b --signs shortest".into(),
+                "\"path\": [\"shortest\"]",
+            ),
+            (
+                "eval a --out b".into(),
+                "eval a --output b".into(),
+                "\"out\": [\"b\"]",
+            ),
+            (
+                "follow a -o b --rate 2 --frame fixed --up 0,0,1 --ends loop --speed constant -m linear --forward x".into(),
+                "follow a -o b --pace 2 --path-frame fixed --path-up 0,0,1 --path-ends loop --path-speed constant \
+                 --path-method linear --body-forward x"
+                    .into(),
+                "\"rate\": [\"2\"]",
+            ),
+            (
+                "view a -o b --upward x --body 2".into(),
+                "view a -o b --body-up x --body-length 2".into(),
+                "",
+            ),
+            (
+                "reduce a -o b --curve linear".into(),
+                "reduce a -o b --method linear".into(),
+                "\"curve\": [\"linear\"]",
             ),
             (
                 "prove --seconds 9".into(),

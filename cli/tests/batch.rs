@@ -132,6 +132,15 @@ fn one_flipped_bit_is_found_and_made_good() {
         assert!(!check.words.contains("a.npy"), "{}", check.words);
     }
     fs::remove_file(folder.join("out/a.npy")).unwrap();
+    let report = run(folder, &["check", "out", "--json"]);
+    assert_eq!(report.code, 8, "{}", report.words);
+    let report: serde_json::Value = serde_json::from_slice(&report.out).unwrap();
+    assert_eq!(
+        (&report["complete"], &report["results"]),
+        (&false.into(), &2.into())
+    );
+    assert_eq!(report["differ"][0]["output"], "a.npy", "{report}");
+    assert_eq!(report["differ"][1]["input"], "b.dat", "{report}");
     let check = run(folder, &["check", "out"]);
     assert!(
         check.words.contains("a.npy: cannot be read"),

@@ -248,7 +248,7 @@ fn outputs_have_their_shapes_and_names() {
             let line = [
                 "eval",
                 "a.dat",
-                "--output",
+                "--quantity",
                 output,
                 "--fps",
                 "1",
@@ -281,7 +281,7 @@ fn outputs_have_their_shapes_and_names() {
     let line = [
         "eval",
         "a.dat",
-        "--output",
+        "--quantity",
         "world",
         "--parents",
         "-1,-1",
@@ -295,7 +295,7 @@ fn outputs_have_their_shapes_and_names() {
         let line = [
             "eval",
             "a.dat",
-            "--output",
+            "--quantity",
             "world",
             "--parents",
             list,
@@ -309,15 +309,15 @@ fn outputs_have_their_shapes_and_names() {
     assert!(parents("-2,0").contains("-2 is not the index of a track"));
     for (wrong, says) in [
         (
-            ["--output", "euler", "--sequence", "XXY"],
+            ["--quantity", "euler", "--sequence", "XXY"],
             "no two neighbours the same",
         ),
         (
-            ["--output", "matrix", "--encoding", "f16"],
+            ["--quantity", "matrix", "--encoding", "f16"],
             "for quaternions",
         ),
         (
-            ["--output", "velocity", "--after", "mirror"],
+            ["--quantity", "velocity", "--after", "mirror"],
             "cannot be mirrored",
         ),
     ] {

@@ -37,6 +37,8 @@ const ARGUMENTS: &str = "
 4 | eval a.dat -o o.npy --ends loop              | equals the first
 2 | eval a.dat -o o.npy --memory 5parsecs        | 256MiB
 2 | eval a.dat -o o.txt                          | .npy, .parquet
+2 | eval a.dat --output velocity                | --quantity velocity
+2 | eval a.dat -o world                         | for a directory of this name give -o ./world
 2 | eval a.dat -o a.dat --format npy --overwrite | is the input
 2 | eval a.dat -o old.npy                        | --overwrite
 0 | eval a.dat -o old.npy --overwrite            | old.npy
@@ -47,7 +49,7 @@ const ARGUMENTS: &str = "
 0 | eval folder -o out                           | a.npy
 4 | eval bad.dat -o o.npy                        | bad.dat:2:8: error[E020]
 0 | eval antipodal.dat -o o.npy                  | 1 track
-4 | eval antipodal.dat -o o.npy --path as-authored | as-authored
+4 | eval antipodal.dat -o o.npy --signs as-authored | as-authored
 4 | eval /dev/null -o o.npy                      | is a device
 4 | eval a.dat/b -o o.npy                        | Not a directory
 4 | eval --files-from none.txt -o out            | the list cannot be read

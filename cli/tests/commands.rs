@@ -127,7 +127,7 @@ fn the_table_of_options_is_that_of_the_program() {
     let each = all.iter().map(|command| (command.get_name(), command));
     for (name, command) in each.chain([("every command", &program)]) {
         for option in command.get_arguments() {
-            let Some(long) = option.get_long() else {
+            let Some(long) = option.get_long().filter(|_| !option.is_hide_set()) else {
                 continue;
             };
             let row = rows.entry(long.to_owned()).or_insert_with(|| {

@@ -93,8 +93,8 @@ fn results_number_by_number() {
         ("same.npy", &["-m", "slerp", "--device", "cpu"]),
         ("half.npy", &["-m", "slerp", "--encoding", "f16"]),
         ("frames.npy", &["-m", "slerp", "--layout", "frame"]),
-        ("speed.npy", &["-m", "slerp", "--output", "velocity"]),
-        ("speed2.npy", &["-m", "c2", "--output", "velocity"]),
+        ("speed.npy", &["-m", "slerp", "--quantity", "velocity"]),
+        ("speed2.npy", &["-m", "c2", "--quantity", "velocity"]),
     ] {
         succeed(folder, &[&["eval", "a.dat", "-o", name][..], more].concat());
     }
@@ -604,7 +604,7 @@ fn rotations_of_unknown_parents_are_not_compared_in_the_world() {
         ],
     );
     // With the parents, the table is where the skeleton is.
-    let world = ["-m", "slerp", "--output", "world", "-o"];
+    let world = ["-m", "slerp", "--quantity", "world", "-o"];
     let parents = ["--parents", "-1,0"];
     succeed(
         folder,
@@ -728,7 +728,7 @@ fn documented_checks_hold() {
                 file,
                 "--tolerance",
                 "0.1deg",
-                "--curve",
+                "--method",
                 "cubic",
                 "-o",
                 "take.glb",

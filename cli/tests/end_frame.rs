@@ -45,12 +45,12 @@ fn clips_end_with_a_key_or_a_held_frame_and_arrays_with_a_frame() {
         ("out.kitti", 35, after),
         ("out.kitti --times-out out.txt", 35, length),
         ("out.npy", 34, before),
-        ("out.csv --output velocity", 34, before),
-        ("out.npy --output world", 34, before),
+        ("out.csv --quantity velocity", 34, before),
+        ("out.npy --quantity world", 34, before),
         ("out.npy --end-frame hold", 35, after),
         ("out.npy --end-frame hold --layout frame", 35, after),
-        ("out.npy --end-frame hold --output velocity", 35, after),
-        ("out.csv --end-frame key --output world", 35, length),
+        ("out.npy --end-frame hold --quantity velocity", 35, after),
+        ("out.csv --end-frame key --quantity world", 35, length),
         ("out.npz --end-frame hold", 35, after),
         ("out.bvh --end-frame leave-out", 34, before),
         ("out.csv --end-frame leave-out", 34, before),
@@ -284,16 +284,16 @@ fn frames_are_those_of_the_source() {
         let out = fs::read_to_string(folder.path().join("out.csv")).unwrap();
         (out.lines().count() - 1, run.words)
     };
-    let (count, words) = frames("eval fast.tum --output quaternion -o out.csv --overwrite");
+    let (count, words) = frames("eval fast.tum --quantity quaternion -o out.csv --overwrite");
     assert_eq!(count, 61, "{words}");
     assert!(!words.contains("fps"), "{words}");
-    let (count, words) = frames("eval slow.tum --output quaternion -o out.csv --overwrite");
+    let (count, words) = frames("eval slow.tum --quantity quaternion -o out.csv --overwrite");
     assert_eq!(count, 51, "{words}");
     assert!(
         words.contains("51 frames (25 fps, because its keys have no rate), "),
         "{words}"
     );
-    let (again, words) = frames("eval slow.tum --output quaternion -f 25 -o out.csv --overwrite");
+    let (again, words) = frames("eval slow.tum --quantity quaternion -f 25 -o out.csv --overwrite");
     assert_eq!((again, words.contains("fps")), (51, false), "{words}");
     // Device and reference are compared where no key is, too.
     let run = succeed(

@@ -50,9 +50,9 @@ fn results_are_the_library_s_bits() {
         "c2",
         "--speed",
         "eased:0.2,0.3",
-        "--forward",
+        "--body-forward",
         "-x",
-        "--upward",
+        "--body-up",
         "z",
         "-o",
         "out.npy",
@@ -107,7 +107,7 @@ fn other_formats_hold_the_same_poses() {
             "out.glb",
             "--fps",
             "2",
-            "--output",
+            "--quantity",
             "world",
             "-o",
             "again.npy",
@@ -149,7 +149,7 @@ fn paths_of_a_directory_get_a_file_each() {
         &[
             "follow",
             "paths/b.csv",
-            "--rate",
+            "--pace",
             "0.5",
             "--fps",
             "1",
@@ -186,7 +186,7 @@ fn what_cannot_be_followed_is_refused() {
     refused(4, "nan.csv:2", &["nan.csv"]);
     refused(4, "is not after", &["order.csv"]);
     refused(4, "no length", &["up.csv"]);
-    refused(4, "--seconds or --rate", &["paths/b.csv"]);
+    refused(4, "--seconds or --pace", &["paths/b.csv"]);
     refused(4, "leave out", &["way.csv", "--seconds", "2"]);
     refused(4, "loop", &["way.csv", "--ends", "loop"]);
     refused(4, "ahead", &["way.csv", "--direction", "ahead:0"]);
@@ -195,30 +195,36 @@ fn what_cannot_be_followed_is_refused() {
     refused(
         4,
         "upward directions at its keys",
-        &["way.csv", "--frame", "fixed"],
+        &["way.csv", "--path-frame", "fixed"],
     );
     refused(
         4,
         "faces along the path",
-        &["one.csv", "--frame", "frenet", "--direction", "ahead:1"],
+        &[
+            "one.csv",
+            "--path-frame",
+            "frenet",
+            "--direction",
+            "ahead:1",
+        ],
     );
     refused(2, "no track", &["way.csv", "--direction", "at:nobody"]);
     refused(2, "--direction", &["way.csv", "--direction", "sideways"]);
     refused(2, "--seconds", &["paths/b.csv", "--seconds", "0"]);
-    refused(4, "axes", &["way.csv", "--forward", "y"]);
+    refused(4, "axes", &["way.csv", "--body-forward", "y"]);
     refused(
         2,
-        "--ends has no effect on a path by linear",
-        &["way.csv", "-m", "linear", "--ends", "natural"],
+        "--path-ends has no effect on a path by linear",
+        &["way.csv", "-m", "linear", "--path-ends", "natural"],
     );
     refused(
         2,
         "--twist has no effect on other frames than minimal",
         &[
             "paths/b.csv",
-            "--rate",
+            "--pace",
             "1",
-            "--frame",
+            "--path-frame",
             "fixed",
             "--twist",
             "free",
@@ -226,12 +232,12 @@ fn what_cannot_be_followed_is_refused() {
     );
     refused(
         2,
-        "--up has no effect on Frenet's frames",
+        "--path-up has no effect on Frenet's frames",
         &[
             "paths/b.csv",
-            "--rate",
+            "--pace",
             "1",
-            "--frame",
+            "--path-frame",
             "frenet",
             "--up",
             "0,0,1",
@@ -413,7 +419,7 @@ fn a_path_on_a_map_is_followed_as_one_at_zero() {
             name,
             "--fps",
             "30",
-            "--frame",
+            "--path-frame",
             "fixed",
             "--direction",
             at,

@@ -187,13 +187,13 @@ fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
     let temporary = sample_folder();
     let folder = temporary.path();
     fixture(folder, "npz/smpl.npz", "body.npz");
-    let without = refused(folder, "eval body.npz --output world -o world.npy");
+    let without = refused(folder, "eval body.npz --quantity world -o world.npy");
     assert!(without.words.contains("--offsets"), "{}", without.words);
     assert!(!folder.join("world.npy").exists());
     fs::write(folder.join("short.txt"), "0 0.1 0\n").unwrap();
     let short = refused(
         folder,
-        "eval body.npz --output world --offsets short.txt -o world.npy",
+        "eval body.npz --quantity world --offsets short.txt -o world.npy",
     );
     assert!(
         short.words.contains("3 numbers of offsets for 24 joints"),
@@ -208,7 +208,7 @@ fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
     .unwrap();
     line(
         folder,
-        "eval body.npz --output world --offsets offsets.txt -o world.npy",
+        "eval body.npz --quantity world --offsets offsets.txt -o world.npy",
     );
     let bytes = fs::read(folder.join("world.npy")).unwrap();
     let file = npyz::NpyFile::new(&bytes[..]).unwrap();
@@ -253,7 +253,7 @@ fn first_row(folder: &Path, file: &str) -> std::collections::HashMap<String, f64
         file,
         "--fps",
         "10",
-        "--output",
+        "--quantity",
         "transform",
         "--to",
         "csv",
@@ -339,7 +339,7 @@ fn joints_without_offsets_are_not_read_as_joints_in_one_point() {
             folder,
             &format!("eval first.{format} --fps 30 -o body.{format} --overwrite"),
         );
-        let world = format!("eval body.{format} --output world -o world.npy --overwrite");
+        let world = format!("eval body.{format} --quantity world -o world.npy --overwrite");
         let without = refused(folder, &world);
         assert!(
             without.words.contains("--offsets"),
@@ -365,7 +365,7 @@ fn offsets_of_a_body_are_written_to_npz() {
         line(folder, wide.trim_end());
         line(
             folder,
-            "eval placed.npz --output world -o world.npy --overwrite",
+            "eval placed.npz --quantity world -o world.npy --overwrite",
         );
         let row = first_row(folder, "placed.npz");
         assert_eq!(row["left_hip.ty"], 0.1, "{wide}");

@@ -273,15 +273,13 @@ fn joints_that_do_not_turn_are_left_out_unless_they_are_chosen() {
             &[2, 4],
             "",
             &[1, 3],
-            Some(
-                "a.dat: not drawn, they do not turn: joint2, joint4; --tracks or --box draws them\n",
-            ),
+            Some("a.dat: not drawn, they do not turn: joint2, joint4; --tracks draws them\n"),
         ),
         (
             &[1],
             "",
             &[2, 3, 4],
-            Some("a.dat: not drawn, it does not turn: joint1; --tracks or --box draws it\n"),
+            Some("a.dat: not drawn, it does not turn: joint1; --tracks draws it\n"),
         ),
         (&[2, 4], "--box 2,3", &[2, 3], None),
         (&[2, 4], "--tracks joint4", &[4], None),
@@ -497,7 +495,7 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
             "a.dat",
             "--dimension",
             "2,8",
-            "--picture-format",
+            "--format",
             "png",
             "-o",
             "out",
@@ -542,6 +540,14 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
             "there is no box 3: a.dat has 2 boxes",
         ),
         (
+            "plot a.dat -o x.svg --components 2.x",
+            "a.dat: --components: there is no track `2`; it has 2 tracks",
+        ),
+        (
+            "plot a.dat -o x.svg --components 1.q",
+            "expected a track and w, x, y or z, such as 0.x",
+        ),
+        (
             "plot a.dat -o x.jpg",
             "x.jpg: end the picture in .svg or .png, or give a directory",
         ),
@@ -563,7 +569,7 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
         ),
         (
             "plot a.dat -o x.svg --show speed --dimension 2",
-            "--dimension needs --show components",
+            "--components needs --show components",
         ),
         (
             "plot a.dat -o x.svg --dimension 2 --box 1",
@@ -579,8 +585,8 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
             "--axis has no effect on this plot; add --show sphere",
         ),
         (
-            "plot a.dat -o x.svg --frame frenet",
-            "--frame has no effect on files of rotations; it is for files of paths",
+            "plot a.dat -o x.svg --path-frame frenet",
+            "--path-frame has no effect on files of rotations; it is for files of paths",
         ),
         (
             "plot a.dat -o x.svg -m slerp --ends natural",

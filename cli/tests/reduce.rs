@@ -40,7 +40,7 @@ fn a_walk_gets_few_keys_and_compares() {
             "-o",
             "walk.glb",
             "--overwrite",
-            "--curve",
+            "--method",
             curve,
         ];
         let said = succeed(
@@ -84,7 +84,7 @@ fn a_gltf_keeps_all_but_its_keys() {
     let fox = fox.to_str().unwrap();
     let said = succeed(
         folder,
-        &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"],
+        &["reduce", fox, "-o", "fox.glb", "--method", "cubic"],
     );
     assert!(
         said.words.contains("Survey: ") && said.words.contains("Run: "),
@@ -165,7 +165,7 @@ fn a_chain_goes_back_into_dat() {
         "few.dat",
         "--fps",
         "100",
-        "--curve",
+        "--method",
         "bessel-overhauser",
     ];
     let said = succeed(folder, &line);
@@ -198,7 +198,7 @@ fn what_cannot_be_reduced_is_refused() {
                 "walk.bvh",
                 "-o",
                 "a.glb",
-                "--curve",
+                "--method",
                 "bessel-overhauser",
             ][..],
             2,
@@ -232,14 +232,14 @@ fn what_cannot_be_reduced_is_refused() {
                 "-o",
                 "a.glb",
                 "--quantize",
-                "--curve",
+                "--method",
                 "cubic",
             ],
             2,
-            "leave out --curve cubic",
+            "leave out --method cubic",
         ),
         (
-            &["reduce", "walk.bvh", "-o", "a.npz", "--curve", "cubic"],
+            &["reduce", "walk.bvh", "-o", "a.npz", "--method", "cubic"],
             4,
             "cubic spline",
         ),
@@ -275,7 +275,7 @@ fn convert_keeps_cubics_and_times_of_channels() {
     walk(folder);
     succeed(
         folder,
-        &["reduce", "walk.bvh", "-o", "cubic.glb", "--curve", "cubic"],
+        &["reduce", "walk.bvh", "-o", "cubic.glb", "--method", "cubic"],
     );
     succeed(folder, &["convert", "cubic.glb", "-o", "again.glb"]);
     let bits = ["--tolerance", "0", "--distance", "0"];

@@ -8,24 +8,24 @@ use crate::program::{run, sample_folder, succeed};
 /// A line, a part of its message, and the lines that the message leads to.
 const REMEDIES: &[(&str, &str, &[&str])] = &[
     (
-        "follow way.csv --frame fixed -o o.npy",
-        "(--frame minimal, --no-ups)",
+        "follow way.csv --path-frame fixed -o o.npy",
+        "(--path-frame minimal, --no-ups)",
         &[
-            "follow way.csv --frame minimal -o o.npy",
-            "follow way.csv --frame fixed --no-ups -o o.npy",
+            "follow way.csv --path-frame minimal -o o.npy",
+            "follow way.csv --path-frame fixed --no-ups -o o.npy",
         ],
     ),
     (
         "follow points.csv -o o.npy",
-        "give --seconds or --rate",
+        "give --seconds or --pace",
         &[
             "follow points.csv --seconds 2 -o o.npy",
-            "follow points.csv --rate 2 -o o.npy",
+            "follow points.csv --pace 2 -o o.npy",
         ],
     ),
     (
         "follow path.csv --seconds 2 -o o.npy",
-        "leave out --seconds and --rate",
+        "leave out --seconds and --pace",
         &["follow path.csv -o o.npy"],
     ),
     (
@@ -68,12 +68,12 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
         ],
     ),
     (
-        "reduce a.dat --curve bessel-overhauser -o o.glb",
-        "choose --curve linear or cubic, or write .npz",
+        "reduce a.dat --method bessel-overhauser -o o.glb",
+        "choose --method linear or cubic, or write .npz",
         &[
-            "reduce a.dat --curve linear -o o.glb",
-            "reduce a.dat --curve cubic -o o.glb",
-            "reduce a.dat --curve bessel-overhauser -o o.npz",
+            "reduce a.dat --method linear -o o.glb",
+            "reduce a.dat --method cubic -o o.glb",
+            "reduce a.dat --method bessel-overhauser -o o.npz",
         ],
     ),
     (
@@ -85,9 +85,9 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
         ],
     ),
     (
-        "eval a.dat --output velocity --order wxyz -o o.npy",
+        "eval a.dat --quantity velocity --order wxyz -o o.npy",
         "leave it out",
-        &["eval a.dat --output velocity -o o.npy"],
+        &["eval a.dat --quantity velocity -o o.npy"],
     ),
     (
         "route hill.obj -o o.csv",

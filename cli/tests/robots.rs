@@ -370,7 +370,7 @@ fn options_without_effect_are_refused() {
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --to npz -o x",
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --describe -o x.pkl",
         "eval take.csv --robot robot.xml --dialect gmr --fps 50 --order wxyz -o x.pkl",
-        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --output euler -o x.pkl",
+        "eval take.csv --robot robot.xml --dialect gmr --fps 50 --quantity euler -o x.pkl",
         "eval take.csv --robot robot.xml --dialect gmr --at keys -o x.pkl",
         "convert take.csv --robot robot.xml --dialect gmr --sequence XYZ -o x.pkl",
         "eval take.csv --robot take.csv --fps 50 -o x.npz",
@@ -391,7 +391,10 @@ fn scalars_are_evaluated_alone() {
     line(folder, &format!("{eval} --dialect mjlab -o bodies.npz"));
     let bodies = arrays(&folder.join("bodies.npz"));
     for (output, array) in [("scalars", "joint_pos"), ("scalar-velocities", "joint_vel")] {
-        line(folder, &format!("{eval} --output {output} -o {output}.npy"));
+        line(
+            folder,
+            &format!("{eval} --quantity {output} -o {output}.npy"),
+        );
         let bytes = fs::read(folder.join(format!("{output}.npy"))).unwrap();
         let found = tumble_formats::npy::read_numbers(output, &bytes, |_| Ok(())).unwrap();
         assert_eq!(
@@ -400,7 +403,7 @@ fn scalars_are_evaluated_alone() {
             "{output}"
         );
     }
-    line(folder, &format!("{eval} --output scalars -o scalars.csv"));
+    line(folder, &format!("{eval} --quantity scalars -o scalars.csv"));
     let text = fs::read_to_string(folder.join("scalars.csv")).unwrap();
     let heading = "frame,time,left_shoulder,left_elbow,right_shoulder,right_elbow";
     assert_eq!(text.lines().next(), Some(heading));
@@ -417,16 +420,16 @@ fn scalars_are_evaluated_alone() {
     // Without the robot the joints have numbers, and wrap as they are.
     let run = line(
         folder,
-        "eval take.csv --fps 10 --output scalar-accelerations -o a.csv",
+        "eval take.csv --fps 10 --quantity scalar-accelerations -o a.csv",
     );
     assert!(run.words.contains("4 scalars"), "{}", run.words);
     fs::write(folder.join("a.tum"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").unwrap();
     for words in [
-        "eval a.tum --output scalars --fps 30 -o x.npy",
-        "eval take.csv --output scalars --fps 30 --tracks 0 -o x.npy",
-        "eval take.csv --output scalars --fps 30 --order wxyz -o x.npy",
-        "eval take.csv --output scalars --fps 30 --axes parent -o x.npy",
-        "eval take.csv --output scalars --fps 30 -o x.glb",
+        "eval a.tum --quantity scalars --fps 30 -o x.npy",
+        "eval take.csv --quantity scalars --fps 30 --tracks 0 -o x.npy",
+        "eval take.csv --quantity scalars --fps 30 --order wxyz -o x.npy",
+        "eval take.csv --quantity scalars --fps 30 --axes parent -o x.npy",
+        "eval take.csv --quantity scalars --fps 30 -o x.glb",
     ] {
         let run = run_words(folder, words);
         assert_ne!(run.code, 0, "{words}: {}", run.words);

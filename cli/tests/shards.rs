@@ -179,7 +179,11 @@ fn strangers_are_not_replaced() {
     }
     assert_eq!(names(&folder.join("out")), ["05.npy"]);
     succeed(folder, &shard("out", &bytes, "1/1", &["--overwrite"]));
-    succeed(folder, &["merge", "out"]);
+    let merged = succeed(folder, &["merge", "out", "--json"]);
+    let report: serde_json::Value = serde_json::from_slice(&merged.out).unwrap();
+    let results = fs::read_dir(folder.join("out")).unwrap().count() - 1;
+    assert_eq!(report["results"], results, "{report}");
+    assert_eq!(report["failed"], serde_json::json!([]), "{report}");
     assert_eq!(run(folder, &shard("out", &bytes, "1/1", &[])).code, 2);
 }
 

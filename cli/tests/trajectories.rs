@@ -229,7 +229,7 @@ fn times_in_gaps_are_left_out_held_or_refused() {
     // Numbers alone, likewise.
     line(
         at,
-        &format!("{eval} --in-gaps hold --output world -o held.csv"),
+        &format!("{eval} --in-gaps hold --quantity world -o held.csv"),
     );
     let text = fs::read_to_string(at.join("held.csv")).unwrap();
     let third = text.lines().nth(3).unwrap();
@@ -241,7 +241,7 @@ fn times_in_gaps_are_left_out_held_or_refused() {
     );
     refused(
         at,
-        &format!("{eval} --in-gaps hold --output velocity -o no.npy"),
+        &format!("{eval} --in-gaps hold --quantity velocity -o no.npy"),
         "has no velocity",
     );
     refused(
@@ -312,16 +312,19 @@ fn times_since_1970_are_kept_by_every_table() {
     for (command, first) in [
         ("eval keys.csv --fps 4 -m slerp", "1700000000.123456789"),
         (
-            "eval keys.csv --fps 4 -m slerp --output euler",
+            "eval keys.csv --fps 4 -m slerp --quantity euler",
             "1700000000.123456789",
         ),
         (
-            "eval keys.csv --fps 4 -m slerp --output velocity",
+            "eval keys.csv --fps 4 -m slerp --quantity velocity",
             "1700000000.123456789",
         ),
         ("eval path.tum --fps 10", "1305031098.6"),
-        ("eval path.tum --fps 10 --output world", "1305031098.6"),
-        ("eval path.tum --fps 10 --output transform", "1305031098.6"),
+        ("eval path.tum --fps 10 --quantity world", "1305031098.6"),
+        (
+            "eval path.tum --fps 10 --quantity transform",
+            "1305031098.6",
+        ),
         ("smooth keys.csv --kernel linear", "1700000000.123456789"),
         ("convert keys.csv", "1700000000.123456789"),
     ] {

@@ -68,7 +68,7 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
 
     succeed(
         folder.path(),
-        &words("eval walk.glb --output world -o walk.npy"),
+        &words("eval walk.glb --quantity world -o walk.npy"),
     );
     let bytes = fs::read(folder.path().join("walk.npy")).unwrap();
     let poses = npyz::NpyFile::new(&bytes[..]).unwrap();
@@ -105,7 +105,7 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
 #[test]
 fn a_path_its_axes_and_a_box_are_rendered() {
     let folder = road_folder();
-    let line = "render road.csv --frame frenet,minimal --size 400x200 --start 1.5 -o a.png";
+    let line = "render road.csv --path-frame frenet,minimal --size 400x200 --start 1.5 -o a.png";
     let run = succeed(folder.path(), &words(line));
     assert!(
         run.words.contains("road.csv: 1 frame, 1 path, on"),
@@ -154,7 +154,7 @@ fn a_path_its_axes_and_a_box_are_rendered() {
 #[test]
 fn paths_are_plotted_by_each_frame() {
     let folder = road_folder();
-    let line = "plot road.csv --frame minimal,fixed -o road.svg";
+    let line = "plot road.csv --path-frame minimal,fixed -o road.svg";
     succeed(folder.path(), &words(line));
     let svg = fs::read_to_string(folder.path().join("road.svg")).unwrap();
     for word in [
@@ -178,7 +178,10 @@ fn paths_are_plotted_by_each_frame() {
     };
     refused("plot road.csv --show error -o e.svg", "--show path");
     refused("plot a.dat --show path -o e.svg", "neither a file of paths");
-    refused("render road.csv --frame sideways -o e.png", "--frame");
+    refused(
+        "render road.csv --path-frame sideways -o e.png",
+        "--path-frame",
+    );
 }
 
 #[test]
@@ -216,7 +219,7 @@ fn a_batch_of_paths_goes_on_where_it_stopped() {
     // With other options, `follow` makes all results again.
     let other = succeed(
         folder.path(),
-        &words("follow paths -o poses --resume --frame fixed"),
+        &words("follow paths -o poses --resume --path-frame fixed"),
     );
     assert!(!other.words.contains("skipped"), "{}", other.words);
     assert!(result("a.npy") != first);
@@ -230,7 +233,7 @@ fn the_page_shows_paths_with_axes_and_a_body_that_moves() {
         folder.path(),
         &words("generate --hill -o hill.obj --rocks rocks.obj"),
     );
-    let line = "view road.csv --frame minimal,frenet --fps 30 --mesh hill.obj -o view.html";
+    let line = "view road.csv --path-frame minimal,frenet --fps 30 --mesh hill.obj -o view.html";
     succeed(folder.path(), &words(line));
     let Some(mut page) = Page::open(&folder.path().join("view.html")) else {
         return;

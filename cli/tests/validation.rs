@@ -64,7 +64,7 @@ fn no_layer_has_anything_to_say_of_the_program() {
             "a.dat",
             "-o",
             "o.npy",
-            "--output",
+            "--quantity",
             "world",
             "--overwrite",
         ],

@@ -40,7 +40,7 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
     for method in ["bessel-overhauser", "c2"] {
         page.choose("#method", method);
         page.value("tumble.loaded().then(() => true)");
-        let line = "eval walk.bvh --output world --times times.txt -o world.npy --overwrite -m";
+        let line = "eval walk.bvh --quantity world --times times.txt -o world.npy --overwrite -m";
         let line: Vec<&str> = line.split(' ').chain([method]).collect();
         succeed(folder, &line);
         let bytes = fs::read(folder.join("world.npy")).unwrap();
@@ -98,8 +98,8 @@ fn a_long_motion_is_refused_in_its_words() {
             "--twist has no effect on files of rotations",
         ),
         (
-            "view walk.bvh -o x.html --body 2",
-            "--body has no effect on boxes and skeletons",
+            "view walk.bvh -o x.html --body-length 2",
+            "--body-length has no effect on boxes and skeletons",
         ),
     ] {
         let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());

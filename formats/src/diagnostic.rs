@@ -259,7 +259,7 @@ codes! {
     FrameTimes = "E507" elsewhere, "not a time for each pose", "A file of times has one number on each line, the time of a pose in seconds, in the order of the poses.";
     // E6xx: paths.
     Path = "E601" elsewhere, "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, where `t` and `ux,uy,uz` are optional, or NPY of shape (tracks, points, 3). An upward direction must not be 0; its cells may be blank.";
-    PathTimes = "E602" elsewhere, "no times, or too many", "A path without times needs `--seconds` or `--rate`. A path with times must have neither.";
+    PathTimes = "E602" elsewhere, "no times, or too many", "A path without times needs `--seconds` or `--pace`. A path with times must have neither.";
     // E61x: what ways lead over, and who goes.
     Mesh = "E610" elsewhere, "not a mesh", "A mesh is OBJ, PLY, GLB or glTF. Its faces have at least three corners, which are existing vertices with finite coordinates.";
     Net = "E611" elsewhere, "not a net", "A net of control points is NPY of floats and of shape (m, n, 3), each side 2 to 32.";

@@ -157,11 +157,11 @@ impl PathPoints {
         let Some(pace) = pace else {
             return match has_times {
                 true => Ok(()),
-                false => refuse("the path has no times; give --seconds or --rate"),
+                false => refuse("the path has no times; give --seconds or --pace"),
             };
         };
         if has_times {
-            return refuse("the path has times of its own; leave out --seconds and --rate");
+            return refuse("the path has times of its own; leave out --seconds and --pace");
         }
         let input = std::mem::take(self);
         let mut length = 0.0;

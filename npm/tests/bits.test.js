@@ -50,7 +50,7 @@ test("options mean what they mean to the program", () => {
     [{ ends: "natural" }, "--ends", "natural"],
     [{ ends: "clamped", after: "extrapolate" }, "--ends", "clamped", "--after", "extrapolate"],
     [{ before: "loop", after: "mirror" }, "--before", "loop", "--after", "mirror"],
-    [{ path: "as-authored" }, "--path", "as-authored"],
+    [{ path: "as-authored" }, "--signs", "as-authored"],
     [{ speed: "constant" }, "--speed", "constant"],
     [{ method: "kochanek-bartels", tension: 0.1, continuity: 0.3, bias: -0.7 }, "--tension", "0.1", "--continuity", "0.3", "--bias", "-0.7"],
     [{ layout: "frame" }, "--layout", "frame"],
@@ -94,10 +94,10 @@ test("velocities, accelerations and places in the world are the program's", () =
     [clip.accelerations(TIMES, { method: "c2", axes: "parent" }).values, "acceleration"],
   ]) {
     const axes = output === "acceleration" ? ["--axes", "parent"] : [];
-    const right = evaluated(file, "-m", "c2", "--times", "times.txt", "--output", output, ...axes);
+    const right = evaluated(file, "-m", "c2", "--times", "times.txt", "--quantity", output, ...axes);
     assert.equal(differs(found, right.numbers), -1, output);
   }
-  const right = evaluated(file, "-m", "c2", "--times", "times.txt", "--output", "world");
+  const right = evaluated(file, "-m", "c2", "--times", "times.txt", "--quantity", "world");
   const world = clip.world(TIMES, { method: "c2", layout: "frame" });
   const joints = world.tracks;
   assert.deepEqual(right.shape, [TIMES.length, joints, 7]);

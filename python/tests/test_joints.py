@@ -362,7 +362,7 @@ def test_offsets_with_names_are_matched_by_name(body, tmp_path):
     listed = tmp_path / "offsets.txt"
     result = tmp_path / "world.npy"
     listed.write_text("\n".join(reversed(lines)))
-    line = ["eval", body, "--offsets", listed, "--output", "world", "-m", "slerp", "--fps", "30", "-o", result]
+    line = ["eval", body, "--offsets", listed, "--quantity", "world", "-m", "slerp", "--fps", "30", "-o", result]
     subprocess.run([sys.executable, "-m", "tumble", *map(str, line)], check=True, timeout=300)
     expected = tumble.Engine("cpu").world(tumble.load(body, offsets=offsets).clip, fps=30, method="slerp", layout="frame")[0]
     found = np.load(result)

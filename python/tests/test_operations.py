@@ -81,7 +81,7 @@ def test_every_encoding_has_the_bytes_of_the_program(clip, engine, tmp_path, enc
     clip = tumble.load(tmp_path / "clip.npz").clip
     found = engine.encoded(clip, encoding, fps=30, method="slerp")
     is_quaternion = encoding in ("f32", "f16", "snorm16")
-    output = ["--encoding", encoding] if is_quaternion else ["--output", encoding]
+    output = ["--encoding", encoding] if is_quaternion else ["--quantity", encoding]
     program(
         "eval", "clip.npz", *output, "--method", "slerp", "--fps", 30, "-o", "out.npy", cwd=tmp_path
     )
@@ -374,7 +374,7 @@ def test_bodies_follow_as_in_the_program(rng, engine, tmp_path):
     times, points = np.array([0.0, 1.0, 2.5, 4.0]), rng.normal(size=(4, 3)).astype(np.float32)
     np.savetxt(tmp_path / "way.csv", np.c_[times, points], delimiter=",", header="t,x,y,z", comments="", fmt="%.9g")
     line = ["follow", "way.csv", "--fps", 30, "--device", "cpu", "-o", "out.npy"]
-    program(*line, "--frame", "fixed", "--direction", "ahead:0.5", "--forward", "x", cwd=tmp_path)
+    program(*line, "--path-frame", "fixed", "--direction", "ahead:0.5", "--body-forward", "x", cwd=tmp_path)
     positions, rotations = engine.follow(times, points, fps=30, frame="fixed", ahead=0.5, forward="x")
     expected = np.load(tmp_path / "out.npy")
     assert np.array_equal(np.c_[positions, rotations], expected[:, 0])

@@ -19,15 +19,15 @@ use crate::arguments::output::one_of;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// `--path` and `--ends`, which every method takes.
+/// `--signs` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct InterpolationArguments {
     /// The boundary condition at the first and the last key [default: depends on the method]
     #[arg(long, value_name = "ENDS", value_parser = ends())]
     ends: Option<Ends>,
     /// Which way to rotate between neighbouring keys
-    #[arg(long, value_name = "PATH", value_parser = key_signs())]
-    path: Option<KeySigns>,
+    #[arg(id = "path", long = "signs", alias = "path", value_name = "SIGNS", value_parser = key_signs())]
+    signs: Option<KeySigns>,
     /// The speed along the curve
     #[arg(long, value_name = "SPEED", default_value_t, value_parser = speed())]
     speed: Speed,
@@ -59,7 +59,7 @@ impl InterpolationArguments {
     /// The options as the engine has them.
     pub(crate) fn options(self) -> InterpolationOptions {
         InterpolationOptions {
-            signs: self.path,
+            signs: self.signs,
             ends: self.ends,
             speed: self.speed,
             before: self.before.wrap_mode(),
@@ -136,11 +136,11 @@ impl InterpolationArguments {
                 names()
             ));
         }
-        let path = self.path;
-        let takes = |method: &Method| method.signs.is_none() || method.signs == path;
-        if path.is_some() && !methods.iter().any(takes) {
+        let signs = self.signs;
+        let takes = |method: &Method| method.signs.is_none() || method.signs == signs;
+        if signs.is_some() && !methods.iter().any(takes) {
             return Err(format!(
-                "--path has no effect on {}, which always follows the signs of the keys; leave it out",
+                "--signs has no effect on {}, which always follows the signs of the keys; leave it out",
                 names()
             ));
         }

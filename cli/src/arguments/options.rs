@@ -271,7 +271,7 @@ impl ResultDescription<'_> {
     fn unless(&self, applies: bool, option: &str, wants: &str) -> Option<String> {
         (!applies).then(|| {
             format!(
-                "--{option} has no effect on --output {}; leave it out, or use {wants}",
+                "--{option} has no effect on --quantity {}; leave it out, or use {wants}",
                 self.output.name()
             )
         })
@@ -279,36 +279,36 @@ impl ResultDescription<'_> {
 }
 
 fn sequence(result: &ResultDescription<'_>) -> Option<String> {
-    // Files of angles have them whatever `--output` is (BVH).
+    // Files of angles have them whatever `--quantity` is (BVH).
     let is_angles = result.kind.is_clip() && result.format.takes(FormatOption::Sequence);
     let applies = result.output.is_euler() || is_angles;
-    result.unless(applies, "sequence", "--output euler, or BVH")
+    result.unless(applies, "sequence", "--quantity euler, or BVH")
 }
 
 fn major(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.is_matrix();
-    result.unless(applies, "major", "--output matrix or matrix-3x4")
+    result.unless(applies, "major", "--quantity matrix or matrix-3x4")
 }
 
 fn axes(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.is_rate();
-    result.unless(applies, "axes", "--output velocity or acceleration")
+    result.unless(applies, "axes", "--quantity velocity or acceleration")
 }
 
 fn parents(result: &ResultDescription<'_>) -> Option<String> {
     let applies = result.output.poses().is_some();
-    result.unless(applies, "parents", "--output world or transform")
+    result.unless(applies, "parents", "--quantity world or transform")
 }
 
 fn order(result: &ResultDescription<'_>) -> Option<String> {
     let (output, format) = (result.output, result.format);
     match result.kind {
         ResultKind::Poses if output.scalars().is_some() => Some(format!(
-            "--order is for quaternions, and --output {} has none; leave it out",
+            "--order is for quaternions, and --quantity {} has none; leave it out",
             output.name()
         )),
         ResultKind::Rotations if !output.is_rotations() => Some(format!(
-            "--order is for quaternions, and --output {} has none; leave it out",
+            "--order is for quaternions, and --quantity {} has none; leave it out",
             output.name()
         )),
         ResultKind::Motion if format.takes(FormatOption::Order) => None,
@@ -352,7 +352,7 @@ fn encoding(result: &ResultDescription<'_>) -> Option<String> {
         }
         ResultKind::Rotations if result.output.is_rotations() => None,
         ResultKind::Rotations | ResultKind::Poses => Some(format!(
-            "--encoding is for quaternions, and --output {} is written as f32; leave it out",
+            "--encoding is for quaternions, and --quantity {} is written as f32; leave it out",
             result.output.name()
         )),
         ResultKind::Motion | ResultKind::Baked | ResultKind::Robot => Some(format!(
@@ -379,7 +379,7 @@ fn end_frame(result: &ResultDescription<'_>) -> Option<String> {
 fn lengths(result: &ResultDescription<'_>, option: &str) -> Option<String> {
     (result.kind == ResultKind::Rotations).then(|| {
         format!(
-            "--{option} has no effect on rotations alone; leave it out, or write --output world or \
+            "--{option} has no effect on rotations alone; leave it out, or write --quantity world or \
              transform, or a clip (-o OUT.glb)"
         )
     })
@@ -433,7 +433,7 @@ impl CommandLine {
 
     /// Refuses the options of curves through rotations where there are none.
     pub(crate) fn refuse_rotation_options(&self, on: &str) -> Result<(), Failure> {
-        let remedy = "it is for rotations; leave it out, or see --frame and --path-method";
+        let remedy = "it is for rotations; leave it out, or see --path-frame and --path-method";
         self.refuse(&[("methods", "--method")], on, remedy)?;
         self.refuse_group::<InterpolationArguments>(on, remedy)
     }

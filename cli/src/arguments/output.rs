@@ -1,4 +1,4 @@
-//! `--output` and its options: what is written for each rotation.
+//! `--quantity` and its options: what is written for each rotation.
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -13,7 +13,7 @@ use tumble_formats::quaternion::ComponentOrder;
 pub(crate) struct OutputArguments {
     /// What to write of each rotation
     #[arg(
-        long = "output",
+        long = "quantity",
         value_name = "WHAT",
         default_value = "quaternion",
         value_parser = one_of(outputs())
@@ -55,7 +55,7 @@ const QUATERNION: &str = "quaternion";
 /// A value of an argument, with its name and its help.
 type NamedValue<T> = (&'static str, &'static str, T);
 
-/// The values of `--output`: quaternions, the other representations of rotations, rates, and poses.
+/// The values of `--quantity`: quaternions, the other representations of rotations, rates, and poses.
 fn outputs() -> Vec<NamedValue<OutputKind>> {
     let others = encodings(|encoding| encoding.stores_rotations() && !encoding.is_quaternion());
     let others = others.map(|(name, help, encoding)| (name, help, OutputKind::Encoded(encoding)));
@@ -85,6 +85,11 @@ fn outputs() -> Vec<NamedValue<OutputKind>> {
         (scalar_output(quantity), help, OutputKind::Scalars(quantity))
     }));
     outputs
+}
+
+/// Whether a value of `--quantity` has this name.
+pub(crate) fn is_quantity(name: &str) -> bool {
+    outputs().iter().any(|(quantity, ..)| *quantity == name)
 }
 
 fn scalar_output(quantity: ScalarQuantity) -> &'static str {

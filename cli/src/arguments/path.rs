@@ -21,16 +21,15 @@ use crate::messages::names;
 /// The heading of these options in help.
 pub(crate) const PATHS: &str = "Paths";
 
-/// How paths are followed. Beside arguments about rotations those of the same meaning are called
-/// `--path-…`; `follow`, which has none of these, gives them their short names.
+/// How paths are followed. Those whose meaning an option of rotations has too are called `--path-…`, in every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PathArguments {
     /// The duration, seconds: of paths without times
     #[arg(long, value_name = "S", conflicts_with = "rate", value_parser = positive)]
     seconds: Option<f64>,
     /// The distance that a body covers in a second on paths without times
-    #[arg(long, value_name = "UNITS", value_parser = positive)]
-    rate: Option<f64>,
+    #[arg(id = "rate", long = "pace", alias = "rate", value_name = "UNITS", value_parser = positive)]
+    pace: Option<f64>,
     /// How to interpolate: the curve through the points of a path
     #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
     path_method: VectorMethod,
@@ -42,7 +41,8 @@ pub(crate) struct PathArguments {
     direction: DirectionArgument,
     /// The orientation about this direction; several are drawn side by side
     #[arg(
-        long = "frame",
+        long = "path-frame",
+        alias = "frame",
         value_name = "FRAMES",
         value_delimiter = ',',
         default_value = "minimal",
@@ -58,16 +58,16 @@ pub(crate) struct PathArguments {
     /// What to do with the rotation about the direction that is left over at the end of a closed path
     #[arg(long, value_name = "TWIST", default_value_t, value_parser = twist())]
     twist: Twist,
-    /// The speed along the curve: keys, constant, or eased:A,B, which speeds up over the fraction A of the
-    /// time and slows down over the fraction B
-    #[arg(long, value_name = "SPEED", default_value = "keys", value_parser = speed)]
+    /// The speed along the curve: as-keyed, constant, or eased:A,B, which speeds up over the fraction A of the
+    /// time and slows down over the fraction B [default: as-keyed]
+    #[arg(long, value_name = "SPEED", default_value = "keys", hide_default_value = true, value_parser = speed)]
     path_speed: PathSpeed,
     /// The axis of the body that faces forward
-    #[arg(long, value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
-    forward: BodyAxis,
+    #[arg(id = "forward", long = "body-forward", alias = "forward", value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
+    body_forward: BodyAxis,
     /// The axis of the body that faces up
-    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
-    upward: BodyAxis,
+    #[arg(id = "upward", long = "body-up", alias = "upward", value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
+    body_up: BodyAxis,
 }
 
 fn frame() -> impl TypedValueParser<Value = PathFrame> {
@@ -162,13 +162,14 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
         .strip_prefix("eased:")
         .and_then(|parts| parts.split_once(','));
     match (text, parts) {
-        ("keys", _) => Ok(PathSpeed::Keys),
+        // `keys` is its older name, which manifests have.
+        ("as-keyed" | "keys", _) => Ok(PathSpeed::Keys),
         ("constant", _) => Ok(PathSpeed::Constant),
         (_, Some((start, end))) => match (start.parse(), end.parse()) {
             (Ok(start), Ok(end)) => Ok(PathSpeed::Eased { start, end }),
             _ => Err(expected("pair of fractions")),
         },
-        _ => Err("a speed is keys, constant or eased:A,B".to_owned()),
+        _ => Err("a speed is as-keyed, constant or eased:A,B".to_owned()),
     }
 }
 
@@ -198,17 +199,17 @@ impl PathArguments {
         each_once(self.path_frames.iter())
     }
 
-    /// The rotation of a body that faces along z, with y up, to `--forward` and `--upward`.
+    /// The rotation of a body that faces along z, with y up, to `--body-forward` and `--body-up`.
     pub(crate) fn body_rotation(&self) -> Quat {
-        let [z, y] = [self.forward, self.upward].map(|axis| axis.direction().as_vec3());
+        let [z, y] = [self.body_forward, self.body_up].map(|axis| axis.direction().as_vec3());
         Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z))
     }
 
     /// Reads the paths of a file, a track each.
     pub(crate) fn read(&self, path: &Path) -> Result<Motion, Failure> {
-        let pace = match (self.seconds, self.rate) {
+        let pace = match (self.seconds, self.pace) {
             (Some(seconds), _) => Some(Pace::Seconds(seconds)),
-            (None, rate) => rate.map(Pace::Rate),
+            (None, pace) => pace.map(Pace::Rate),
         };
         let options = ReadOptions {
             limits: Limits::default(),
@@ -241,7 +242,7 @@ impl PathArguments {
             up: self.path_up,
             twist: self.twist,
             speed: self.path_speed,
-            axes: [self.forward, self.upward],
+            axes: [self.body_forward, self.body_up],
         })
     }
 }

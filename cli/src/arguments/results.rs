@@ -25,7 +25,7 @@ const ONE_INPUT: &str = "--times-out needs a single input whose result is a sing
 
 #[derive(Debug, Args)]
 pub(crate) struct ResultArguments {
-    #[arg(short, long = "out", value_name = "OUT", help = target::out_help())]
+    #[arg(short, long = "output", alias = "out", value_name = "OUT", help = target::out_help())]
     out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
@@ -203,10 +203,8 @@ impl ResultArguments {
                 return Err(Failure::usage(message));
             }
         }
-        if self.json && plan.targets.iter().any(ResultTarget::is_standard) {
-            return Err(Failure::usage(
-                "--json and the result cannot both go to standard output; give -o FILE",
-            ));
+        for target in &plan.targets {
+            target::refuse_both_on_standard(self.json, target.path())?;
         }
         if let Some(file) = &self.times_out {
             let (1, None, Some(target)) = (plan.targets.len(), &plan.manifest, plan.targets.pop())

@@ -62,12 +62,22 @@ pub(crate) fn format() -> impl TypedValueParser<Value = &'static Format> {
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }
 
-/// The help of `--out`.
+/// The help of `--output`.
 pub(crate) fn out_help() -> String {
     format!(
         "Where to write: {}, `-` (standard output), or a directory for several inputs",
         extensions(|name| format!("OUT.{name}")).join(", ")
     )
+}
+
+/// Refuses JSON and a result on standard output together.
+pub(crate) fn refuse_both_on_standard(prints_json: bool, out: &Path) -> Result<(), Failure> {
+    match prints_json && names::is_standard(out) {
+        true => Err(Failure::usage(
+            "--json and the result cannot both go to standard output; give -o FILE",
+        )),
+        false => Ok(()),
+    }
 }
 
 /// The target of one result: its destination and format.
@@ -112,11 +122,6 @@ impl ResultTarget {
     /// The path of its destination.
     pub(crate) fn path(&self) -> &Path {
         self.destination.path()
-    }
-
-    /// Whether it is standard output.
-    pub(crate) fn is_standard(&self) -> bool {
-        self.destination.is_standard()
     }
 
     /// Its name in messages, its extension, and whether times go to a separate file.

@@ -1,15 +1,17 @@
 //! `tumble check`: is a batch complete, and have its results or its inputs changed?
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::arguments::options::{self, OptionFile};
 use crate::batch::digest::{self, InputFile};
-use crate::batch::entry::{self, ManifestEntry, ManifestLines, NAME, UnfinishedInputs};
+use crate::batch::entry::{self, InputEntry, ManifestEntry, ManifestLines, NAME, UnfinishedInputs};
 use crate::batch::manifest::InputPresence;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
@@ -38,6 +40,35 @@ Examples:
 pub(crate) struct Arguments {
     /// The manifest, or its directory
     manifest: PathBuf,
+    /// Print JSON: about the batch, and about results that differ and inputs without a result
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct CheckReport<'a> {
+    manifest: String,
+    /// Whether all inputs have their results, and nothing has changed.
+    complete: bool,
+    results: usize,
+    differ: Vec<FaultyResult<'a>>,
+    /// Lines of the manifest that cannot be read.
+    damaged_lines: usize,
+    failed: Vec<&'a InputEntry>,
+    /// Inputs that the batch has not come to.
+    pending: BTreeSet<&'a str>,
+    /// Where the shards of a directory are not merged: how many are done.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shards: Option<String>,
+}
+
+/// A result that is not as it was written, or that was made from other files.
+#[derive(Debug, Serialize)]
+struct FaultyResult<'a> {
+    output: &'a str,
+    input: &'a str,
+    fault: String,
 }
 
 /// What is wrong with one result.
@@ -46,6 +77,16 @@ enum Fault {
     Unreadable(io::Error),
     /// This file has other bytes than those that it was made from.
     Stale(String),
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Damaged => f.write_str("its bits have changed since it was written"),
+            Self::Unreadable(error) => write!(f, "cannot be read: {error}"),
+            Self::Stale(file) => write!(f, "its {file} has changed since it was written"),
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -96,11 +137,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for (entry, fault) in &faults {
         let output = folder.join(&entry.output);
         let output = output.display();
-        words::error(&match fault {
-            Fault::Damaged => format!("{output}: its bits have changed since it was written"),
-            Fault::Unreadable(error) => format!("{output}: cannot be read: {error}"),
-            Fault::Stale(file) => format!("{output}: its {file} has changed since it was written"),
-        });
+        words::error(&format!("{output}: {fault}"));
     }
     inputs.note_missing(&entries);
     if lines.damaged > 0 {
@@ -108,6 +145,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "{shown}: {} damaged",
             words::count(lines.damaged, "line")
         ));
+    }
+    let progress = shards
+        .as_ref()
+        .map(|recorded| ShardProgress::of(folder, recorded));
+    if arguments.json {
+        let UnfinishedInputs { failed, pending } = lines.unfinished_inputs();
+        let differ = faults.iter().map(|(entry, fault)| FaultyResult {
+            output: &entry.output,
+            input: &entry.input,
+            fault: fault.to_string(),
+        });
+        listing::json(&CheckReport {
+            manifest: shown.to_string(),
+            complete: faults.is_empty()
+                && lines.damaged == 0
+                && failed.is_empty()
+                && pending.is_empty()
+                && progress.is_none(),
+            results: entries.len(),
+            differ: differ.collect(),
+            damaged_lines: lines.damaged,
+            failed,
+            pending,
+            shards: progress.as_ref().map(ShardProgress::summary),
+        })?;
     }
     let total = words::count(entries.len(), "result");
     let mut missing: Vec<String> = Vec::new();
@@ -142,8 +204,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         "they were"
     };
-    listing::text(&format!("{total}, unchanged since {were} written\n"))?;
-    match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
+    let unchanged = format!("{total}, unchanged since {were} written");
+    match arguments.json {
+        true => words::note(&unchanged),
+        false => listing::text(&format!("{unchanged}\n"))?,
+    }
+    match progress {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
     }

@@ -27,7 +27,7 @@ use crate::messages::words;
 
 /// What the help says of files.
 const NOTES: &str = "\
-If a path has no times, --seconds gives its duration or --rate its speed. The result is float32 of shape
+If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape
 (frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a
 motion file. Positions far from 0, such as those of maps, are float64. CPU and Vulkan give the same bits.
 
@@ -35,9 +35,9 @@ Examples:
   tumble follow road.csv --fps 60 -o poses.npy
   tumble follow paths/*.csv -o poses/                        a file for each path
   tumble follow paths -o poses --resume                      skips results that are done
-  tumble follow lap.csv --ends loop --speed constant -o lap.glb
-  tumble follow points.npy --rate 1.5 --method linear --direction ahead:0.5 -o walk.csv
-  tumble follow orbit.csv --direction at:0,1,0 --frame fixed -o camera.glb";
+  tumble follow lap.csv --path-ends loop --path-speed constant -o lap.glb
+  tumble follow points.npy --pace 1.5 -m linear --direction ahead:0.5 -o walk.csv
+  tumble follow orbit.csv --direction at:0,1,0 --path-frame fixed -o camera.glb";
 
 /// What files of paths are, for the help.
 fn kinds() -> String {
@@ -50,10 +50,10 @@ fn kinds() -> String {
 /// Move bodies along paths: the position and the orientation of each at every frame
 #[derive(Debug, Args)]
 #[command(
-    mut_arg("path_method", |arg| arg.long("method").short('m')),
-    mut_arg("path_ends", |arg| arg.long("ends")),
-    mut_arg("path_up", |arg| arg.long("up")),
-    mut_arg("path_speed", |arg| arg.long("speed")),
+    mut_arg("path_method", |arg| arg.visible_short_alias('m').alias("method")),
+    mut_arg("path_ends", |arg| arg.alias("ends")),
+    mut_arg("path_up", |arg| arg.alias("up")),
+    mut_arg("path_speed", |arg| arg.alias("speed")),
     mut_arg("path_frames", |arg| {
         let arg = arg.value_name("FRAME").help("The orientation about this direction");
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
@@ -110,11 +110,11 @@ impl Arguments {
         if matches!(method, VectorMethod::Step | VectorMethod::Linear) {
             let curve = format!("a path by {}", method.name());
             let remedy = "its curve depends on the two points that it joins; leave it out";
-            refuse(("path_ends", "--ends"), &curve, remedy)?;
+            refuse(("path_ends", "--path-ends"), &curve, remedy)?;
         }
         if frame == PathFrame::Frenet {
             refuse(
-                ("path_up", "--up"),
+                ("path_up", "--path-up"),
                 "Frenet's frames",
                 "they follow from the path; leave it out",
             )?;
@@ -138,7 +138,7 @@ impl Arguments {
         };
         let (name, set, target) = (&*work.name, &paths.set, &work.target);
         let [frame] = self.path.frames()[..] else {
-            return Err(Failure::usage("give a single --frame"));
+            return Err(Failure::usage("give a single --path-frame"));
         };
         self.check_effects(frame, name)?;
         let follow = self.path.follow(paths, name, frame)?;
@@ -180,7 +180,7 @@ fn failed(name: &str, error: &Error) -> Failure {
     match error {
         Error::Follow(error) => {
             let hint = match error {
-                FollowError::UpsUnused { .. } => " (--frame minimal, --no-ups)",
+                FollowError::UpsUnused { .. } => " (--path-frame minimal, --no-ups)",
                 _ => "",
             };
             Failure::new(ALL_INPUTS, format!("{name}: {error}{hint}"))

@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::batch::shards::merge::{MergeSummary, merge};
+use crate::batch::shards::record::RefusedInput;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::listing;
 use crate::messages::progress::busy;
 use crate::messages::words;
 
@@ -24,6 +27,19 @@ pub(crate) struct Arguments {
     /// The directory of results
     #[arg(value_name = "OUT")]
     folder: PathBuf,
+    /// Print JSON: about the results and the inputs that failed
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct MergeReport<'a> {
+    output: String,
+    results: usize,
+    shards: usize,
+    inputs: usize,
+    failed: &'a [RefusedInput],
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -34,6 +50,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         inputs,
         failed,
     } = busy("merging", || merge(folder))?;
+    if arguments.json {
+        listing::json(&MergeReport {
+            output: folder.display().to_string(),
+            results,
+            shards,
+            inputs,
+            failed: &failed,
+        })?;
+    }
     for refused in &failed {
         words::note(&refused.message);
     }

@@ -46,8 +46,8 @@ pub(crate) struct Scenery {
     )]
     pub(crate) meshes: Vec<PathBuf>,
     /// The length of a body on a path [default: a tenth of the path's size]
-    #[arg(long, value_name = "LENGTH", value_parser = crate::arguments::path::positive)]
-    pub(crate) body: Option<f64>,
+    #[arg(long, alias = "body", value_name = "LENGTH", value_parser = crate::arguments::path::positive)]
+    pub(crate) body_length: Option<f64>,
     /// How many frames to draw as small axes along a path
     #[arg(long, alias = "axes", value_name = "N", default_value_t = 40)]
     pub(crate) drawn_frames: usize,
@@ -91,7 +91,7 @@ impl Scenery {
         } else {
             1.0
         };
-        self.body.map_or(default, |length| length as f32)
+        self.body_length.map_or(default, |length| length as f32)
     }
 }
 

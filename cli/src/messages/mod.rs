@@ -1,6 +1,7 @@
 //! Messages, and the exit codes.
 
 pub(crate) mod colours;
+pub(crate) mod drawn;
 pub(crate) mod exit;
 pub(crate) mod listing;
 pub(crate) mod names;

@@ -647,7 +647,7 @@ fn faults_of_inputs_are_no_bugs() {
             "mixed.gltf",
             "--animation",
             "0",
-            "--output",
+            "--quantity",
             quantity,
             "--explain-route",
             "--overwrite",

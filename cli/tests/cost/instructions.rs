@@ -205,7 +205,7 @@ fn velocities_of_few_samples_cost_no_more_than_they_did() {
     let dense = generate(folder.path(), 600, &[]);
     for (method, bound) in [("slerp", 4_750.0), ("bessel-overhauser", 19_600.0)] {
         let count = |fps| {
-            let options = ["--output", "velocity", "--format", "npy"];
+            let options = ["--quantity", "velocity", "--format", "npy"];
             instructions_with(&options, &dense, method, fps, "avx2")
         };
         let (Some(coarse), Some(fine)) = (count(1), count(3)) else {

@@ -108,7 +108,7 @@ def evaluate(*options):
 (FOLDER / "sets").mkdir()
 sets = [random_set(FOLDER / "sets" / f"{index:05}.dat") for index in range(SETS)]
 curves, said = evaluate()
-rates, _ = evaluate("--output", "velocity")
+rates, _ = evaluate("--quantity", "velocity")
 counts = dict.fromkeys(
     ["sets", "c2 continuous", "warned", "SciPy continuous as it comes", "SciPy continuous iterated"], 0
 )

@@ -99,7 +99,7 @@ for name, options in [("even", ["--uniform"]), ("uneven", ["--random", "--seed",
     tcb = (0.3, -0.4, 0.5)
     given = [f"--{word}={value}" for word, value in zip(["tension", "continuity", "bias"], tcb)]
     found["kochanek-bartels"] = evaluate(path, "-m", "kochanek-bartels", *given)
-    rates = {w: evaluate(path, "-m", "c2", "--output", w) for w in ["velocity", "acceleration"]}
+    rates = {w: evaluate(path, "-m", "c2", "--quantity", w) for w in ["velocity", "acceleration"]}
     for track in range(raw.shape[1]):
         keys = keys_of(path, times, raw[:, track])
         rotations = Rotation.from_quat(xyzw(keys))
@@ -139,11 +139,11 @@ path, times, raw = generate("outputs", "--random", "--seed", "11")
 quats = evaluate(path)
 rotations = Rotation.from_quat(quats.reshape(-1, 4))
 matrices = rotations.as_matrix().reshape(*quats.shape[:2], 3, 3)
-check("matrix", np.abs(evaluate(path, "--output", "matrix") - matrices), 1e-6)
-columns = evaluate(path, "--output", "matrix", "--major", "column")
+check("matrix", np.abs(evaluate(path, "--quantity", "matrix") - matrices), 1e-6)
+columns = evaluate(path, "--quantity", "matrix", "--major", "column")
 check("matrix, columns", np.abs(np.swapaxes(columns, 2, 3) - matrices), 1e-6)
-check("matrix-3x4", np.abs(evaluate(path, "--output", "matrix-3x4")[..., :3] - matrices), 1e-6)
-turned = evaluate(path, "--output", "axis-angle")
+check("matrix-3x4", np.abs(evaluate(path, "--quantity", "matrix-3x4")[..., :3] - matrices), 1e-6)
+turned = evaluate(path, "--quantity", "axis-angle")
 vectors = turned[..., :3] * np.radians(turned[..., 3:])
 back = Rotation.from_rotvec(vectors.reshape(-1, 3))
 check("axis-angle", (back.inv() * rotations).magnitude(), 1.5e-6)
@@ -151,7 +151,7 @@ for letters in ["xyz", "XYZ"]:
     x, y, z = letters
     proper = [a + b + c for a in letters for b in letters for c in letters if a != b and b != c]
     for sequence in proper:
-        found = evaluate(path, "--output", "euler", "--sequence", sequence)
+        found = evaluate(path, "--quantity", "euler", "--sequence", sequence)
         expected = rotations.as_euler(sequence, degrees=True).reshape(found.shape)
         apart = np.abs((found - expected + 180) % 360 - 180)
         # Near the gimbal the first and the third are only known together.
@@ -161,7 +161,7 @@ for letters in ["xyz", "XYZ"]:
 
 # The chain: each box hangs at the end of the one before it.
 length = float(path.read_text().split("\n", 1)[0].split()[2])
-world = evaluate(path, "--output", "world")
+world = evaluate(path, "--quantity", "world")
 above, hung = Rotation.identity(len(world)), np.zeros((len(world), 3))
 for track in range(raw.shape[1]):
     if track > 0:

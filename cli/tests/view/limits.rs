@@ -69,7 +69,7 @@ fn what_cannot_be_shown_is_refused() {
     let folder = sample_folder();
     fs::write(folder.path().join("old.html"), "old").unwrap();
     for (line, code, message) in [
-        ("view a.dat", 2, "--out"),
+        ("view a.dat", 2, "--output"),
         (
             "view a.dat -o old.html",
             2,

@@ -367,7 +367,7 @@ fn keys(
     if body.kind == BodyKind::Path && stamps.len() > 1 && stamps.iter().all(|at| *at == stamps[0]) {
         let message = format!(
             "the path `{name}` of {} poses has no times: all have the stamp {} s, as planners write routes; move a body \
-             along it by tumble follow with --seconds or --rate",
+             along it by tumble follow with --seconds or --pace",
             stamps.len(),
             stamps[0] as f64 / SECOND as f64
         );

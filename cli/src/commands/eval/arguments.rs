@@ -1,6 +1,7 @@
 //! The options of `tumble eval`.
 
 use std::ops::RangeInclusive;
+use std::path::Path;
 use std::str::FromStr;
 
 use clap::Args;
@@ -16,7 +17,9 @@ use crate::arguments::interpolation::{InterpolationArguments, method_argument};
 use crate::arguments::options::{
     AppliesTo, CommandLine, OPTIONS, ResultDescription, ResultKind, ResultOptions,
 };
-use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
+use crate::arguments::output::{
+    OutputArguments, component_order, is_quantity, one_of, quaternions,
+};
 use crate::arguments::results::ResultArguments;
 use crate::arguments::robot::DialectArguments;
 use crate::arguments::time::{
@@ -29,7 +32,7 @@ use tumble_formats::sample::MethodChoice;
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-In NPY the result is float32 of shape (tracks, frames, 4), with components x y z w. --output, --layout
+In NPY the result is float32 of shape (tracks, frames, 4), with components x y z w. --quantity, --layout
 and --order change this. In CSV it has a row for each frame and a header that names the columns; the
 default order is w x y z. An option that has no effect on a result is refused. CPU and Vulkan give the
 same bits.
@@ -38,8 +41,8 @@ Examples:
   tumble eval data/pendulum.dat -o out.npy
   tumble eval data/pendulum.dat -m slerp --fps 30000/1001 -o out.csv
   tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
-  tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
-  tumble eval lafan1/walk.csv --fps 50 --output scalar-velocities -o joints.csv
+  tumble eval data/pendulum.dat --quantity euler --sequence ZXY -o angles.csv
+  tumble eval lafan1/walk.csv --fps 50 --quantity scalar-velocities -o joints.csv
   tumble eval *.dat -o results                 a file for each input, results/NAME.npy
   tumble eval walks -o results --resume        a directory tree; skips results that are done
   find . -name '*.dat' | tumble eval --files-from - -o results
@@ -183,10 +186,22 @@ impl Arguments {
         }
     }
 
+    /// Refuses a result that is called like a quantity: `--output` once named the quantity.
+    pub(super) fn refuse_quantity_as_output(&self) -> Result<(), Failure> {
+        let named = self.results.out().and_then(|out| out.to_str());
+        let quantity = named.filter(|name| is_quantity(name) && !Path::new(name).exists());
+        quantity.map_or(Ok(()), |name| {
+            Err(Failure::usage(format!(
+                "`{name}` is a quantity: `--quantity {name} -o FILE` writes it; for a directory of this name give \
+                 -o ./{name}"
+            )))
+        })
+    }
+
     /// Refuses options that have no effect on the layout of another program.
     fn check_dialect(&self, dialect: &WrittenDialect) -> Result<(), Failure> {
         let options = [
-            ("output", "--output"),
+            ("output", "--quantity"),
             ("tracks", "--tracks"),
             ("max_gap", "--max-gap"),
             ("times", "--times"),
@@ -227,7 +242,7 @@ impl Arguments {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             return Some(format!(
-                "{} stores whole clips; for --output {} write {}",
+                "{} stores whole clips; for --quantity {} write {}",
                 format.name,
                 self.output.name(),
                 names.join(" or ")

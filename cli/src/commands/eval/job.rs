@@ -156,7 +156,7 @@ impl EvaluationJob<'_> {
         }
         let [clip] = clips else {
             let message =
-                format!("{name}: --output needs a single animation; choose one with --animation");
+                format!("{name}: --quantity needs a single animation; choose one with --animation");
             return Err(Failure::usage(message));
         };
         if let Some(quantity) = output.scalars() {
@@ -193,7 +193,7 @@ impl EvaluationJob<'_> {
         }
         if !lost.is_empty() {
             let message = format!(
-                "the numbers of --output {} have no room for this, left out: {}; -o FILE.npz has all channels",
+                "the numbers of --quantity {} have no room for this, left out: {}; -o FILE.npz has all channels",
                 self.arguments.output.name(),
                 lost.join(", ")
             );
@@ -666,7 +666,7 @@ impl EvaluationJob<'_> {
         end_frame: EndFrame,
         target: &ResultTarget,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
-        let on = format!("--output {}", self.arguments.output.name());
+        let on = format!("--quantity {}", self.arguments.output.name());
         let options = [("tracks", "--tracks"), ("explain_route", "--explain-route")];
         self.arguments
             .command_line
@@ -674,7 +674,7 @@ impl EvaluationJob<'_> {
         let count = clip.set.scalar_count();
         if count == 0 {
             return Err(Failure::usage(format!(
-                "{name}: has no scalars, such as the joints of a robot; leave out --output {}",
+                "{name}: has no scalars, such as the joints of a robot; leave out --quantity {}",
                 self.arguments.output.name()
             )));
         }

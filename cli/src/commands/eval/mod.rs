@@ -13,6 +13,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return shards::run(arguments, part);
     }
     // Everything that can be refused is refused before any work.
+    arguments.refuse_quantity_as_output()?;
     let inputs = arguments
         .inputs
         .gather(arguments.sampling.reads_standard_input())?;

@@ -21,7 +21,7 @@ Examples:
   tumble generate --hill -o hill.obj --rocks rocks.obj")]
 pub(crate) struct Arguments {
     /// Where to write: a file (`-`: standard output)
-    #[arg(short, long = "out", value_name = "FILE")]
+    #[arg(short, long = "output", alias = "out", value_name = "FILE")]
     out: PathBuf,
     /// Replace existing files
     #[arg(long)]

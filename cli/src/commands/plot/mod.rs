@@ -27,32 +27,35 @@ use crate::arguments::interpolation::{
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
+use crate::batch::entry::InputEntry;
 use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::curves::PlotSubject;
 use crate::commands::plot::source::{PlotSamples, PlotSource};
-use crate::commands::plot::subjects::{PlotQuantity, Subjects, moving_boxes, together};
+use crate::commands::plot::subjects::{
+    ComponentSelector, PlotQuantity, Subjects, moving_boxes, together,
+};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
+use crate::messages::drawn::DrawnFile;
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
-use crate::messages::{names, words};
+use crate::messages::{listing, names, words};
 use tumble_formats::sample::MethodChoice;
 
 /// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A set of N boxes (tracks, joints) has 4 N dimensions: w x y z of box 1, w x y z of box 2, and so
-on, counted from 1. Keys are drawn as dots, or as vertical lines where a curve has no value at a
-key. Boxes that never turn are left out unless they are chosen. For files of paths, the speed,
-the angular speed of the direction and the roll are drawn for each --frame.
+Keys are drawn as dots, or as vertical lines where a curve has no value at a key. Tracks that never
+turn are left out unless they are chosen (--tracks). For files of paths, the speed,
+the angular speed of the direction and the roll are drawn for each --path-frame.
 
 Examples:
   tumble plot data/pendulum.dat -o pendulum.svg
-  tumble plot data/pendulum.dat --dimension 2 --dimension 16 -m slerp,c2 -o two.png
+  tumble plot data/pendulum.dat --components 0.x,3.z -m slerp,c2 -o two.png
   tumble plot data/pendulum.dat --show speed -m slerp,catmull-rom,c2 -o speed.svg
-  tumble plot data/pendulum.dat --show error --box 4 -m all -o error.svg
+  tumble plot data/pendulum.dat --show error --tracks 3 -m all -o error.svg
   tumble plot data/*.dat -o pictures           a picture for each box of each input
-  tumble plot road.csv --frame minimal,frenet -o road.svg
+  tumble plot road.csv --path-frame minimal,frenet -o road.svg
   tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -60,11 +63,14 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
     /// Where to write: FILE.svg, FILE.png, or a directory for several pictures
-    #[arg(short, long = "out", value_name = "OUT")]
+    #[arg(short, long = "output", alias = "out", value_name = "OUT")]
     out: PathBuf,
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
+    /// Print JSON: about the pictures and the inputs that failed
+    #[arg(long)]
+    json: bool,
     /// How to interpolate: one method or several, or all [default: authored; for a report
     /// slerp,catmull-rom,bessel-overhauser]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
@@ -72,31 +78,41 @@ pub(crate) struct Arguments {
     /// What to draw [default: components; of files of paths, path]
     #[arg(long, value_enum, value_name = "WHAT")]
     show: Option<PlotQuantity>,
-    /// Only this dimension, counted from 1 (may be repeated)
+    /// Only these components of rotations: `knee.x`, by the name of a track or its index from 0, and w, x, y or z
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        conflicts_with = "tracks"
+    )]
+    components: Vec<ComponentSelector>,
+    /// Only this dimension, counted from 1: w x y z of the first track, then of the second …
     #[arg(
         long = "dimension",
         value_name = "D",
         value_delimiter = ',',
-        conflicts_with_all = ["boxes", "tracks"]
+        hide = true,
+        conflicts_with_all = ["components", "boxes", "tracks"]
     )]
     dimensions: Vec<usize>,
-    /// Only this box, counted from 1 (may be repeated)
+    /// Only this track, counted from 1
     #[arg(
         long = "box",
         value_name = "N",
         value_delimiter = ',',
-        conflicts_with = "tracks"
+        hide = true,
+        conflicts_with_all = ["components", "tracks"]
     )]
     boxes: Vec<usize>,
     /// sphere: the axis of the box to draw; -y points along the box
     #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
     axis: AxisArgument,
     /// Write all plots, and an HTML page that shows them, into a directory
-    #[arg(long, conflicts_with_all = ["show", "dimensions", "boxes", "tracks", "axis"])]
+    #[arg(long, conflicts_with_all = ["show", "components", "dimensions", "boxes", "tracks", "axis"])]
     report: bool,
-    /// svg or png [default: by the name of the output, else svg]
-    #[arg(long, alias = "format", value_enum, value_name = "FORMAT")]
-    picture_format: Option<PictureFormat>,
+    /// The format of the results: svg or png [default: by the name of the output, else svg]
+    #[arg(long, visible_alias = "to", alias = "picture-format", value_enum)]
+    format: Option<PictureFormat>,
     #[command(flatten)]
     sampling: SamplingArguments,
     #[command(flatten, next_help_heading = PATHS)]
@@ -196,19 +212,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         out,
         overwrite: arguments.overwrite,
         inputs: inputs.clone(),
-        drawn: 0,
+        drawn: Vec::new(),
     };
     if arguments.report {
         return report::write(arguments, &mut writer, &samples);
     }
-    let outcome = for_each(&inputs, |path| {
+    let outcome = arguments.for_each_input(&inputs, &mut writer, |writer, path| {
         let name = names::input(path);
         let stem = names::stem(path);
         if let Some((source, makers, rest)) = arguments.bodies(path)? {
             let title = (&*name, names::file(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
             let file = format!("{stem}-path.{}", writer.format.extension());
-            return writer.draw(&figure, &file).and(rest);
+            return writer.draw(&figure, &file, path).and(rest);
         }
         let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
@@ -231,17 +247,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let mut progress = Progress::new("drawing", pictures.len() as u64);
         for (file, subject) in pictures {
             let figure = source.figure(&mut writer.device, &subject)?;
-            writer.draw(&figure, &file)?;
+            writer.draw(&figure, &file, path)?;
             progress.advance(1);
         }
         rest
     });
-    if writer.drawn == 0 {
+    if writer.drawn.is_empty() {
         return outcome;
     }
     words::note(&format!(
         "{} of {}, on {} → {}",
-        words::count(writer.drawn, "picture"),
+        words::count(writer.drawn.len(), "picture"),
         words::count(inputs.len(), "input"),
         writer.device.label,
         arguments.out.display()
@@ -263,6 +279,24 @@ impl Arguments {
             .map(|method| MethodChoice(Some(method)))
             .to_vec(),
         }
+    }
+
+    /// Draws each input, and prints JSON about the pictures and the inputs that failed.
+    fn for_each_input(
+        &self,
+        inputs: &[PathBuf],
+        writer: &mut FigureWriter,
+        mut draw: impl FnMut(&mut FigureWriter, &PathBuf) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let mut failed = Vec::new();
+        let outcome = for_each(inputs, |path| {
+            let drawn = draw(writer, path);
+            drawn.inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
+        });
+        if self.json {
+            listing::records(&writer.drawn, &failed)?;
+        }
+        outcome
     }
 
     /// The methods that draw a clip, each differently.
@@ -290,7 +324,11 @@ impl Arguments {
                 "each is drawn from its first key to its last; leave it out",
             );
             line.refuse_group::<SamplingArguments>(on, remedy)?;
-            let subjects = [("boxes", "--box"), ("dimensions", "--dimension")];
+            let subjects = [
+                ("components", "--components"),
+                ("boxes", "--box"),
+                ("dimensions", "--dimension"),
+            ];
             line.refuse(&subjects, on, remedy)?;
         }
         if self.show != Some(PlotQuantity::Sphere) {
@@ -335,12 +373,13 @@ impl Arguments {
 
     fn format(&self) -> PictureFormat {
         let named = PictureFormat::of(&self.out);
-        self.picture_format.or(named).unwrap_or(PictureFormat::Svg)
+        self.format.or(named).unwrap_or(PictureFormat::Svg)
     }
 
     /// Checks the output before any work; makes the directory.
     fn output(&self, inputs: &[PathBuf]) -> Result<PlotOutput, Failure> {
         let out = &self.out;
+        target::refuse_both_on_standard(self.json, out)?;
         let shown = out.display();
         let is_file =
             !out.is_dir() && (PictureFormat::of(out).is_some() || names::is_standard(out));
@@ -374,9 +413,10 @@ impl Arguments {
         name: &str,
     ) -> Result<Subjects, Failure> {
         let boxes = set.track_count();
-        if !self.dimensions.is_empty() && self.show() != PlotQuantity::Components {
+        let is_of_components = !self.dimensions.is_empty() || !self.components.is_empty();
+        if is_of_components && self.show() != PlotQuantity::Components {
             return Err(Failure::usage(
-                "--dimension needs --show components; choose boxes for the others (--box)",
+                "--components needs --show components; choose tracks for the others (--tracks)",
             ));
         }
         let there = format!(
@@ -398,7 +438,10 @@ impl Arguments {
                     .collect::<Vec<_>>()),
             }
         };
-        let dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
+        let mut dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
+        for component in &self.components {
+            dimensions.push(component.dimension(set, name)?);
+        }
         let mut selected = chosen("box", &self.boxes, 0..boxes)?;
         if selected.is_empty() && dimensions.is_empty() {
             selected = tracks.unwrap_or_else(|| moving_boxes(set, name));
@@ -434,7 +477,7 @@ pub(crate) struct FigureWriter {
     out: PlotOutput,
     overwrite: bool,
     inputs: Vec<PathBuf>,
-    drawn: usize,
+    drawn: Vec<DrawnFile>,
 }
 
 impl FigureWriter {
@@ -448,7 +491,8 @@ impl FigureWriter {
         }
     }
 
-    fn draw(&mut self, figure: &Figure, name: &str) -> Result<(), Failure> {
+    /// Draws a figure of an input.
+    fn draw(&mut self, figure: &Figure, name: &str, input: &Path) -> Result<(), Failure> {
         let drawn = match self.format {
             PictureFormat::Svg => draw::svg(figure).map(String::into_bytes),
             PictureFormat::Png => draw::png(figure),
@@ -456,7 +500,9 @@ impl FigureWriter {
         let destination = self.destination(name)?;
         let bytes = drawn.map_err(|error| Failure::writing(&destination.to_string(), &error))?;
         destination.write(None, |out| out.write_all(&bytes))?;
-        self.drawn += 1;
+        let device = &self.device.label;
+        let inputs = [input.to_owned()];
+        (self.drawn).push(DrawnFile::new(&inputs, destination.path(), device));
         Ok(())
     }
 }

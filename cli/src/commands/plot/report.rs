@@ -14,7 +14,7 @@ use crate::commands::plot::source::curves::{NAMES, PlotSubject};
 use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
-use crate::messages::exit::{Failure, for_each};
+use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
 
@@ -45,7 +45,7 @@ pub(crate) fn write(
     let each = figures_of_one(arguments.methods().len());
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
-    let outcome = for_each(&inputs, |path| {
+    let outcome = arguments.for_each_input(&inputs, writer, |writer, path| {
         let only = arguments.inputs.load_one(path)?;
         let (clip, set) = (&only.clip, &only.clip.set);
         let name = names::input(path);
@@ -75,7 +75,7 @@ pub(crate) fn write(
     page.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
         "{} and a page, on {} → {page}",
-        words::count(writer.drawn, "picture"),
+        words::count(writer.drawn.len(), "picture"),
         writer.device.label
     ));
     outcome
@@ -104,7 +104,7 @@ fn figures(
                 names::stem(path),
                 writer.format.extension()
             );
-            writer.draw(&figure, &file)?;
+            writer.draw(&figure, &file, path)?;
             shown.push(ReportFigure { file, caption });
             progress.advance(1);
             Ok::<(), Failure>(())

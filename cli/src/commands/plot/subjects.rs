@@ -1,5 +1,7 @@
 //! Which boxes and dimensions of a set are drawn, and how they are shared out over pictures.
 
+use std::str::FromStr;
+
 use clap::ValueEnum;
 use glam::{DVec3, Quat, Vec3};
 use tumble::{Track, TrackSet};
@@ -24,6 +26,48 @@ pub(super) enum PlotQuantity {
     Sphere,
     /// of bodies on paths: speed, turning rate of the direction, and the turn about it
     Path,
+}
+
+/// An entry of `--components`: a component of the rotations of a track.
+#[derive(Debug, Clone)]
+pub(super) struct ComponentSelector {
+    track: String,
+    /// From 0, in the order of dimensions.
+    component: usize,
+}
+
+/// The components of a rotation, in the order in which they are drawn.
+const COMPONENTS: [&str; 4] = ["w", "x", "y", "z"];
+
+impl FromStr for ComponentSelector {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.rsplit_once('.').and_then(|(track, component)| {
+            let found = COMPONENTS.iter().position(|name| *name == component);
+            Some((track, found?))
+        });
+        let (track, component) = parts.ok_or("expected a track and w, x, y or z, such as 0.x")?;
+        let track = track.to_owned();
+        Ok(Self { track, component })
+    }
+}
+
+impl ComponentSelector {
+    /// Its dimension in a set: four for each track.
+    pub(super) fn dimension(&self, set: &TrackSet, name: &str) -> Result<usize, Failure> {
+        let count = set.track_count();
+        let named = (0..count).find(|&track| set.track_name(track) == self.track);
+        let found = named.or_else(|| self.track.parse().ok().filter(|&track| track < count));
+        let track = found.ok_or_else(|| {
+            Failure::usage(format!(
+                "{name}: --components: there is no track `{}`; it has {}, `tumble info` names them",
+                self.track,
+                words::count(count, "track")
+            ))
+        })?;
+        Ok(COMPONENTS.len() * track + self.component)
+    }
 }
 
 /// What is drawn of one set, and how it is shared out where there are several pictures.
@@ -103,7 +147,7 @@ pub(super) fn moving_boxes(set: &TrackSet, name: &str) -> Vec<usize> {
             _ => ("they do", "them"),
         };
         words::note(&format!(
-            "{name}: not drawn, {subject} not turn: {}; --tracks or --box draws {object}",
+            "{name}: not drawn, {subject} not turn: {}; --tracks draws {object}",
             names.join(", ")
         ));
     }
@@ -120,7 +164,7 @@ pub(super) fn together(
     if panels > PANELS {
         return Err(Failure::usage(format!(
             "{name}: {panels} panels in one picture cannot be read, at most {PANELS}; choose \
-             some (--box, --dimension), or give a directory, for a picture each"
+             some (--tracks, --components), or give a directory, for a picture each"
         )));
     }
     Ok(subjects.one())

@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Args)]
 pub(crate) struct ReportOutput {
     /// Where to write: the report, as JSON
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long = "output", alias = "out", value_name = "FILE")]
     out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long, requires = "out")]

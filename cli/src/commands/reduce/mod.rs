@@ -42,7 +42,7 @@ more keys. A GLB or glTF that is written as one keeps everything else in the fil
 Examples:
   tumble reduce walk.bvh --tolerance 0.1deg -o walk.glb
   tumble reduce dance.glb --tolerance 0.05deg --distance 0.001 --shell 0.1 -o small.glb
-  tumble reduce walk.bvh --curve cubic -o walk.glb --plot errors.svg
+  tumble reduce walk.bvh --method cubic -o walk.glb --plot errors.svg
   tumble reduce takes -o small --to glb --resume")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -61,9 +61,9 @@ pub(crate) struct Arguments {
     /// stand-in for the skin
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     shell: f64,
-    /// The curve that joins the keys
-    #[arg(long, value_name = "CURVE", default_value_t, value_parser = curve())]
-    curve: ReducedCurve,
+    /// How to interpolate: the curve that joins the remaining keys
+    #[arg(id = "curve", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
+    method: ReducedCurve,
     /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
     /// as it is read back
     #[arg(long)]
@@ -144,10 +144,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = plan.targets.first().map(ResultTarget::format);
     check_stores_keys(&plan)?;
     check_sequence(arguments.sequence, format)?;
-    let is_bessel = matches!(arguments.curve, ReducedCurve::BesselOverhauser);
+    let is_bessel = matches!(arguments.method, ReducedCurve::BesselOverhauser);
     if is_bessel && format.is_some_and(|format| format.takes(FormatOption::AtKeys)) {
         return Err(Failure::usage(
-            "glTF has no bessel-overhauser; choose --curve linear or cubic, or write .npz",
+            "glTF has no bessel-overhauser; choose --method linear or cubic, or write .npz",
         ));
     }
     arguments.check_quantized(format)?;
@@ -177,9 +177,9 @@ impl Arguments {
                 "--{option} is for glTF and has no effect on {name}; leave it out"
             )));
         }
-        if self.quantize && matches!(self.curve, ReducedCurve::GltfCubic) {
+        if self.quantize && matches!(self.method, ReducedCurve::GltfCubic) {
             return Err(Failure::usage(
-                "--quantize cannot store the tangents of cubics; leave out --curve cubic",
+                "--quantize cannot store the tangents of cubics; leave out --method cubic",
             ));
         }
         Ok(())
@@ -283,7 +283,7 @@ impl Arguments {
         // The samples and the poses, of the input and of what becomes of it.
         room::in_memory(name, &clip.set, &times, 14)?;
         let options = ReduceOptions {
-            curve: self.curve,
+            curve: self.method,
             angle: self.tolerance.to_radians(),
             distance: self.distance,
             shell: self.shell,

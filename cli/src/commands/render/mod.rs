@@ -32,9 +32,10 @@ use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
 use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
+use crate::messages::drawn::DrawnFile;
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
-use crate::messages::{names, signals, words};
+use crate::messages::{listing, names, signals, words};
 use tumble_formats::sample::MethodChoice;
 
 /// Chains side by side in one picture.
@@ -57,7 +58,7 @@ Examples:
   tumble render data/pendulum.dat --start 2.5 -o still.png
   tumble render data/pendulum.dat --fps 60 -o frames    frames/00000.png, 00001.png …
   tumble render walk.bvh --size 400x600 --view 60,10 -o walk.gif
-  tumble render road.csv --frame frenet,minimal -o both.gif
+  tumble render road.csv --path-frame frenet,minimal -o both.gif
   tumble render walker.glb --mesh hill.obj,rocks.obj --view 30,25 -o walk.gif")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -67,11 +68,14 @@ pub(crate) struct Arguments {
     inputs: Inputs,
     /// Where to write: FILE.gif, FILE.apng, FILE.png (the first frame), or a directory for a
     /// picture of each frame
-    #[arg(short, long = "out", value_name = "OUT")]
+    #[arg(short, long = "output", alias = "out", value_name = "OUT")]
     out: PathBuf,
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
+    /// Print JSON: about the film or the pictures
+    #[arg(long)]
+    json: bool,
     /// How to interpolate: one method or several, which stand side by side
     #[arg(
         short,
@@ -247,6 +251,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = Scene::new(actors, &surroundings, style)
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
     arguments.render_frames(kind, &scene, &timeline, &inputs)?;
+    if arguments.json {
+        let film = DrawnFile::new(&inputs, &arguments.out, &device.label);
+        listing::records(&[film.with_frames(timeline.len())], &[])?;
+    }
     words::note(&format!(
         "{name}: {}, {}, on {} → {}",
         words::count(timeline.len(), "frame"),

@@ -8,10 +8,10 @@ use tumble_routes::net::NetBy;
 use tumble_routes::route::By;
 
 use crate::arguments::options::CommandLine;
+use crate::batch::target;
 use crate::commands::route::surface::{Surface, kinds};
 use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
-use crate::messages::names;
 
 /// What the help says of files.
 const NOTES: &str = "\
@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with = "start_point")]
     walkers: Option<PathBuf>,
     /// Where to write: a CSV (`-`: standard output), or a directory for pairs and walkers
-    #[arg(short, long = "out", value_name = "OUT")]
+    #[arg(short, long = "output", alias = "out", value_name = "OUT")]
     pub(crate) out: PathBuf,
     /// Also draw, as .svg or .png: the mesh from above with the routes
     #[arg(long, value_name = "FILE")]
@@ -94,10 +94,7 @@ pub(crate) enum RouteMethod {
 impl Arguments {
     /// The start and the goal of each route.
     pub(crate) fn participants(&self) -> Result<Participants, Failure> {
-        if self.json && names::is_standard(&self.out) {
-            let message = "--json and -o - both write to standard output; give a file";
-            return Err(Failure::usage(message));
-        }
+        target::refuse_both_on_standard(self.json, &self.out)?;
         match (self.start_point, self.end_point, &self.pairs, &self.walkers) {
             (Some(start), Some(end), None, None) => Ok(Participants::of_pair([start, end])),
             (None, None, Some(file), None) => read_pairs(file),

@@ -25,14 +25,16 @@ use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
-use crate::batch::target::Destination;
+use crate::batch::entry::InputEntry;
+use crate::batch::target::{self, Destination};
 use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::ghosts::{FoundGhosts, find_ghosts};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
+use crate::messages::drawn::DrawnFile;
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS, for_each};
 use crate::messages::progress::Progress;
-use crate::messages::{names, words};
+use crate::messages::{listing, names, words};
 use tumble_formats::sample::MethodChoice;
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
@@ -58,7 +60,7 @@ Examples:
   tumble view data/pendulum.dat --open
   tumble view take.bvh cleaned.npz -o both.html     the second as a ghost of the first
   tumble view a.dat b.dat -m slerp,c2 --no-ghosts -o menu.html
-  tumble view road.csv --frame minimal,frenet --path-speed constant --open
+  tumble view road.csv --path-frame minimal,frenet --path-speed constant --open
   tumble view walker.glb --mesh hill.obj,rocks.obj -o walker.html")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -68,7 +70,8 @@ pub(crate) struct Arguments {
     /// Where to write: a page (`-`: standard output) [default with --open: a temporary file]
     #[arg(
         short,
-        long = "out",
+        long = "output",
+        alias = "out",
         value_name = "FILE.html",
         required_unless_present = "open"
     )]
@@ -76,6 +79,9 @@ pub(crate) struct Arguments {
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
+    /// Print JSON: about the page and the inputs that failed
+    #[arg(long)]
+    json: bool,
     /// Open the page in the browser
     #[arg(long)]
     open: bool,
@@ -122,8 +128,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut shown = Vec::new();
     let mut refused = 0;
-    // An input that fails does not take the page of the others away.
-    let outcome = for_each(&inputs, |path| {
+    let mut failed = Vec::new();
+    let mut read = |path: &PathBuf| {
         if is_path_file(path) {
             let source = TravelSource::of_paths(path, &arguments.path, &arguments.inputs.tracks)?;
             shown.push(arguments.sampled(ShownClip::of_paths(path, source))?);
@@ -153,6 +159,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             shown.push(arguments.sampled(one)?);
         }
         Ok(())
+    };
+    // An input that fails does not take the page of the others away.
+    let outcome = for_each(&inputs, |path| {
+        read(path).inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
     });
     if shown.is_empty() {
         outcome.clone()?;
@@ -173,6 +183,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let text = arguments.page(&mut shown, &methods, menu, &mut device)?;
     destination.write(None, |out| out.write_all(text.as_bytes()))?;
+    if arguments.json {
+        let page = DrawnFile::new(&inputs, destination.path(), &device.label);
+        listing::records(&[page], &failed)?;
+    }
     words::note(&format!(
         "{}, {}, on {}, {} → {destination}",
         words::count(inputs.len(), "input"),
@@ -257,6 +271,9 @@ impl Arguments {
     }
 
     fn destination(&self, inputs: &[PathBuf]) -> Result<Destination, Failure> {
+        if let Some(out) = &self.out {
+            target::refuse_both_on_standard(self.json, out)?;
+        }
         let Some(out) = &self.out else {
             // A unique name; the file stays for the browser.
             let name = format!("tumble-view-{:016x}.html", fastrand::u64(..));

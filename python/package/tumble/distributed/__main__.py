@@ -53,7 +53,7 @@ VALUES = {
 }
 FLAGS = ("--resume", "--overwrite", "--json")
 # What is said in another way here, or not at all.
-REFUSED = ("-o", "--out", "--files-from", "--shard", "--pipes")
+REFUSED = ("-o", "--output", "--out", "--files-from", "--shard", "--pipes")
 FILES = ("--times", "--offsets")
 
 

@@ -1,0 +1,60 @@
+//! What the commands that draw say of the files that they wrote, to people and to programs.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::messages::names;
+
+/// A picture, a film or a page, as `--json` prints it.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct DrawnFile {
+    /// As on the command line.
+    inputs: Vec<String>,
+    /// The file, or the directory of a picture for each frame.
+    output: String,
+    /// Of a directory, those of the pictures together; `None` of standard output.
+    output_bytes: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frames: Option<usize>,
+    /// Which device computed it.
+    device: String,
+}
+
+impl DrawnFile {
+    /// A file that has been written.
+    pub(crate) fn new(inputs: &[PathBuf], output: &Path, device: &str) -> Self {
+        Self {
+            inputs: inputs.iter().map(|path| names::input(path)).collect(),
+            output: output.display().to_string(),
+            output_bytes: bytes(output),
+            frames: None,
+            device: device.to_owned(),
+        }
+    }
+
+    /// With the number of its frames.
+    pub(crate) fn with_frames(self, frames: usize) -> Self {
+        Self {
+            frames: Some(frames),
+            ..self
+        }
+    }
+}
+
+/// The bytes of a file, or of the files in a directory.
+fn bytes(path: &Path) -> Option<u64> {
+    let found = fs::metadata(path).ok()?;
+    if !found.is_dir() {
+        return Some(found.len());
+    }
+    let files = fs::read_dir(path).ok()?;
+    let lengths = files.filter_map(|file| file.ok()?.metadata().ok());
+    Some(
+        lengths
+            .filter(fs::Metadata::is_file)
+            .map(|file| file.len())
+            .sum(),
+    )
+}
