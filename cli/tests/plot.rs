@@ -493,14 +493,23 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
         &[
             "plot",
             "a.dat",
-            "--dimension",
-            "2,8",
+            "--components",
+            "0.x,1.z",
             "--format",
             "png",
             "-o",
             "out",
         ],
     );
+    // Inputs with equal names in different directories.
+    fs::create_dir(folder.path().join("take")).unwrap();
+    fs::copy(
+        folder.path().join("a.dat"),
+        folder.path().join("take/a.dat"),
+    )
+    .unwrap();
+    let line = "plot take/a.dat a.dat --show error --tracks 0 -o out";
+    succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
     let mut names: Vec<String> = fs::read_dir(folder.path().join("out"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -509,10 +518,12 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
     let expected = [
         "a-dimension-2.png",
         "a-dimension-8.png",
+        "a-error-box-1.svg",
         "a-speed-box-1.svg",
         "a-speed-box-2.svg",
         "b-speed-box-1.svg",
         "b-speed-box-2.svg",
+        "take-a-error-box-1.svg",
     ];
     assert_eq!(names, expected);
 }
@@ -558,14 +569,6 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
         (
             "plot a.dat -o x.svg --report",
             "a report has many pictures; give a directory",
-        ),
-        (
-            "plot a.dat folder/a.dat -o x --show speed",
-            "would share the pictures' names",
-        ),
-        (
-            "plot a.dat folder/a.dat -o x --report",
-            "would share the pictures' names",
         ),
         (
             "plot a.dat -o x.svg --show speed --dimension 2",

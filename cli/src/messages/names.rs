@@ -1,6 +1,7 @@
 //! How messages, titles and files call inputs and their clips.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
@@ -36,6 +37,50 @@ pub(crate) fn stem(path: &Path) -> String {
     }
 }
 
+/// The names of the pictures of some inputs, no two of them the same: their stems; where several inputs share one, with
+/// as many directories before it as tell them apart (`sh010-walk`), and with the ending if these do not.
+pub(crate) fn distinct_stems(paths: &[PathBuf]) -> Vec<String> {
+    let mut names: Vec<String> = paths.iter().map(|path| stem(path)).collect();
+    for depth in 1.. {
+        let shared = shared_names(&names);
+        if shared.is_empty() {
+            break;
+        }
+        let mut is_longer = false;
+        for index in shared {
+            let folders = paths[index].ancestors().skip(1);
+            let mut folders = folders.filter_map(|folder| folder.file_name());
+            if let Some(folder) = folders.nth(depth - 1) {
+                names[index] = format!("{}-{}", folder.to_string_lossy(), names[index]);
+                is_longer = true;
+            }
+        }
+        if !is_longer {
+            break;
+        }
+    }
+    for index in shared_names(&names) {
+        if let Some(ending) = paths[index].extension() {
+            names[index] = format!("{}-{}", names[index], ending.to_string_lossy());
+        }
+    }
+    // `a/b-c.dat` beside `a-b/c.dat`.
+    for index in shared_names(&names).into_iter().skip(1) {
+        names[index] = format!("{}-{}", names[index], index + 1);
+    }
+    names
+}
+
+/// The indices of names that are there more than once.
+fn shared_names(names: &[String]) -> Vec<usize> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for name in names {
+        *counts.entry(name).or_default() += 1;
+    }
+    let all = 0..names.len();
+    all.filter(|&index| counts[&*names[index]] > 1).collect()
+}
+
 /// The name in messages of a clip of a file with several.
 pub(crate) fn clip(clip: &Motion) -> String {
     match &clip.name {
@@ -56,4 +101,31 @@ pub(crate) fn title(path: &Path, of_file: &Motion) -> String {
 pub(crate) fn clips(loaded: &Loaded) -> String {
     let names: Vec<String> = loaded.clips.iter().map(clip).collect();
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_of_inputs_with_equal_names_are_told_apart() {
+        let names = |paths: &[&str]| {
+            let paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
+            distinct_stems(&paths)
+        };
+        assert_eq!(names(&["a/walk.bvh", "a/run.bvh"]), ["walk", "run"]);
+        assert_eq!(
+            names(&["s/1/walk.bvh", "s/2/walk.bvh"]),
+            ["1-walk", "2-walk"]
+        );
+        assert_eq!(
+            names(&["x/s/walk.bvh", "y/s/walk.bvh"]),
+            ["x-s-walk", "y-s-walk"]
+        );
+        assert_eq!(names(&["walk.bvh", "a/walk.bvh"]), ["walk", "a-walk"]);
+        assert_eq!(names(&["walk.bvh", "walk.glb"]), ["walk-bvh", "walk-glb"]);
+        let odd = names(&["a/b-c.dat", "a-b/c.dat", "c.dat", "b-c.dat", "-"]);
+        let distinct: std::collections::BTreeSet<&String> = odd.iter().collect();
+        assert_eq!(distinct.len(), odd.len(), "{odd:?}");
+    }
 }

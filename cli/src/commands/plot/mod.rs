@@ -203,7 +203,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         is_rate_chosen: arguments.command_line.has("fps"),
         outside: arguments.interpolation.outside(),
     };
-    refuse_shared_names(&inputs)?;
     arguments.check_effects(&inputs)?;
     let out = arguments.output(&inputs)?;
     let mut writer = FigureWriter {
@@ -211,6 +210,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         format: arguments.format(),
         out,
         overwrite: arguments.overwrite,
+        stems: names::distinct_stems(&inputs),
         inputs: inputs.clone(),
         drawn: Vec::new(),
     };
@@ -219,7 +219,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let outcome = arguments.for_each_input(&inputs, &mut writer, |writer, path| {
         let name = names::input(path);
-        let stem = names::stem(path);
+        let stem = writer.stem(path);
         if let Some((source, makers, rest)) = arguments.bodies(path)? {
             let title = (&*name, names::file(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
@@ -455,21 +455,6 @@ impl Arguments {
     }
 }
 
-/// Pictures are named after their inputs, so no two of those may have the same name.
-fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
-    for (index, path) in inputs.iter().enumerate() {
-        let same = |other: &&PathBuf| names::stem(other) == names::stem(path);
-        if let Some(other) = inputs[..index].iter().find(same) {
-            return Err(Failure::usage(format!(
-                "{} and {} would share the pictures' names; draw them into different directories",
-                names::input(other),
-                names::input(path)
-            )));
-        }
-    }
-    Ok(())
-}
-
 /// Draws figures into files.
 pub(crate) struct FigureWriter {
     device: OpenedDevice,
@@ -477,6 +462,8 @@ pub(crate) struct FigureWriter {
     out: PlotOutput,
     overwrite: bool,
     inputs: Vec<PathBuf>,
+    /// The names of the pictures of each input.
+    stems: Vec<String>,
     drawn: Vec<DrawnFile>,
 }
 
@@ -489,6 +476,12 @@ impl FigureWriter {
                 Destination::below(folder, Path::new(name), self.overwrite, &self.inputs)
             }
         }
+    }
+
+    /// The name of an input, with which the names of its pictures begin.
+    fn stem(&self, path: &Path) -> String {
+        let index = self.inputs.iter().position(|input| input == path);
+        index.map_or_else(|| names::stem(path), |index| self.stems[index].clone())
     }
 
     /// Draws a figure of an input.

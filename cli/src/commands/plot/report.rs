@@ -101,7 +101,7 @@ fn figures(
             let figure = source.figure(&mut writer.device, subject)?;
             let file = format!(
                 "{}-{label}.{}",
-                names::stem(path),
+                writer.stem(path),
                 writer.format.extension()
             );
             writer.draw(&figure, &file, path)?;
