@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Parser;
-use tumble::{Device, Engine, EngineOptions, Interpolation, TrackSet};
+use tumble::{Device, Engine, EngineOptions, Interpolation};
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 
@@ -120,15 +120,15 @@ pub fn nearest_name<'a>(
     words::nearest(misspelt, known)
 }
 
-/// A warning about `name` if curves of a set are less smooth than their method promises: their angular acceleration
+/// A warning about `name` if curves of a clip are less smooth than their method promises: their angular acceleration
 /// jumps at a key. `None` if there are none.
 #[must_use]
 pub fn curve_warning(
     name: &str,
-    set: &TrackSet,
+    clip: &Motion,
     interpolation: &Interpolation,
 ) -> Option<Diagnostic> {
-    interpolation::curve_warning(name, set, interpolation)
+    interpolation::curve_warning(name, clip, interpolation)
 }
 
 /// The HTML page of `tumble view` for some clips, which are called `path` in messages and titles. `box_length` is the

@@ -300,6 +300,31 @@ fn frames_and_listed_times_lie_in_gaps_too() {
     assert_eq!(read("with.csv"), read("without.csv"));
 }
 
+/// Times in messages are those of the file, whatever second the clip counts from.
+#[test]
+fn messages_have_the_clock_of_the_file() {
+    let folder = sample_folder();
+    let at = folder.path();
+    fs::write(at.join("path.tum"), PATH).unwrap();
+    for (command, words) in [
+        ("reduce path.tum -o r.tum", "(body, 1305031098.600 s)"),
+        (
+            "eval path.tum --fps 7 -o a.bvh",
+            "the clip ends at 1305031099.3 s, between two frames of 7 a second; one frame more, at 1305031099.314286 s",
+        ),
+        (
+            "verify path.tum -m slerp --fps 4 --device cpu",
+            "at 130503109",
+        ),
+    ] {
+        let run = succeed(at, &command.split(' ').collect::<Vec<_>>());
+        let text = format!("{}{}", String::from_utf8_lossy(&run.out), run.words);
+        assert!(text.contains(words), "{command}: {text}");
+    }
+    let gaps = "eval path.tum --max-gap 0.2 --in-gaps refuse --fps 7 -o b.npy";
+    refused(at, gaps, "the first at 1305031098.885714 s;");
+}
+
 /// Would catch times since 1970 that lose their date in some formats or some quantities.
 #[test]
 fn times_since_1970_are_kept_by_every_table() {

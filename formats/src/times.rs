@@ -4,7 +4,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, time_text};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::source::Source;
@@ -19,6 +19,13 @@ pub struct FrameTimes {
     pub(crate) decimals: u32,
     /// The warnings about the file.
     pub(crate) warnings: Vec<Diagnostic>,
+}
+
+/// A time in seconds on the clock of a clip's file, for messages: to a microsecond. `time_offset` is the clip's whole
+/// second from which `time` counts.
+#[must_use]
+pub fn clock_text(time_offset: i64, time: f64) -> String {
+    time_text(time_offset, (time * 1e6).round() / 1e6)
 }
 
 /// Reads the times in a file, in seconds; `-` is standard input.

@@ -579,7 +579,7 @@ pub(crate) fn curve_warnings(
     drop(known);
     let name = clip.name.clone().unwrap_or_else(|| "clip".to_owned());
     let clip = Arc::clone(clip);
-    let find_warning = move || Ok(host::curve_warning(&name, &clip.set, &interpolation));
+    let find_warning = move || Ok(host::curve_warning(&name, &clip, &interpolation));
     let found = match clip_is_short(rotations) {
         true => py.detach(|| guarded(find_warning))?,
         false => interruptible(py, find_warning)?,

@@ -472,7 +472,7 @@ impl Save {
     fn held(&self, frames: &[FramesToEnd]) -> Option<Diagnostic> {
         frames.iter().find_map(|frames| {
             let (end, rate) = frames.end.zip(frames.rate)?;
-            let warning = end.warning(rate, &self.path.display().to_string());
+            let warning = end.warning(rate, frames.time_offset, &self.path.display().to_string());
             warning.filter(|_| self.end_frame.is_none())
         })
     }

@@ -7,12 +7,12 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tumble::method::{BESSEL_OVERHAUSER, KOCHANEK_BARTELS};
 use tumble::{
     Ends, Engine, Error, FrameRate, Interpolation, InterpolationOption, InterpolationOptions,
-    InterpolationWarning, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, TrackSet,
-    WrapMode,
+    InterpolationWarning, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, WrapMode,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::{Outside, OutsideError, OutsideValue};
 use tumble_formats::sample::{ChannelMethods, MethodChoice, Samples};
+use tumble_formats::times::clock_text;
 use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::output::one_of;
@@ -229,9 +229,10 @@ fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
 /// are counted.
 pub(crate) fn curve_warning(
     name: &str,
-    set: &TrackSet,
+    clip: &Motion,
     interpolation: &Interpolation,
 ) -> Option<Diagnostic> {
+    let set = &clip.set;
     let mut first = None;
     let (mut keys, mut tracks) = (0, 0);
     for warning in interpolation.warnings(set) {
@@ -243,7 +244,7 @@ pub(crate) fn curve_warning(
     }
     let (index, key) = first?;
     let track = set.track(index);
-    let time = track.times[key];
+    let time = clock_text(clip.time_offset, track.times[key]);
     let others = match (keys, tracks) {
         (1, _) => String::new(),
         (_, 1) => format!(" (and at {} more)", keys - 1),

@@ -13,7 +13,7 @@ use tumble_formats::end_frame::{
 use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::Outside;
-use tumble_formats::times::open_times;
+use tumble_formats::times::{clock_text, open_times};
 use tumble_formats::{Format, ReadOptions};
 
 use crate::arguments::interpolation::{kept, of_outside};
@@ -245,6 +245,8 @@ pub(crate) struct ClipFrames {
     pub(crate) rate: Option<FrameRate>,
     /// How many of the times were in gaps, and were left out or held.
     pub(crate) in_gaps: usize,
+    /// The whole second of the clip from which times count.
+    pub(crate) time_offset: i64,
 }
 
 impl From<SampleTimes> for ClipFrames {
@@ -256,6 +258,7 @@ impl From<SampleTimes> for ClipFrames {
             left_out: None,
             rate: None,
             in_gaps: 0,
+            time_offset: 0,
         }
     }
 }
@@ -274,6 +277,7 @@ impl ClipFrames {
             end: found.end,
             left_out: found.left_out,
             rate: found.rate,
+            time_offset: found.time_offset,
             ..found.frames.into()
         })
     }
@@ -455,13 +459,9 @@ impl SampleChoice {
         };
         let done = match gaps.in_gaps {
             InGaps::Refuse => {
-                let time = times[first];
-                let from = match clip.time_offset {
-                    0 => String::new(),
-                    second => format!(" (counted from second {second})"),
-                };
+                let time = clock_text(clip.time_offset, times[first]);
                 let message = format!(
-                    "{found}, the first at {time} s{from}; continue with --in-gaps leave-out or hold"
+                    "{found}, the first at {time} s; continue with --in-gaps leave-out or hold"
                 );
                 return Err(Failure::new(ALL_INPUTS, message));
             }

@@ -217,7 +217,7 @@ fn summarise(
         let follows = arguments.inputs.follows_curves(path);
         let smoothest = Interpolation::from(C2);
         let of_curves = (!follows)
-            .then(|| curve_warning(&name, &clip.set, &smoothest))
+            .then(|| curve_warning(&name, &clip, &smoothest))
             .flatten();
         summary
             .warnings

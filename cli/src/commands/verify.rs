@@ -155,11 +155,16 @@ impl Arguments {
         let mut lines = Vec::new();
         for &method in methods {
             let interpolation = self.interpolation.with(method);
-            if let Some(warning) = curve_warning(name, set, &interpolation) {
+            if let Some(warning) = curve_warning(name, clip, &interpolation) {
                 words::note(&warning.to_string());
             }
-            let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
+            let mut found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
+            // On the clock of the file.
+            let positions = [&mut found.worst, &mut found.first_difference];
+            for position in positions.into_iter().flatten() {
+                position.time += clip.time_offset as f64;
+            }
             let track_name = |position: Option<SamplePosition>| {
                 position.and_then(|position| set.track(position.track).name.map(str::to_owned))
             };

@@ -16,6 +16,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::Motion;
 use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::signs::continue_signs;
+use crate::times::clock_text;
 
 pub use result::{EndFrameError, SampledKind, SampledResult};
 
@@ -55,12 +56,11 @@ impl EndSample {
     }
 
     /// The warning that a frame after the end was added, unless it was asked for. `name` is the output's name in
-    /// messages.
+    /// messages, and `time_offset` that of the clip.
     #[must_use]
-    pub fn warning(self, rate: FrameRate, name: &str) -> Option<Diagnostic> {
+    pub fn warning(self, rate: FrameRate, time_offset: i64, name: &str) -> Option<Diagnostic> {
         self.is_held().then(|| {
-            // To a microsecond: the digits behind it are those of f64.
-            let [at, time] = [self.at, self.time].map(|time| (time * 1e6).round() / 1e6);
+            let [at, time] = [self.at, self.time].map(|time| clock_text(time_offset, time));
             let message = format!(
                 "the clip ends at {at} s, between two frames of {rate} a second; one frame more, at {time} s, has \
                  the value of the end (--end-frame leave-out ends before it)"
@@ -140,6 +140,8 @@ pub struct FramesToEnd {
     pub left_out: Option<f64>,
     /// The rate of which all samples are neighbouring frames.
     pub rate: Option<FrameRate>,
+    /// The whole second of the clip from which all times count.
+    pub time_offset: i64,
 }
 
 impl FramesToEnd {
@@ -174,6 +176,7 @@ impl FramesToEnd {
             end: None,
             left_out: None,
             rate: None,
+            time_offset: clip.time_offset,
         })
     }
 

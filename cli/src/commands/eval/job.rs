@@ -175,7 +175,7 @@ impl EvaluationJob<'_> {
             return Ok(()); // No file asks for such a method.
         };
         let selected = self.arguments.inputs.tracks.select(clip, name)?;
-        if let Some(warning) = curve_warning(name, &selected.set, &curve.interpolation(method)) {
+        if let Some(warning) = curve_warning(name, &selected, &curve.interpolation(method)) {
             self.work.warn(warning);
         }
         Ok(())
@@ -463,7 +463,7 @@ impl EvaluationJob<'_> {
         self.left_out = frames.iter().find_map(|of_clip| of_clip.left_out);
         let warning = frames.iter().find_map(|of_clip| {
             let (end, rate) = of_clip.end.zip(of_clip.rate)?;
-            end.warning(rate, &target.to_string())
+            end.warning(rate, of_clip.time_offset, &target.to_string())
         });
         if let Some(warning) = warning {
             self.work.warn(warning);

@@ -188,7 +188,7 @@ fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
     // No file asks for such a method.
     let named = choices.iter().filter_map(|choice| choice.method.0);
     let interpolations = named.map(|method| choices[0].interpolation(method));
-    let warnings = interpolations.filter_map(|one| curve_warning(name, &clip.set, &one));
+    let warnings = interpolations.filter_map(|one| curve_warning(name, clip, &one));
     for warning in warnings {
         words::note(&warning.to_string());
     }

@@ -114,7 +114,7 @@ struct LargestError {
     largest: f64,
     bound: f64,
     track: String,
-    /// Seconds.
+    /// Seconds, on the clock of the file.
     time: f64,
 }
 
@@ -129,7 +129,8 @@ impl LargestError {
                 * factor,
             bound: reduced.bounds[kind] * factor,
             track: reduced.clip.set.track_name(joint),
-            time: reduced.times.get(sample).copied().unwrap_or(0.0),
+            time: reduced.times.get(sample).copied().unwrap_or(0.0)
+                + reduced.clip.time_offset as f64,
         }
     }
 }
@@ -421,12 +422,12 @@ impl ReductionReport {
             }
         };
         format!(
-            "{}: {keys}, at most {:.4}° ({}, {:.3} s) and {:.3e} ({}, {:.3} s) from {}",
+            "{}: {keys}, at most {:.4}° ({}, {:.3} s) and {} ({}, {:.3} s) from {}",
             self.input,
             self.angle.largest,
             self.angle.track,
             self.angle.time,
-            self.distance.largest,
+            words::decimals(self.distance.largest),
             self.distance.track,
             self.distance.time,
             words::count(reduced.times.len(), "sample")
