@@ -25,7 +25,7 @@ const WORLD: u64 = 2 * SIZE;
 /// Bytes from one pose to the next in a buffer of several: passes bind ranges from multiples of 256 on.
 const STEP: u64 = SIZE.next_multiple_of(256);
 
-/// What a renderer has: a device, a queue for the engine, and one for drawing.
+/// A renderer's objects: a device, a queue for the engine, and one for drawing.
 struct Renderer {
     entry: ash::Entry,
     instance: ash::Instance,
@@ -169,7 +169,7 @@ impl Renderer {
         }
     }
 
-    /// What a renderer does with the poses: here its queue copies them to memory that the host reads.
+    /// Stands for the drawing of a renderer: its queue copies the poses to memory that the host reads.
     fn draw(&self, from: vk::Buffer, to: vk::Buffer) -> Result<(), Box<dyn Error>> {
         self.submit(self.graphics, |commands| {
             let region = vk::BufferCopy::default().size(SIZE);
@@ -209,7 +209,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// What is in memory that the host sees.
+    /// The content of memory that the host sees.
     fn read(&self, memory: vk::DeviceMemory, size: u64) -> Result<Vec<[f32; 4]>, vk::Result> {
         // SAFETY: the memory is as long as what is read, and what writes it has ended.
         unsafe {

@@ -122,7 +122,7 @@ fn go_on(crowd: &mut Crowd, frame: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a renderer has: a device and a queue.
+/// A renderer's objects: a device and a queue.
 struct Renderer {
     entry: ash::Entry,
     instance: ash::Instance,
@@ -270,7 +270,7 @@ struct Slot {
     memory: vk::DeviceMemory,
 }
 
-/// What was found on the device.
+/// The results and the times of the run on the device.
 struct DeviceRun {
     name: String,
     /// The result of the last frame.

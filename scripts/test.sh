@@ -71,8 +71,8 @@ fetch_validator() {
     fi
 }
 
-# What the tests need, fetched beside what is compiled. A newer lavapipe, and AMD's compiler for cards
-# of today (tests/mesa), come with scripts/mesa.sh.
+# Fetches the tools that the tests need, while the workspace is compiled. A newer lavapipe, and AMD's compiler
+# for cards of today (tests/mesa), come with scripts/mesa.sh.
 fetch() {
     [ $# -eq 0 ] || install_packages "$@"
     running=()
@@ -110,7 +110,7 @@ if [ -z "${CI:-}" ]; then
 elif cargo fmt --version >/dev/null 2>&1; then
     cargo fmt --check
 fi
-# What the tests are, and the Python package's extension: one after the other would leave a core idle.
+# The tests and the Python package's extension in one build: two builds in turn would leave a core idle.
 cargo build --workspace --lib --bins --tests --examples --quiet
 wait "$fetching" || {
     echo "what the tests need could not be fetched: see above" >&2

@@ -475,7 +475,7 @@ fn reused_buffers_hold_nothing_of_older_results() {
     }
 }
 
-/// What a user of several threads does; a Vulkan queue takes one at a time.
+/// Several threads evaluate one clip at the same time; a Vulkan queue takes one submission at a time.
 #[test]
 fn several_threads_share_an_engine() {
     let set = hostile_set(31, 32);
@@ -512,7 +512,7 @@ fn nothing_to_evaluate_is_no_error() {
     }
 }
 
-/// What callers move into threads and share between them.
+/// The types that callers move into threads and share between them.
 #[test]
 fn engines_clips_and_results_are_send_and_sync() {
     fn check<T: Send + Sync>() {}

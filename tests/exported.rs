@@ -8,7 +8,7 @@ use tumble::{Device, Encoding, Engine, EngineOptions, Error, Layout, SampleTimes
 
 use crate::support::{dense_set, hostile_set, vulkan_devices};
 
-/// What lies in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
+/// The bytes in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
 /// second word says where the memory starts.
 fn bytes(result: &ExportedResult) -> Vec<u8> {
     let file = File::from(result.memory_file().unwrap());

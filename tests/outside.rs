@@ -39,7 +39,7 @@ fn set(seed: u64, keys: usize) -> TrackSet {
     set
 }
 
-/// What the words say, by the reference.
+/// The reference's rotation, with the wrap modes as the documentation defines them.
 fn expected(curve: &ReferenceCurve, track: Track, sides: [WrapMode; 2], time: f64) -> DQuat {
     let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
     let length = last - first;

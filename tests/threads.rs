@@ -1,5 +1,5 @@
-//! Whoever calls from whatever thread: nothing hangs, and no thread that is refused ends the program.
-//! What may hang runs in a process of its own, which is ended after a while.
+//! Calls from any thread do not hang, and a thread that the system refuses does not end the program.
+//! Tests that may hang run in a process of their own, which is ended after a while.
 #![allow(unsafe_code)] // the buffers of an application's device
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -341,8 +341,8 @@ fn to_application_buffers() {
     }
 }
 
-/// What fits one thread needs no others; what does not is refused with an error, and a copy is made by
-/// one thread. Address space for a thousand stacks is more than this process may have.
+/// Work for one thread starts no others. Work for several is refused with an error, and a copy is made by one
+/// thread. Address space for a thousand stacks is more than this process may have.
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_the_system_refuses_are_an_error() {

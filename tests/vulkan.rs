@@ -453,7 +453,7 @@ fn the_callers_keys_are_read_where_they_are() {
     }
 }
 
-/// What no result is.
+/// No result is this, so that samples that were not written are found.
 const SENTINEL: Quat = Quat::from_xyzw(7.0, 7.0, 7.0, 7.0);
 
 /// That `work` writes what is expected, and nothing `beside` it on either side.
@@ -841,7 +841,7 @@ fn engines_with_files() {
     unsafe { application.device.destroy_pipeline_cache(pipelines, None) };
 }
 
-/// What is compiled beforehand is what evaluating uses, and it is kept for the next process.
+/// The kernels compiled beforehand are those that evaluating uses, and they are kept for the next process.
 #[test]
 fn kernels_are_compiled_beforehand() {
     for engine in vulkan_engines(|_| {}) {

@@ -106,7 +106,7 @@ fn hashes() -> String {
     said
 }
 
-/// What these tests say in a process whose vectors have a width, and that has no Vulkan device.
+/// The output of these tests in a process whose vectors have a width, and that has no Vulkan device.
 fn said_with(width: VectorWidth, tests: &[&str]) -> String {
     let output = Command::new(std::env::current_exe().unwrap())
         .args(tests)

@@ -60,7 +60,7 @@ impl Inputs<'_> {
     }
 }
 
-/// What a pass reads, and by which weights.
+/// The buffers that a pass reads, and their weights.
 struct Inputs<'a> {
     ranges: Vec<TumbleBufferRange>,
     weights: &'a [f32],

@@ -313,7 +313,7 @@ fn resuming_does_not_replace_the_result_of_another_input() {
         // The same file by another path.
         let same = batch("./m1/x.dat", &[]);
         assert_eq!(same.code, 0, "{}", same.words);
-        // What is asked for is done, and so is what replaces nothing.
+        // A result is replaced when the user asks for it, and written where nothing is replaced.
         assert_eq!(batch("m2/x.dat", &["--overwrite"]).code, 0);
         assert_ne!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
         if !shard.is_empty() {

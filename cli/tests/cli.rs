@@ -12,7 +12,7 @@ fn set() -> TrackSet {
     TrackSet::with_shared_times(&times, &keys).unwrap()
 }
 
-/// What the library gives for the file that [`sample_folder`] has.
+/// The library's result for the file of [`sample_folder`].
 fn expected(frames: &SampleTimes, layout: Layout) -> Vec<Quat> {
     let engine = Engine::new(Device::Cpu).unwrap();
     engine

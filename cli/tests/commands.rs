@@ -1,4 +1,4 @@
-//! What follows from the list of commands, which is clap's: the table of the guide, and what is tested of
+//! clap's list of commands, and all that follows from it: the table of the guide, and the tests that run for
 //! every command. And the list of the tests' files. `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all
 //! commands::` writes the table and the list anew.
 

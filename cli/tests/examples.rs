@@ -33,7 +33,8 @@ const LONG: [(&str, Option<&str>); 11] = [
     ("tumble generate --boxes 4096", None),
 ];
 
-/// What is done before an example whose inputs are results of another command, or whose results are inputs of others.
+/// The commands to run before an example whose inputs are results of another command, or whose results are inputs of
+/// others.
 const BEFORE: [(&str, &str); 3] = [
     ("tumble check", "tumble eval walks -o results"),
     ("tumble merge", "tumble eval walks -o results --shard 1/1"),
@@ -234,7 +235,7 @@ fn every_example_of_the_help_runs() {
     let help = String::from_utf8(succeed(&inputs, &["--help"]).out).unwrap();
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let commands = commands.take_while(|line| !line.is_empty());
-    // What is said of a command may go on in a further line.
+    // The summary of a command may go on in a further line.
     let commands = commands.filter(|line| !line.starts_with("   "));
     let mut commands: Vec<&str> = commands
         .filter_map(|line| line.split_whitespace().next())

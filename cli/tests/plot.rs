@@ -620,7 +620,7 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
                 .words
                 .contains("65 panels in one picture cannot be read")
     );
-    // What is not drawn does not count.
+    // Tracks that are not drawn do not count.
     skeleton(folder.path(), 65, &[7]);
     let marks = plot(folder.path(), &["--show", "speed"]);
     assert!(marks.says("joint65") && !marks.says("joint7"));

@@ -40,7 +40,7 @@ pub(crate) fn read(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// What a proof of one of the software drivers must say, whatever its verdict.
+/// Asserts the numbers and the verdict that every proof of a software driver has.
 fn expect_proof(run: &Run, proof: &Value, name: &str) {
     let page = String::from_utf8_lossy(&run.out);
     assert_eq!(run.code, 0, "{page}{}", run.words);
@@ -185,7 +185,7 @@ pub(crate) fn schema(of: &str) -> Value {
     read(&root().join(format!("docs/{of}.schema.json")))
 }
 
-/// What is wrong with a value, by the parts of JSON Schema that the schema uses: `type`, `properties`,
+/// The faults of a value, by the parts of JSON Schema that the schema uses: `type`, `properties`,
 /// `required`, `additionalProperties`, `items`, `enum`, `const`.
 pub(crate) fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut found = Vec::new();

@@ -106,7 +106,7 @@ fn largest_difference(found: &[f64], expected: &[f64]) -> f64 {
 }
 
 /// From Unitree's lines to each dialect and back: positions and joints to the last bit, rotations within a step of f32.
-/// What is stored as centimetres and degrees is rounded once more.
+/// Values that are stored as centimetres and degrees are rounded once more.
 #[test]
 fn every_dialect_is_read_back() {
     let folder = folder();

@@ -87,7 +87,7 @@ fn parts_may_run_at_once() {
     }
 }
 
-/// What is missing is said, and made by `--resume`, by shards or by one process.
+/// Messages name the missing shards, and `--resume` makes them, by shards or by one process.
 #[test]
 fn missing_shards_are_named_and_made() {
     let (temporary, bytes) = library();

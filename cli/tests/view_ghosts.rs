@@ -75,7 +75,7 @@ fn open(folder: &Path, line: &str) -> (String, Option<Page>) {
     (run.words, Page::open(&folder.join("view.html")))
 }
 
-/// What the list says of a clip, from 1: its name, how far it is from the solid one, and what is not compared.
+/// The texts of a clip in the list, by its number from 1: its name, its distance from the solid one, and its note.
 fn said(page: &mut Page, clip: usize) -> [String; 3] {
     [".clip-name", "output", ".note"].map(|part| {
         let text =

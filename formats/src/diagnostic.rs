@@ -50,7 +50,7 @@ pub struct Diagnostic {
     pub location: Option<Location>,
     /// The code of the problem.
     pub code: Code,
-    /// What is wrong, in words.
+    /// The message, without code and location.
     pub message: String,
     /// How often the problem occurs; the location is that of the first time.
     pub count: u64,

@@ -245,7 +245,7 @@ fn half_turns_go_the_way_of_a_product_that_is_not_negative() {
     }
 }
 
-/// What is missing or not followed is said of the buffer that names it, once for all animations.
+/// A file that is missing or not followed is an error at the buffer that names it, once for all animations.
 #[test]
 fn files_beside_that_are_missing_are_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -380,7 +380,7 @@ fn nothing_to_bake_is_the_same_file() {
     assert!(bytes == fs::read(fixture("step_scale.gltf")).unwrap());
 }
 
-/// What is nested deeper than a thread's stack is copied.
+/// JSON that is nested deeper than a thread's stack is copied.
 #[test]
 fn deeply_nested_extras_are_copied() {
     let extras = format!("{}7{}", "[".repeat(100_000), "]".repeat(100_000));

@@ -1,4 +1,4 @@
-//! What a conversion does not change stays: channels and End Sites of BVH, names, skeletons that
+//! A conversion keeps all that it does not change: channels and End Sites of BVH, names, skeletons that
 //! several animations share, joints of a skin that rest, files that are written again.
 
 use std::path::Path;
@@ -335,7 +335,7 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
         assert_eq!(found.channels, part.channels);
         for (track, other) in part.set.tracks().zip(found.set.tracks()) {
             assert_eq!(track.keys, other.keys);
-            // What rests does so from the first key on.
+            // A joint that rests has only one key, which may be at another time.
             let is_moved = track.keys.len() > 1;
             assert!(!is_moved || track.times == other.times, "{:?}", other.times);
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What names all formats, and the module with which they are asked for.
+/// The tables that name all formats, and the module that looks up formats.
 const TABLES: [&str; 4] = ["FORMATS", "SURFACES", "PATHS", "format::registry"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

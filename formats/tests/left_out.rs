@@ -1,4 +1,4 @@
-//! What is in a file and no part of its motion is said, by name, whatever the format.
+//! Warnings name the contents of a file that are no part of its motion, in every format.
 
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
 

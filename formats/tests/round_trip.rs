@@ -1,5 +1,5 @@
-//! What is written and read again is the same motion, from every format into every other: within
-//! 1e-6, with all that both can say, or with a warning that names what is left out.
+//! A motion that is written and read again is the same, from every format into every other: within 1e-6,
+//! with all that both formats can hold, or with a warning that names the parts left out.
 
 use std::collections::HashSet;
 

@@ -341,7 +341,7 @@ proptest! {
     }
 }
 
-/// What is read in spite of damage is a set all the same.
+/// A clip that is read in spite of damage still has increasing times and unit quaternions.
 fn check(loaded: &Loaded) {
     for clip in &loaded.clips {
         for track in clip.set.tracks() {

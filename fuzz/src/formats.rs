@@ -37,7 +37,7 @@ pub(crate) fn format(format: &Format, bytes: &[u8]) -> u64 {
     }
     let reported = loaded.refused.iter().chain(&loaded.warnings);
     let mut codes: Vec<Option<Code>> = reported.map(|reported| Some(reported.code)).collect();
-    // What is no clip's format is written in one that holds clips of any kind.
+    // If the format cannot be written, its clips are written as NPZ, which holds clips of any kind.
     let other = FORMATS.iter().find(|other| other.name == "npz");
     let other = other.expect("NPZ is always there");
     for clip in &loaded.clips {

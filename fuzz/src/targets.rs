@@ -1,5 +1,5 @@
-//! What is fuzzed, and what must be true of every outcome. Each target takes bytes and gives
-//! back a signature of what became of them: inputs with a new signature are worth keeping.
+//! The targets of fuzzing, and the assertions about every outcome. Each target takes bytes and returns a
+//! signature of the outcome: inputs with a new signature are worth keeping.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 

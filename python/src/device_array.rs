@@ -88,8 +88,8 @@ impl DeviceArray {
         numpy(py)?.call_method1("dtype", (type_name(self.component),))
     }
 
-    /// Who waits for the card to write it: the "stream" that takes it, or the "host", which has done so, where the
-    /// Vulkan device exports no semaphore or CUDA takes none.
+    /// How readers are ordered after the card's writing: "stream" if the stream that takes the array waits for it,
+    /// "host" if the host has waited already, because the Vulkan device exports no semaphore or CUDA takes none.
     #[getter]
     fn waited_by(&self) -> &'static str {
         match self.mapping.is_ordered_by_streams() {

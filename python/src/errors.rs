@@ -1,5 +1,5 @@
-//! What went wrong, as Python's exceptions. The classes are defined in `tumble/_errors.py`, because
-//! each has two bases.
+//! Errors as Python's exceptions. The classes are defined in `tumble/_errors.py`, because each has two
+//! bases.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -187,7 +187,7 @@ pub(crate) fn in_python(message: &str) -> String {
     spoken
 }
 
-/// What is wrong with a file.
+/// The exception or warning of a diagnostic about a file.
 pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
     let is_missing = || !Path::new(&diagnostic.file).exists();
     let class = match diagnostic.code.severity() {

@@ -25,7 +25,7 @@ use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::output::{array, array_of, filled, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
-/// What is made of a clip, and how it lies in memory.
+/// The quantity that is evaluated of a clip, its encoding, and its layout in memory.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OutputForm {
     pub(crate) quantity: Quantity,
@@ -82,7 +82,7 @@ impl Default for OutputForm {
     }
 }
 
-/// What is evaluated: a clip, on an engine, at some times of each track.
+/// A clip that is evaluated on an engine, at some times of each track.
 #[derive(Clone, Copy)]
 struct Work<'a> {
     engine: &'a Engine,

@@ -49,7 +49,7 @@ pub(crate) fn devices(py: Python<'_>) -> PyResult<Vec<String>> {
     })
 }
 
-/// What each method is: its name, and a few words.
+/// The names of the methods, each with a short description.
 ///
 /// >>> import tumble
 /// >>> tumble.methods()["slerp"]
@@ -63,7 +63,7 @@ pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(found)
 }
 
-/// What each representation of rotations is (`Engine.encoded`): its name, and a few words.
+/// The names of the representations of rotations (`Engine.encoded`), each with a short description.
 ///
 /// >>> import tumble
 /// >>> tumble.encodings()["axis-angle"]

@@ -17,7 +17,7 @@ use crate::errors::{guarded, of_engine};
 /// longer than many a call.
 const SHORT: f64 = 3e7;
 
-/// What preparing a key for constant speed takes, nanoseconds.
+/// The time that preparing a key for constant speed takes, nanoseconds.
 const CONSTANT_SPEED: f64 = 3e6;
 
 /// How long Ctrl-C may go unseen.
@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 /// How long work that was stopped may take to end before it is left alone.
 const GRACE: Duration = Duration::from_millis(40);
 
-/// What to evaluate.
+/// A set to evaluate, with the engine, the times and the form of the result.
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) engine: &'a Engine,

@@ -23,7 +23,7 @@ use crate::options::frame_rate;
 use crate::output::{array, filled};
 use crate::run::{interruptible, work};
 
-/// What the axes of samples are, without that of their components.
+/// The lengths of the axes of samples, without that of their components.
 #[derive(Debug, Clone, Copy)]
 struct Axes {
     tracks: usize,

@@ -1,4 +1,4 @@
-//! What a comparison of a device with the CPU and with the reference found.
+//! The result of comparing a device with the CPU and with the reference.
 
 use pyo3::prelude::*;
 use tumble::verify::{Verdict, verify};
@@ -9,7 +9,7 @@ use crate::errors::of_engine;
 use crate::options::EvaluationKeywords;
 use crate::values::{Pickled, pickled, value};
 
-/// What `Engine.verify` found.
+/// The result of `Engine.verify`.
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Verification {

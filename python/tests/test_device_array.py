@@ -13,7 +13,7 @@ import pytest
 
 HERE = pathlib.Path(__file__).parent
 
-# What each process begins with.
+# The code with which each process begins.
 COMMON = """
 import ctypes, gc, os, re, sys
 import numpy as np

@@ -111,7 +111,7 @@ def test_encodings_have_one_name_each(clip, engine):
         assert np.array_equal(found, engine.axis_angle(clip, degrees=degrees, **options))
         found = engine.encoded(clip, "euler", sequence="zxz", degrees=degrees, **options)
         assert np.array_equal(found, engine.euler(clip, sequence="zxz", degrees=degrees, **options))
-    # What is no angle is not converted.
+    # `degrees` converts angles only.
     found = engine.encoded(clip, "f16", degrees=False, **options)
     assert np.array_equal(found, engine.encoded(clip, "f16", **options))
     for wrong in ["vector", "f64"]:

@@ -136,7 +136,7 @@ step prove "$prove_limit" ./tumble prove "${device[@]}" --time-limit "$prove_sec
 step prove-validate "$validate_limit" \
     ./tumble prove "${device[@]}" --time-limit "$validate_seconds" --validate -o "$results/proof-validated.json"
 proved=$worst
-# What the engine might do otherwise, and the bits and the speed of what follows.
+# Variants of the kernels; then a proof and a timing with the variants that the lab chose.
 step lab "$lab_limit" ./tumble lab "${device[@]}" --time-limit "$lab_seconds" -o "$results/lab.json"
 step prove-lab "$chosen_limit" ./tumble prove "${device[@]}" --quick --time-limit "$chosen_seconds" \
     --lab "$results/lab.json" -o "$results/proof-lab.json"

@@ -106,7 +106,7 @@ impl Engine {
         let cache = Cache::new(&options.cache_files);
         let (mut models, mut timed) = (HashSet::new(), Vec::new());
         for device in Device::list().unwrap_or_default() {
-            // Of several cards of one model the first serves as well as any.
+            // Cards of one model are equally fast: the first one is timed.
             let Some(model) = model(&device).filter(|_| !device.is_software()) else {
                 continue;
             };

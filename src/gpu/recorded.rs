@@ -227,7 +227,7 @@ impl From<CommandUsers> for Users {
 pub(crate) struct Commands<'a> {
     device: &'a LogicalDevice,
     raw: vk::CommandBuffer,
-    /// What barriers to and from any other commands order.
+    /// The work before and after these commands that their barriers order.
     scopes: CommandScopes,
 }
 

@@ -8,8 +8,8 @@
 //! * [`EngineOptions`], [`EvaluateError`], [`reports`] and the files that
 //!   are kept from process to process ([`cache`]): what every build has, with and without the feature `vulkan`.
 //!
-//! What only a Vulkan device can do, such as write into an application's buffer, is no method of the traits: its callers
-//! ask for the device itself (`gpu::Opened::of`).
+//! The traits have no methods for operations of Vulkan devices alone, such as writing into an application's buffer:
+//! callers ask for the device itself (`gpu::Opened::of`).
 
 pub(crate) mod cache;
 // The host evaluates its crowds without them.
@@ -44,7 +44,7 @@ use crate::time::frames::Timeline;
 
 /// A machine that evaluates. All machines give the same bits.
 pub(crate) trait Machine: Any + Send + Sync {
-    /// What plans depend on.
+    /// The capabilities of the machine on which plans depend.
     fn limits(&self) -> Limits;
 
     /// The vectors in which the host computes its part.

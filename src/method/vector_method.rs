@@ -41,7 +41,7 @@ impl From<VectorMethod> for PerTrack<VectorMethod> {
     }
 }
 
-/// What is evaluated of a scalar or of a vector.
+/// The quantity evaluated of a scalar or a vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ScalarQuantity {
     /// The number itself.

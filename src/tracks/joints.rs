@@ -420,7 +420,7 @@ fn by_name<'a>(
 /// A name for each joint by its index.
 type Numbering = fn(usize) -> String;
 
-/// What BVH files call a joint without a name.
+/// The name that is read from BVH files for a joint without one.
 fn bvh_name(joint: usize) -> String {
     format!("joint{joint}")
 }

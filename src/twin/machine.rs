@@ -1,5 +1,5 @@
-//! What the generated entry points run on: numbers, the memory that kernels share, and workgroups whose invocations
-//! wait for each other.
+//! The machine on which the generated entry points run: numbers, the memory that kernels share, and workgroups whose
+//! invocations wait for each other.
 
 use std::cell::RefCell;
 use std::future::Future;
@@ -182,7 +182,7 @@ pub(crate) struct InvocationIds {
     pub(crate) local_invocation_index: u32,
 }
 
-/// What an invocation of a kernel runs on.
+/// The machine on which an invocation of a kernel runs: its indices and its memory.
 pub(crate) trait Machine {
     type F: Float;
     /// Lives as long as a block of statements runs.

@@ -172,7 +172,7 @@ pub(crate) fn record(
     unsafe { crowd.record(target, commands) }
 }
 
-/// What is recorded of a target between others of the same.
+/// The scopes of a recording between others of the same target.
 const IN_ROW: CommandScopes = CommandScopes {
     before: CommandUsers::KernelsAndCopies,
     after: CommandUsers::KernelsAndCopies,

@@ -178,7 +178,7 @@ fn fades_take_over_from_each_other() {
     assert_eq!(crowd.get_fade(0, 1).unwrap(), Some(expected));
 }
 
-/// What a crowd reports of itself, set in another crowd at the same time, plays on alike.
+/// Layers and fades read from a crowd and set in another one at the same time play on alike.
 #[test]
 fn a_saved_crowd_fades_on_as_before() {
     let mut random = Random(53);

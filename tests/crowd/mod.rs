@@ -433,7 +433,7 @@ fn steps_add_up_without_a_rounding() {
     fast.advance_ticks(1000 * 11_760).unwrap();
     let [a, b] = [&mut slow, &mut fast].map(|crowd| bits(&evaluated(crowd, CrowdValues::Local)));
     assert_eq!(a, b);
-    // What `get` says, set again, changes nothing where speeds are whole.
+    // Setting the layer that `get` returns changes nothing where speeds are whole.
     for slot in 0..120 {
         let layer = slow.get(slot / 2, slot % 2).unwrap();
         if layer.speed.fract() == 0.0 {

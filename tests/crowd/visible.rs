@@ -79,7 +79,7 @@ fn visible_instances_have_the_rows_of_the_whole_crowd() {
     }
 }
 
-/// What was submitted keeps its size when another list is set before it is taken.
+/// A submission keeps its size when another list is set before its result is read.
 #[test]
 fn a_submission_has_the_list_that_it_was_made_with() {
     let mut random = Random(67);

@@ -88,7 +88,7 @@ impl Compiler {
             let extensions = [khr::pipeline_executable_properties::NAME.as_ptr()];
             let mut reports = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
                 .pipeline_executable_info(true);
-            // What the kernels that read texels declare.
+            // The feature that the kernels that read texels declare.
             let features = vk::PhysicalDeviceFeatures::default().shader_int64(true);
             let create = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
@@ -244,8 +244,8 @@ impl Drop for Compiler {
     }
 }
 
-/// What a driver makes of kernels (all where none is named), by their names, in a process of its own. `program` runs
-/// this program with the driver; `is_bare` undoes the exactness pass.
+/// The listings of kernels as a driver compiles them (all kernels where none is named), with their names, made in a
+/// process of its own. `program` runs this program with the driver; `is_bare` undoes the exactness pass.
 pub(super) fn listings(
     program: &mut Command,
     label: &str,

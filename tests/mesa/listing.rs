@@ -1,5 +1,5 @@
-//! What RADV says of a compiled kernel, read: statistics, and instructions, of which each that
-//! computes with floats must be one whose rounding is that of the shader.
+//! Reads RADV's listing of a compiled kernel: statistics and instructions. Every instruction that computes
+//! with floats must round as the shader does.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! What a compiler makes of every kernel for NVIDIA's processors, none of which need be there: Mesa's NVK on a layer
-//! that stands in for the kernel's driver (`mesa-drm-shim`) makes a device that cannot compute, and compiles for it.
+//! Every kernel compiled for NVIDIA's processors, none of which need be there: Mesa's NVK on a layer that stands in
+//! for the kernel's driver (`mesa-drm-shim`) makes a device that cannot compute, and compiles for it.
 //! Every instruction on floats must round as the shader says. NVIDIA's driver has a compiler of its own; what both
 //! must obey are the decorations, and how many instructions a kernel needs is near.
 //!

@@ -65,7 +65,7 @@ fn system() -> Option<PathBuf> {
     found
 }
 
-/// What a driver makes of kernels (all where none is named) for a family.
+/// The listings of kernels as a driver compiles them for a family (all kernels where none is named).
 fn compiled(
     manifest: &Path,
     family: &str,
@@ -86,7 +86,7 @@ fn compiled(
         .collect()
 }
 
-/// What is wrong with a kernel.
+/// The faults of a kernel: instructions that do not round as the shader, spilled registers, and too many registers.
 fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String> {
     let mut faults = Vec::new();
     let mut left = [divisions(kernel); 2];

@@ -30,7 +30,7 @@ fn skeleton() -> Skeleton {
     Skeleton::new(parents.collect(), offsets.collect()).unwrap()
 }
 
-/// What the passes of a test give by the CPU, one after another, with these weights.
+/// The CPU's results of the passes of a test, one after another, with these weights.
 fn expected(layers: &[Rotations], layout: Layout, weights: [f32; 3], mix: f32) -> Vec<Vec<u8>> {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let [first, second, third] = layers else {

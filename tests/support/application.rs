@@ -174,7 +174,7 @@ impl Application {
         }
     }
 
-    /// What is in that memory.
+    /// The first `size` bytes of that memory.
     pub(crate) fn bytes(&self, memory: vk::DeviceMemory, size: u64) -> Vec<u8> {
         // SAFETY: nothing else uses the memory now.
         unsafe {

@@ -1,4 +1,4 @@
-//! What several test files need: devices, hostile keys, a small generator.
+//! Code that several test files share: devices, hostile keys, a small generator.
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use std::collections::BTreeMap;

@@ -130,7 +130,7 @@ const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 4] = [
     ),
 ];
 
-/// What reaches a spot: the indices of kernels with those of their trials, and of functions.
+/// The trials and functions that reach a spot: the indices of kernels with those of their trials, and of functions.
 #[derive(Default)]
 struct Reached {
     trials: Vec<(usize, usize)>,

@@ -29,7 +29,7 @@ pub(super) enum Rule {
     Mistaken(Spot, f32),
 }
 
-/// What a mistake is likely to be.
+/// The kinds of mistakes that are likely in a shader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// A difference for a sum.
@@ -190,7 +190,7 @@ impl Float for Number {
     }
 }
 
-/// What a kernel stores by the rule that holds, and behind it what says which invocations touched which words.
+/// The words that a kernel stores by the present rule, then a checksum of which invocation accessed which words.
 pub(super) fn results(trial: &Trial, kernel: Kernel) -> Vec<u32> {
     let memory = trial.memory(kernel);
     TOUCHED.set(0);
@@ -236,7 +236,7 @@ fn results_are_the_same_where_products_are_fused_with_zero() {
     assert_results_are_the_same(Rule::FusedWithZero);
 }
 
-/// What the rules change, and what they leave.
+/// Each rule changes the products that it is about, and no others.
 #[test]
 fn a_rule_changes_what_it_says() {
     let product = |rule, a, b| by(rule, || (Number(a) * Number(b)).bits());

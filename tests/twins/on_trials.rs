@@ -150,7 +150,7 @@ fn every_list_stores_every_encoding_alike() {
 }
 
 impl Trial {
-    /// What a store needs beside a rotation.
+    /// The detail that a store needs in addition to a rotation, from the constants of the dispatch.
     fn detail(&self, list: List) -> u32 {
         match list {
             List::Frames | List::Times | List::Samples => {

@@ -203,7 +203,7 @@ pub(super) fn set_layers(crowd: *mut TumbleCrowd, layers: &[TumbleCrowdLayer]) -
     unsafe { tumble_crowd_set(crowd, layers.as_ptr(), layers.len()) }
 }
 
-/// What everybody plays in some frame, in both forms; not every layer in every frame.
+/// The layers that are set in a frame, as C's structure and as Rust's: all in the first frame, later a third.
 fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdLayer, CrowdLayer)> {
     let mut all = Vec::new();
     for i in 0..instances * layers {

@@ -1,4 +1,5 @@
-//! What crowds refuse to be set to, and what they cannot do now; and an application's handles.
+//! Layers, fades and lists that a crowd refuses, calls that it refuses in its present state, and an application's
+//! handles.
 
 use std::ptr::{dangling, null, null_mut};
 

@@ -220,7 +220,7 @@ impl Inputs {
     }
 }
 
-/// What reads the inputs of a command, on a thread that runs ahead.
+/// Reads the inputs of a command, on a thread that runs ahead.
 pub(crate) trait InputReader: Send + 'static {
     /// Reads an input; its warnings are not printed.
     fn read(&self, path: &Path) -> Result<Loaded, Failure>;
@@ -372,7 +372,7 @@ pub(crate) struct InputSelection<'a> {
     pub(crate) repeats: Repeats,
 }
 
-/// What becomes of inputs that are named several times.
+/// How inputs that are named several times are processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Repeats {
     /// They are processed once, with a warning.

@@ -78,7 +78,7 @@ impl InterpolationArguments {
         self.options().with(method)
     }
 
-    /// What is done with times outside the keys.
+    /// How times before the first key and after the last are treated.
     pub(crate) fn outside(self) -> Outside {
         Outside {
             before: self.before,

@@ -28,7 +28,7 @@ pub(crate) struct OptionRule {
     pub(crate) applies_to: AppliesTo,
 }
 
-/// What of an option determines the bytes of a result.
+/// The part of an option on which the bytes of a result depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bytes {
     /// Nothing: it says where inputs and results are, what is permitted, which device computes, or what is
@@ -40,7 +40,7 @@ pub(crate) enum Bytes {
     ByContent,
 }
 
-/// What an option applies to.
+/// The inputs or results to which an option applies.
 pub(crate) enum AppliesTo {
     /// Whatever its command does; what depends on values is refused where these are used.
     All,
@@ -208,7 +208,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("tension"),
     deciding("continuity"),
     deciding("bias"),
-    // What is written of each rotation.
+    // The quantity that is written of each rotation, and its encoding.
     deciding("output"),
     of_results("sequence", sequence),
     of_results("major", major),

@@ -297,7 +297,7 @@ impl OutputArguments {
         }
     }
 
-    /// What is written of scalars, if they are.
+    /// The quantity that is written of scalars; `None` if the output is another.
     pub(crate) fn scalars(&self) -> Option<ScalarQuantity> {
         match self.output {
             OutputKind::Scalars(quantity) => Some(quantity),

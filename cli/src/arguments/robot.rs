@@ -110,7 +110,7 @@ pub(crate) struct RobotFrames<'a> {
     pub(crate) methods: ChannelMethods,
 }
 
-/// What was written of a robot's motion, with `--json`.
+/// The part of an evaluation's JSON about a robot's motion: the names, orders and rules of its file.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct RobotReport {
     dialect: &'static str,
@@ -245,7 +245,7 @@ impl DialectArguments {
         })
     }
 
-    /// What is said of joints that leave their limits; `None` if none does.
+    /// The text of the message about joints that leave their limits; `None` if none does.
     fn limits_text(&self, bodies: &Bodies) -> Option<String> {
         let joint = |excess: &LimitExcess| {
             let time = bodies.times.get(excess.sample).copied().unwrap_or(0.0);

@@ -85,7 +85,7 @@ pub(crate) struct OpenInput {
 /// A file to write: all clips of an input, or one of them.
 pub(crate) struct ClipWork {
     pub(crate) input: Rc<OpenInput>,
-    /// What messages call the clips.
+    /// The name of the clips in messages.
     pub(crate) name: String,
     pub(crate) target: ResultTarget,
     clips: std::ops::Range<usize>,
@@ -723,7 +723,7 @@ impl BatchRecords<'_> {
     }
 }
 
-/// What the reading thread knows.
+/// The state of the thread that reads inputs ahead of the evaluation.
 struct ReadingAhead<R> {
     reader: R,
     previous: PreviousEntries,
@@ -761,7 +761,7 @@ impl<R: InputReader> ReadingAhead<R> {
 
 /// A file to write: which of the input's clips go into it.
 pub(super) struct ClipFile {
-    /// What messages call these clips.
+    /// The name of these clips in messages.
     pub(super) name: String,
     pub(super) clips: Range<usize>,
     pub(super) target: ResultTarget,

@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is listed; also the form of the JSON.
+/// The list of devices, as printed and as JSON.
 #[derive(Serialize)]
 struct Listing {
     /// Why there is no Vulkan device.

@@ -99,7 +99,7 @@ struct Summary {
     /// Whole seconds that all times are to be moved by, as those of clocks that count from 1970 are.
     #[serde(skip_serializing_if = "is_second_zero")]
     time_offset: i64,
-    /// What the positions of each track are to be moved by in f64, where those of any are.
+    /// The vector to add in f64 to the positions of each track; empty if it is 0 for all tracks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     origins: Vec<[f64; 3]>,
     /// The rate on whose frames all key times lie: a number or a ratio.

@@ -1,4 +1,4 @@
-//! What the commands that draw say of the files that they wrote, to people and to programs.
+//! The reports of the commands that draw about the files that they wrote: text for people, JSON for programs.
 
 use std::fs;
 use std::path::{Path, PathBuf};

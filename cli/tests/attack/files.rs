@@ -60,7 +60,7 @@ fn somebodys_manifest_is_kept() {
     succeed(folder, &["merge", "out"]);
     succeed(folder, &["check", "out"]);
 
-    // Who says so replaces it.
+    // `--overwrite` replaces it.
     fs::write(&path, "my notes\n").unwrap();
     succeed(folder, &with(&BATCH, &["--overwrite"]));
     succeed(folder, &["check", "out"]);

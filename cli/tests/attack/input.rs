@@ -1,5 +1,5 @@
-//! What an attacker writes into files: broken in ways that each format's structure allows, named so that a
-//! terminal would obey, said to be larger than they are.
+//! Files of an attacker: broken in ways that each format's structure allows, with names that contain a terminal's
+//! commands, or with headers that claim more data than there is.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -76,7 +76,7 @@ fn broken(folder: &Path) -> Vec<(&'static str, i32)> {
     all
 }
 
-/// What commands need beside inputs, where they are not those that make a result of each.
+/// The arguments beside inputs of the commands that do not make a result of each input.
 const COMMANDS: [&[&str]; 3] = [
     &["verify", "-m", "slerp", "--device", "cpu"],
     &["plot", "-o", "pictures"],

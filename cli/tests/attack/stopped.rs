@@ -14,7 +14,7 @@ use crate::program::{command, is_writing, sample_folder, with_signals};
 use crate::support::Random;
 use crate::tree::tree;
 
-/// What commands write, a file or a folder, where it is not the same for all (see [`writers`]).
+/// Commands with the file or folder that each writes; [`writers`] adds the commands that make a result of each input.
 const WRITERS: &[(&str, &str)] = &[
     ("eval a.dat --fps 20000 -o out/o.npy", "out/o.npy"),
     ("eval a.dat --fps 20000 -o out/o.csv", "out/o.csv"),
@@ -43,8 +43,8 @@ const WRITERS: &[(&str, &str)] = &[
     ),
 ];
 
-/// Every command that writes, with what it writes: those of [`WRITERS`], and of the other commands that make
-/// a result of each input, a file and a folder.
+/// Every command line that writes, with the file or folder that it writes: those of [`WRITERS`], and two for each
+/// other command that makes a result of each input, one with a file and one with a folder.
 fn writers() -> Vec<(String, String)> {
     // They need a Vulkan device and take minutes.
     const NOT_HERE: [&str; 2] = ["prove", "lab"];

@@ -35,7 +35,7 @@ struct Case {
     expected: Expected,
 }
 
-/// What becomes of files of a case.
+/// Whether all files of a case must be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Expected {
     Read,
@@ -84,7 +84,7 @@ fn written(format: &Format, clips: &[Motion]) -> Option<Vec<u8>> {
     done.is_ok().then_some(out)
 }
 
-/// What every format that is written can hold.
+/// A case for each kind of content that a format can write: keys, tracks, names, clips.
 fn written_cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for &format in FORMATS.iter().filter(|format| format.writes_clips()) {
@@ -305,7 +305,7 @@ fn file(folder: &Path, number: usize, case: &Case, size: usize) -> std::path::Pa
 
 const FILES: &str = "TUMBLE_GROWTH_FILES";
 
-/// What valgrind runs: it reads the files one after the other.
+/// Reads the files one after the other; valgrind runs it.
 #[test]
 #[ignore = "reads files that another test has made"]
 fn read_all() {

@@ -1,4 +1,4 @@
-//! What evaluating and reading cost, counted, not timed: a program of its own, because the memory that
+//! The cost of evaluating and reading, counted, not timed: a program of its own, because the memory that
 //! is counted is the whole process's.
 
 #![allow(clippy::disallowed_methods)] // as in tests/all.rs
@@ -27,7 +27,7 @@ fn one_at_a_time() -> MutexGuard<'static, ()> {
     ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What some work gives, and the most memory that it took beside what was there before, bytes.
+/// The result of some work, and the most memory that it took in addition to the memory in use before, bytes.
 fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = ALLOCATOR.current_usage();
     ALLOCATOR.reset_peak_usage();

@@ -3,9 +3,9 @@
 //! both. `FAULT_CARD` says which card: `rebar` (the host sees all of the device's memory), `window` (it
 //! sees 256 MiB), or `full` (it sees all, and none is left there).
 //!
-//! What is submitted to the copying queue is held back until somebody asks whether it has ended, and
-//! runs after whatever was submitted to the other queue meanwhile: work that relies on another order
-//! than its semaphores say gives other bits. Lines of the log:
+//! Work for the copying queue is held back until the program asks whether it has ended, and runs after
+//! all work that was submitted to the other queue meanwhile: work that relies on another order than its
+//! semaphores say gives other bits. Lines of the log:
 //!
 //! * `card copies`: something was submitted to the copying queue;
 //! * `card beside`: kernels were submitted while copies were held back;
@@ -27,7 +27,7 @@ const OUT_OF_DEVICE_MEMORY: i32 = -2;
 const TYPES: u32 = 4;
 const BOTH: u32 = 2;
 
-/// What the handle of the copying queue points to.
+/// The target of the copying queue's handle, which only has to be an address.
 static COPIES: u64 = 0;
 
 fn copy_queue() -> Word {
@@ -38,7 +38,7 @@ fn copy_queue() -> Word {
 struct Queues {
     /// The one queue behind both.
     real: Word,
-    /// What was submitted to the copying queue.
+    /// The work that was submitted to the copying queue and has not run.
     held: Vec<Copy>,
     /// The points that submissions to the other queue will reach.
     coming: Vec<(vk::Semaphore, u64)>,

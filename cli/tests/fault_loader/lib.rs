@@ -460,7 +460,7 @@ fn replacement(name: &CStr) -> Option<Pointer> {
     Some(special.cast())
 }
 
-/// What `ash` looks for in the library.
+/// The function that `ash` looks for in the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vkGetInstanceProcAddr(
     instance: Word,

@@ -208,7 +208,7 @@ fn automatic() {
     eprintln!("chosen: {}", Engine::auto().unwrap().device_name());
 }
 
-/// What the driver compiled is kept when a process ends, and written again only where it is more.
+/// The driver's compiled kernels are kept when a process ends, and written again only when there are more of them.
 #[test]
 fn what_the_driver_compiled_is_kept() {
     let Some(loader) = Loader::new() else { return };

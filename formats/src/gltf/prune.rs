@@ -373,7 +373,7 @@ fn extension<'a>(
         .transpose()
 }
 
-/// What a value of a file is part of.
+/// The part of the file in which a value stands.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Surroundings {
     /// glTF itself, or an extension that is known.
@@ -385,7 +385,7 @@ enum Surroundings {
 }
 
 impl Surroundings {
-    /// What the member `name` of an object in these surroundings is part of.
+    /// The surroundings of the member `name` of an object in these.
     fn of_member(self, name: &str) -> Self {
         match self {
             Self::Known if name == "extensions" => Self::Extensions,

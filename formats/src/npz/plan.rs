@@ -71,7 +71,7 @@ pub(crate) struct ArchivePlan {
     pub(crate) is_tumble_layout: bool,
 }
 
-/// What a file says of a robot, besides the keys of its root and its joints.
+/// The arrays about a robot, besides the keys of its root and its joints.
 #[derive(Debug, Clone)]
 pub(crate) struct RobotArrays {
     pub(crate) dialect: &'static str,

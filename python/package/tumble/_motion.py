@@ -34,7 +34,7 @@ _WIDTHS = {name: 4 if name.endswith("rotations") else 3 for name in _NAMES}
 # Where the arrays of a file start: a multiple of what any processor wants, and of a cache line.
 _ALIGNED = 64
 _VERSION = 1
-# What every file has, beside what the extension module looks for.
+# Members that every file has, besides those that the extension module looks for.
 _STORED = ("version", "method", "names", "lengths", "rates")
 
 
@@ -44,7 +44,7 @@ class _WithWeakReferences:
 
 @dataclass(slots=True, eq=False)
 class MotionState(_WithWeakReferences):
-    """What `MotionLibrary.sample` found; an array that was left out is None.
+    """The result of `MotionLibrary.sample`; an array that was left out is None.
 
     float32, x y z w, seconds and radians:
 

@@ -1,4 +1,4 @@
-//! What `tumble eval` does to one input: its clips are evaluated and written into one file, as motion files
+//! The work of `tumble eval` on one input: its clips are evaluated and written into one file, as motion files
 //! with their skeletons, as rotations that are streamed as they come, or as whole poses.
 
 use std::borrow::Cow;
@@ -50,7 +50,7 @@ pub(crate) struct EvaluationReport {
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_gaps: Option<usize>,
-    /// What was written for each rotation.
+    /// The output that was written for each rotation, as `--quantity` names it.
     #[serde(rename = "what")]
     output_kind: &'static str,
     /// The order of a quaternion's components as written; null where none are written, or where the

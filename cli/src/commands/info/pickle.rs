@@ -1,4 +1,4 @@
-//! What `tumble info` says of a pickle: its values by their names, whether or not they are a motion.
+//! `tumble info` of a pickle: its values by their names, whether or not they are a motion.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What a picture shows, before anything is drawn.
+//! The content of a picture (panels, axes, curves, marks), before anything is drawn.
 
 use std::ops::Range;
 

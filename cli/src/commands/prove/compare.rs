@@ -11,7 +11,7 @@ use crate::commands::prove::report::{FORMAT, FORMAT_VERSION, read_report};
 use crate::messages::exit::{DIFFERENCE, Failure};
 use crate::messages::listing;
 
-/// What was found; also the form of the JSON.
+/// The result of comparing two proofs, as printed and as JSON.
 #[derive(Debug, Serialize)]
 pub(crate) struct ProofComparison {
     /// Whether both prove their device.

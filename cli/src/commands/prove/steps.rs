@@ -1,5 +1,5 @@
-//! What is run, in which order, and for how long. What a proof needs runs first; the remaining time is
-//! shared among the configurations of the device and random rounds.
+//! The steps of a proof, their order, and how long each may take. Steps that a proof needs run first; the
+//! remaining time is shared among the configurations of the device and random rounds.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};

@@ -41,7 +41,7 @@ use tumble_formats::sample::MethodChoice;
 /// Chains side by side in one picture.
 const MAX_METHODS: usize = 4;
 
-/// What browsers show a frame of a GIF for at least, seconds; less some rounding.
+/// The shortest time for which browsers show a frame of a GIF, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 
 /// Draw boxes, skeletons or bodies on paths as images or an animation, without a display

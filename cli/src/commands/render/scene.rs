@@ -66,7 +66,7 @@ pub(crate) struct Actor {
     /// `[frame][track]`.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) shape: Shape,
-    /// What casts a shadow on the floor: the curves that bodies go along.
+    /// The curves that bodies go along, which cast shadows on the floor.
     pub(crate) trails: Vec<Face>,
     /// Where the camera looks, and nothing may be left out.
     pub(crate) reach: Vec<Vec3>,
@@ -111,7 +111,7 @@ pub(crate) struct Surroundings {
     pub(crate) shadows: bool,
 }
 
-/// What a picture looks like, whatever it shows.
+/// The options of a picture that do not depend on its scene.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Style {
     pub(crate) size: (u32, u32),

@@ -1,4 +1,4 @@
-//! What is drawn, as triangles: boxes, curves, axes, ground.
+//! The triangles of boxes, curves, axes and the ground.
 
 use glam::{DVec3, Quat, Vec3};
 use tumble_routes::mesh::Mesh;

@@ -24,7 +24,7 @@ const PLACEHOLDER: &str = "/* DATA */";
 /// The module of the npm package, packed by gzip: `scripts/npm.sh --page` puts it here.
 const ENGINE: &[u8] = include_bytes!("tumble.wasm.gz");
 
-/// What the page's scripts read.
+/// The data of the page, which its scripts read as JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Page<'a> {
@@ -180,7 +180,7 @@ pub(crate) struct StoredSet {
     keys: String,
     /// The first of them is shown first.
     results: Vec<StoredResult>,
-    /// What the page's engine evaluates.
+    /// The clip that the page's engine evaluates; `None` where the page only shows the stored results.
     clip: Option<StoredClip>,
     /// Whether joints have scales: what follows them is drawn by the engine's matrices alone then.
     has_scales: bool,

@@ -52,7 +52,7 @@ VALUES = {
     "--into": "files",
 }
 FLAGS = ("--resume", "--overwrite", "--json")
-# What is said in another way here, or not at all.
+# Options that have another form here, or none.
 REFUSED = ("-o", "--output", "--out", "--files-from", "--shard", "--pipes")
 FILES = ("--times", "--offsets")
 

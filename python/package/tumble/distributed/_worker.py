@@ -50,8 +50,8 @@ def run(job: Job, task: Task) -> Entry:
     return {**reply, **outcome, "seconds": time.monotonic() - started}
 
 
-# What a worker process keeps: its engine, by what it was opened for; the last manifest that it read;
-# which card has which UUID.
+# The state that a worker process keeps: its engine, by the options and the device that it was opened with; the
+# last manifest that it read; the UUID of each card.
 _WORKERS: dict[tuple[tuple[str, ...], str], _tumble.Worker] = {}
 _MANIFESTS: dict[tuple[str, int | None], dict[str, list[str]]] = {}
 _UUIDS: dict[str, str] = {}
@@ -106,7 +106,7 @@ def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
         for path, below in inputs:
             target = os.path.join(folder, path)
             os.makedirs(os.path.dirname(target), exist_ok=True)
-            # What is not there, or not ours to read, the evaluation says of its input.
+            # A file that is missing or may not be read is an error of the evaluation, which names the input.
             with contextlib.suppress(FileNotFoundError, PermissionError):
                 source.fetch(below, target)
                 _fetch_referred(source, below, target)
