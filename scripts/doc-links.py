@@ -24,7 +24,7 @@ def page(path):
 
 
 def missing(origin, link):
-    """What a link leads to that is not there."""
+    """The fault of a link: the file or the anchor is missing; else None."""
     path, _, anchor = link.partition("#")
     path = unquote(path.partition("?")[0])
     target = os.path.normpath(os.path.join(os.path.dirname(origin), path)) if path else origin

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What Python has, on the keys that the other contestants read: SciPy's Slerp and RotationSpline, a
-slerp of NumPy's arrays as one would write it, and roma's (torch) where it is installed.
+"""Python's contestants, on the keys that the others read: SciPy's Slerp and RotationSpline, a slerp of
+NumPy's arrays as one would write it, and roma's (torch) where it is installed.
 
     scipy_peers.py KEYS FOLDER    called by race.py
 """

@@ -1,6 +1,6 @@
-"""What a trainer of humanoids asks of its clips, without the training: 4 096 environments, each at a time of
-its own in a clip of its own, step after step. Prints how long a step takes, and a sum of all bits that came
-out, which is the same on every machine.
+"""Samples clips as a trainer of humanoids does, without the training: 4 096 environments, each at a time of
+its own in a clip of its own, step after step. Prints how long a step takes, and a sum of all bits of the
+results, which is the same on every machine.
 
     python steps.py [motions.npz] [--steps 300]
 """

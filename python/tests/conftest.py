@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""The fixtures and functions that the tests share."""
 
 from __future__ import annotations
 

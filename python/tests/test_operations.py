@@ -1,4 +1,4 @@
-"""What is made of samples and clips beside evaluating them, beside NumPy, SciPy and the program."""
+"""Operations on samples and clips other than evaluating them, compared with NumPy, SciPy and the program."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ pub(crate) struct DialectArguments {
     /// How velocities follow from the curves
     #[arg(long, value_name = "HOW", requires = "dialect", default_value_t, value_parser = velocities())]
     velocities: VelocitySource,
-    /// What is done with joints outside the limits of --robot
+    /// What to do with joints outside the limits of --robot
     #[arg(long, value_name = "RULE", requires = "dialect", default_value_t, value_parser = limits())]
     limits: LimitRule,
     /// mjlab, beyondmimic: also write the names and orders of joints and bodies, and how the result was

@@ -78,7 +78,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Report:
-    """What evaluating a library came to."""
+    """The outcome of evaluating a library."""
 
     inputs: int
     results: int

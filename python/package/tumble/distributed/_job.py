@@ -1,4 +1,4 @@
-"""What is said between the driver and its workers."""
+"""The messages between the driver and its workers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class DistributedError(tumble.Error, RuntimeError):
 
 @dataclass(frozen=True)
 class Job:
-    """What is the same for all shards of a library."""
+    """The part of a task that is the same for all shards of a library."""
 
     line: tuple[str, ...]
     """Options of `tumble eval`, without inputs, output and device."""
@@ -90,7 +90,7 @@ def bytes_of(size: int | str) -> int:
 
 
 def wheel() -> tuple[str, str]:
-    """What this process computes with."""
+    """The hash of the kernels and the version with which this process computes."""
     return _tumble.kernels_sha256(), tumble.__version__
 
 

@@ -1,4 +1,4 @@
-"""What a worker does with a task. A worker is a process of Ray's; it keeps one engine open."""
+"""The work of a worker on a task. A worker is a process of Ray's; it keeps one engine open."""
 
 from __future__ import annotations
 
@@ -237,9 +237,9 @@ def _done(
     inputs: list[tuple[str, str]],
     out: Store,
 ) -> Entry | None:
-    """What a shard came to that was done before, from the same inputs and in the same way: its file
-    says so, or the manifest that it was merged into. The bytes of its results are not read again:
-    whole is what has its length."""
+    """The outcome of a shard that was done before, from the same inputs with the same options, by its
+    record or by the manifest that it was merged into; else None. The bytes of its results are not read
+    again: a result of the recorded length counts as whole."""
     file_name = _tumble.Record.name_of(task.shard)
     text = read_text(out, file_name)
     if text is None:
@@ -280,7 +280,7 @@ def _done(
 def _keys(
     worker: _tumble.Worker, job: Job, task: Task, inputs: list[tuple[str, str]]
 ) -> list[str]:
-    """What the results of inputs are known by, without the ending, which is the format's."""
+    """The names of the results of inputs, without the ending, which is the format's."""
     if job.into == "parquet":
         return [_parquet.name_of(task.shard)]
     return [worker.key_of(below) for _, below in inputs]
