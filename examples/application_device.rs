@@ -32,7 +32,7 @@ struct Renderer {
     physical_device: vk::PhysicalDevice,
     device: ash::Device,
     has_int64: bool,
-    /// For the engine alone: it submits to this queue, and nobody else may at the same time.
+    /// For the engine alone: it submits to this queue, and the application must not do so at the same time.
     compute: (vk::Queue, u32),
     /// The renderer's. The same one where the device has no other: then they alternate.
     graphics: (vk::Queue, u32),
@@ -134,7 +134,7 @@ impl Renderer {
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
     }
 
-    /// A buffer that both queue families may use, so that nobody needs to hand it over.
+    /// A buffer that both queue families may use, so that no transfer of ownership is needed.
     fn buffer(
         &self,
         size: u64,

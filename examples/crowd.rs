@@ -97,7 +97,7 @@ fn library() -> Result<CrowdLibrary, Box<dyn Error>> {
     Ok(library)
 }
 
-/// Everybody plays some clip from somewhere.
+/// Sets a clip, a time and a speed for every instance.
 fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
     for instance in 0..crowd.instance_count() {
         let plays = CrowdLayer {
@@ -342,7 +342,7 @@ fn on_device(
             let (from, before) = (Instant::now(), ALLOCATIONS.get());
             go_on(&mut crowd, frame)?;
             crowd.record(target, slot.commands)?;
-            // Most of the first frame is to tell the device what everybody plays.
+            // The first frame mostly uploads the layers of all instances.
             if frame > 0 {
                 host += from.elapsed();
             }
@@ -354,7 +354,7 @@ fn on_device(
             device.queue_submit(renderer.queue, &submit, slot.fence)?;
         }
     }
-    // SAFETY: nobody else uses the device.
+    // SAFETY: nothing else uses the device.
     unsafe { device.device_wait_idle()? };
     let wall = began.elapsed();
     let found = renderer.read(slots[(FRAMES - 1) % IN_FLIGHT].memory, rows)?;

@@ -90,7 +90,7 @@ sudo=""
 missing=$(missing_packages | tr '\n' ' ')
 if [ -n "$missing" ]; then
     if command -v apt-get >/dev/null; then
-        # A password is asked for here: what runs beside the rest has no terminal.
+        # A password is asked for here, because commands in the background have no terminal.
         [ "$(id -u)" -eq 0 ] || { sudo="sudo" && { sudo -n true 2>/dev/null || sudo -v || true; }; }
     else
         echo "the tests want these packages of Debian's, or your system's for the same: $missing." >&2
@@ -126,8 +126,8 @@ fi
 
 # Three seconds for each fuzz target, about a quarter for files of each format; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
-# The Python package waits for processes that it starts more than it computes, and other tests for their last
-# one: what runs beside the engine's tests keeps both cores busy.
+# The Python package's tests wait for processes more than they compute, and other tests wait for their last
+# one: run beside the engine's tests, they keep both cores busy.
 beside=()
 start_beside() { # a file for what it says, a command
     local said=$1

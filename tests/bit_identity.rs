@@ -957,8 +957,8 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
     }
 }
 
-/// Tracks of two keys alone have their own route on the CPU, and have polynomials that
-/// nobody fitted: the same bits as by segments, at every width, and near the reference.
+/// Sets whose tracks all have two keys take another route on the CPU, with polynomials that
+/// were not fitted: the same bits as by segments, at every width, and near the reference.
 #[test]
 fn crowds_of_two_keys_have_the_same_bits() {
     let mut random = Random(79);

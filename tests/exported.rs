@@ -1,4 +1,4 @@
-//! Results in memory that a device exports: the bits of the CPU, whoever drops what first.
+//! Results in memory that a device exports have the bits of the CPU, in whatever order their objects are dropped.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -68,7 +68,7 @@ fn exported_results_have_the_bits_of_the_cpu() {
     assert!(exported > 0, "no device of this machine exports memory");
 }
 
-/// The memory outlives its clip, its engine and all handles of ours, and what is dropped at once was waited for.
+/// The memory outlives its clip, its engine and all handles of ours; dropping a result waits for its work.
 #[test]
 fn exported_memory_lives_as_long_as_somebody_has_it() {
     let cpu = Engine::new(Device::Cpu).unwrap();

@@ -1,4 +1,4 @@
-//! Scalars: what the textbook says, with the same bits on every device.
+//! Scalars agree with the textbook, with the same bits on every device.
 
 use glam::DVec3;
 use tumble::reference::VectorCurve;

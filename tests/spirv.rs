@@ -270,7 +270,7 @@ fn textures_of_one_dimension_become_texel_buffers() {
     );
     let passed = texel_buffers(&module).unwrap();
     validate("texels", "vulkan1.1", &passed);
-    // Dimension and whether it is an array; capabilities; what a fetch says of levels.
+    // The dimension and whether it is an array; capabilities; the level of a fetch.
     let all = instructions(&passed);
     let of = |requested: u16| all.iter().filter(move |(opcode, _)| *opcode == requested);
     let mut dimensions: Vec<u32> = of(25).map(|(_, operands)| operands[2]).collect();

@@ -53,8 +53,8 @@ fn runs(mut command: Command) -> Result<(), String> {
     finish(command.stdout(Stdio::null()).spawn().unwrap())
 }
 
-/// Rayon's workers take up other tasks while they wait: what a call has locked meanwhile, the next task
-/// on the same thread would wait for, for ever.
+/// Rayon's workers take up other tasks while they wait: if a call held a lock meanwhile, the next task on the
+/// same thread would wait for it for ever.
 #[test]
 fn tasks_of_a_callers_own_pool_may_call_everything_at_once() {
     let rounds = std::env::var("SOAK").map_or(2, |_| 200);

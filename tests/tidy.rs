@@ -425,7 +425,7 @@ fn every_page_is_listed_and_no_link_is_dead() {
     assert!(links > 100, "only {links} links were found");
 }
 
-/// A crate that nobody can say the use of is one to leave out.
+/// A dependency without a stated use can be left out.
 #[test]
 fn every_dependency_is_justified() {
     let manifest = read("Cargo.toml");

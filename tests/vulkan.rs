@@ -350,8 +350,8 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
     assert!(result.is_err());
 }
 
-/// Catches a store beside the caller's memory, which software devices write where it is, and
-/// what is left out there: at any offset in its pages, in windows, repaired by the host, in every encoding.
+/// Catches a store beside the caller's memory, which software devices write in place, and samples that are
+/// left out: at any offset in its pages, in windows, repaired by the host, in every encoding.
 #[test]
 fn the_callers_memory_gets_the_result_and_nothing_else() {
     let cpu = Engine::new(Device::Cpu).unwrap();

@@ -23,7 +23,7 @@ WORKS = {
     "smooth": "Smooth curves through the same keys",
     "one sample": "One sample of one track, ten thousand calls",
 }
-# Of the first row: what differs by more is other work. Smooth curves are each its own.
+# The largest difference from the first row: a contestant that differs by more does other work. Smooth curves differ.
 SAME = 1e-3
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tumble beside the libraries that people use today, on the same keys, in turns, in one run. It builds what
 # it needs into target/race: the Rust peers for this machine's own vectors (Tumble chooses them when it
-# runs), Python's from PyPI, three.js from npm; what is not to be had is named under the table.
+# runs), Python's from PyPI, three.js from npm; missing ones are named under the table.
 #
 #   benches/peers/run.sh                prints the table
 #   benches/peers/run.sh --write        writes it into docs/figures.md

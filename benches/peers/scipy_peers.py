@@ -15,7 +15,7 @@ import time
 import numpy
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
-# Of a contestant in one call: what counts is the median of several calls of this program.
+# Of a contestant in one call of this program; the result is the median of several calls.
 ROUNDS = 1
 # SciPy makes a curve for each track in Python: of so many tracks, and the time is for all of them.
 MAX_TRACKS = 512

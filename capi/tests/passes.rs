@@ -15,7 +15,7 @@ use crate::application_device::{done, fails, handles, open, pointer};
 use crate::support::{hostile_set, vulkan_devices};
 
 const TRACKS: usize = 5;
-/// Where a result begins in its buffer: what lies before it must stay.
+/// Where a result begins in its buffer: bytes before it must not change.
 const BEFORE: u64 = 256;
 
 /// Three layers, frame by frame.

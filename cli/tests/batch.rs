@@ -729,8 +729,8 @@ fn results_are_discarded_only_where_that_is_asked_for() {
     assert_eq!(terminal("csv").0, 0);
 }
 
-/// Kills at random moments, each resumed: whatever lies under its name is whole at any
-/// time, and what it all comes to is what an undisturbed run gives, byte for byte. `SOAK` kills 500 times.
+/// Kills at random moments, each resumed: every file under its name is whole at any time, and
+/// the results are those of an undisturbed run, byte for byte. `SOAK` kills 500 times.
 #[cfg(unix)]
 #[test]
 fn two_hundred_kills_lose_nothing() {

@@ -1,9 +1,9 @@
-//! Files import in one direction: types go down, what lists or drives them goes up. A circle of imports
+//! Files import in one direction: types lie below the code that lists or drives them. A circle of imports
 //! has no bottom where one could begin to read.
 //!
 //! The imports are taken from the text: paths that begin with `crate`, `super` or `self`. A file and its
-//! child modules count as one: what a child takes from its parent is no import. Unit tests may look wherever
-//! they like.
+//! child modules count as one: a child's imports from its parent do not count. Unit tests may import from
+//! anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -141,7 +141,7 @@ fn names(folder: &std::path::Path) -> Vec<String> {
     names
 }
 
-/// Where nobody may write, nothing is worked out first.
+/// A folder that may not be written is refused before anything is evaluated.
 #[cfg(unix)]
 #[test]
 fn a_read_only_directory_is_refused_before_any_work() {

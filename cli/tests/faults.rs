@@ -238,7 +238,7 @@ fn too_little_memory_makes_smaller_pieces() {
     }
 }
 
-/// Systems take a device from whoever keeps it busy: work that takes longer than 100 ms
+/// Systems take a device from a program that keeps it busy: work that takes longer than 100 ms
 /// is handed over in smaller pieces from then on, down to a smallest.
 #[test]
 fn a_slow_device_gets_less_at_once() {

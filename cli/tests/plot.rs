@@ -1,4 +1,4 @@
-//! Pictures: what is in them, read back from SVG and PNG.
+//! The contents of pictures, read back from SVG and PNG.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `tumble prove` on the software drivers: what it proves, what it refuses to call proved, and the page of
+//! `tumble prove` on the software drivers: its proofs, the faults for which it refuses one, and the page
 //! `docs/proofs.md`, which is written from the files in `proofs/`.
 #![cfg(target_os = "linux")]
 
@@ -274,7 +274,7 @@ fn check(schema: &Value, value: &Value, location: &str, found: &mut Vec<String>)
     }
 }
 
-/// The check of the schema finds what is missing, what is too much and what is of another type.
+/// The check of the schema finds missing members, additional members, and members of another type.
 #[test]
 fn the_schema_refuses_what_it_does_not_describe() {
     let Some(path) = proofs().into_iter().next() else {

@@ -1,4 +1,4 @@
-//! The page of `tumble view`, in a real browser: what is drawn, and that the rotations shown are the
+//! The page of `tumble view`, in a real browser: the drawings, and that the rotations shown are the
 //! engine's.
 
 mod limits;

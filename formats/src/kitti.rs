@@ -343,7 +343,7 @@ mod tests {
             ),
             Code::KittiPose
         );
-        // A frame's number before the matrix, as KITTI-360 has it: what is left of it is no rotation.
+        // A frame's number before the matrix, as KITTI-360 has it: the numbers read as a matrix are no rotation.
         assert_eq!(
             refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
             Code::NoRotation

@@ -108,7 +108,7 @@ impl Motion {
         }
     }
 
-    /// The time in the set of a time that somebody asks for. If the times of the set are counted from a
+    /// The time in the set of a requested time. If the times of the set are counted from a
     /// [`time_offset`](Self::time_offset), a time that is nearer to it than to 0 is one of the file, for example
     /// 1700000000.5; others count from it.
     #[must_use]

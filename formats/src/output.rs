@@ -478,8 +478,8 @@ impl Temporary {
             }
             Self::Named { file, name } => {
                 name.rename(to, overwrite)?;
-                // It has a writer still, perhaps, but nobody looks for it any more. Windows lets nobody else
-                // read what is locked.
+                // It may still have a writer, but its name is not looked up any more. On Windows, other processes
+                // cannot read a locked file.
                 let _ = file.unlock();
                 Ok(file)
             }
@@ -700,7 +700,7 @@ mod tests {
         written.try_lock().unwrap();
     }
 
-    /// Writers and those who look for abandoned files run at once.
+    /// Processes that write and processes that look for abandoned files run at once.
     #[test]
     fn what_is_being_written_is_never_removed() {
         use std::sync::mpsc::{TryRecvError, channel};

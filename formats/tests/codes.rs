@@ -74,7 +74,7 @@ fn mentions(text: &str, code: Code) -> bool {
         })
 }
 
-/// A code that no fixture shows is a code that nobody has seen. It takes the files of all formats.
+/// Every code has a fixture that causes it, because no other test shows its message. It takes the files of all formats.
 #[test]
 fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
     let all: String = fixtures().iter().map(|path| verdict(path)).collect();

@@ -153,8 +153,8 @@ fn referred(json: &Value) -> (Vec<u64>, Vec<u64>) {
     (all, keys.collect())
 }
 
-/// Of every file: what is not animation stays, keys that samples replace are left out, and what was
-/// sampled is read again.
+/// Every file keeps all that is not animation, loses the keys that samples replace, and gives the samples when it is
+/// read again.
 #[test]
 fn everything_but_the_samples_comes_back() {
     let files = files();
@@ -216,7 +216,7 @@ fn everything_but_the_samples_comes_back() {
         let count = |json: &Value, list: &str| json[list].as_array().map_or(0, Vec::len);
         let unused = count(&before, "accessors") - distinct([&kept, &old_keys]).len();
         let still = count(&after, "accessors") - distinct([&now, &keys]).len();
-        // Its unknown extensions have numbers that may be indices: what they may name stays.
+        // Its unknown extensions have numbers that may be indices: data that these may name stay.
         let is_pinned = path.ends_with("keep_everything.gltf");
         assert!(
             unused == still || is_pinned,
@@ -467,7 +467,7 @@ fn no_error_is_new_to_khronos_validator() {
     };
     for (paths, both) in pairs.chunks(2).zip(reports.chunks(2)) {
         // Of each error its code and its pointer, without indices: entries that nothing uses are left out, so that
-        // others have new ones. What is wrong with a number names the number.
+        // others have new ones. The error of a number names the number.
         let errors = |report: &Report| -> Vec<String> {
             let cut = |error: &String| {
                 let pointer = error.split(": ").next().unwrap();

@@ -375,7 +375,7 @@ fn weights_are_not_cut_and_that_is_said() {
     assert!(channels.any(|channel| *channel == weights), "{written}");
 }
 
-/// The clips of a file from 0.5 to 1.5 s, the file with them, and what was said of it.
+/// The clips of a file from 0.5 to 1.5 s, the file with them, and the warnings.
 fn cut(loaded: &Loaded) -> (Vec<Motion>, Vec<u8>, Vec<Diagnostic>) {
     let engine = Engine::new(Device::Cpu).unwrap();
     let parts: Vec<Motion> = (loaded.clips.iter())
@@ -406,7 +406,7 @@ fn cut(loaded: &Loaded) -> (Vec<Motion>, Vec<u8>, Vec<Diagnostic>) {
     (parts, glb, warnings.unwrap())
 }
 
-/// The body's pelvis is at `trans` and where its shape puts it; what is written again is `trans`.
+/// The body's pelvis is at `trans` plus an offset by its shape; `trans` is written again without it.
 #[test]
 fn the_pelvis_of_a_body_is_at_both_its_places() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/npz/smpl.npz");

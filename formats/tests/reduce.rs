@@ -1,4 +1,4 @@
-//! Clips with few keys: what they are, measured apart from the code that reduces them.
+//! Clips with few keys: their errors, measured apart from the code that reduces them.
 
 use std::path::Path;
 

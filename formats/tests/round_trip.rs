@@ -408,7 +408,7 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
     }
 }
 
-/// Why a format may refuse a clip: what it has no room for.
+/// Whether a format may refuse a clip, because it cannot hold a part of it.
 fn may_be_refused(clip: &Motion, format: &Format) -> bool {
     let tracks = clip.set.track_count();
     let times = clip.key_times();

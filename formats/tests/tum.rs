@@ -1,4 +1,4 @@
-//! Trajectories: a file from elsewhere, and what is written read back.
+//! Trajectories: files of other programs, and our own files read back.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! The readers and the writers of every format. What is read are valid clips, what is refused says why and
-//! where; clips that are written in a format, and files that are written again with samples, are read again.
+//! The readers and the writers of every format. Clips that are read are valid, and errors say why and where;
+//! clips that are written in a format, and files that are written again with samples, are read again.
 
 use std::collections::HashMap;
 use std::path::Path;

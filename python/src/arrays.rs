@@ -297,8 +297,8 @@ impl<'py, T: FromPyObjectOwned<'py>> FromPyObject<'_, 'py> for ListArgument<T> {
     }
 }
 
-/// Rounded to f32, normalised before where that is a matter of rounding; what is not a rotation is
-/// left for the set to refuse.
+/// Rounded to f32, and normalised before if only rounding made its norm differ from 1; a quaternion that is no
+/// rotation is left for the set to refuse.
 fn unit(key: DQuat) -> Quat {
     let is_near = (key.length() - 1.0).abs() <= tumble::NORM_TOLERANCE;
     match is_near {

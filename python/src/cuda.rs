@@ -425,7 +425,7 @@ impl Mapping {
         self.semaphore.is_some()
     }
 
-    /// Where the first number is, for somebody whose work comes after [`Mapping::order`].
+    /// The address of the first number, for work that comes after [`Mapping::order`].
     pub(crate) fn address(&self) -> Address {
         self.is_known.store(true, Ordering::Relaxed);
         self.address.unwrap_or(0)

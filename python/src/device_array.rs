@@ -57,7 +57,7 @@ impl DeviceArray {
     fn order(&self, stream: Option<i64>) -> PyResult<()> {
         let stream = match stream {
             None => DEFAULT_STREAM,
-            Some(-1) => return Ok(()), // whoever asks waits by themselves
+            Some(-1) => return Ok(()), // the consumer orders its work itself
             Some(0) => {
                 return Err(PyBufferError::new_err(
                     "stream: 0 may be either default stream of CUDA's; give 1, that of all threads, or 2, that of \

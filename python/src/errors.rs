@@ -64,12 +64,12 @@ impl Class {
             let object = self.object(py, message, found);
             object.map_or_else(|error| error, PyErr::from_value)
         });
-        // The interpreter has ended, and nobody reads the error of work that was left behind.
+        // The interpreter has ended, and the error of work that was left behind is not read.
         made.unwrap_or_else(|| PyRuntimeError::new_err(message.to_owned()))
     }
 }
 
-/// Which fault was found, and where: what exceptions carry beside their message.
+/// The code and the location of a fault, which exceptions carry in addition to their message.
 #[derive(Debug, Default)]
 pub(crate) struct FaultDetails {
     code: Option<&'static str>,

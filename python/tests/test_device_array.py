@@ -299,7 +299,7 @@ for name in names:
                          "strides": None, "stream": 1}
     assert ctypes.string_at(address, expected.nbytes) == expected.tobytes()
 
-    # Capsules that nobody consumes, and those that somebody does, before and after the array has gone.
+    # Capsules that are not consumed, and capsules that are, before and after the array has gone.
     for options in [{}, {"max_version": (1, 0)}]:
         array.__dlpack__(**options)
         one, delete_one = consumed(array.__dlpack__(**options))
@@ -327,7 +327,7 @@ for name in names:
     order += ["cuDestroyExternalMemory", "cuCtxPopCurrent_v2"]
     assert given_back == order, given_back
 
-    # Nobody was told where it is: nobody's work is waited for.
+    # Its address was not read: no other work is waited for.
     evaluate(engine)
     assert not any("cuCtxSynchronize" in call for call in calls())
 

@@ -46,8 +46,8 @@ else
     loader="the system's loader"
 fi
 export VK_LAYER_PATH=$here/layers
-# Nothing is known from before, and nothing is left behind: what drivers compile for one engine serves the next from
-# a folder that goes at the end.
+# Nothing is known from before, and nothing is left behind: the drivers' compiled kernels are kept for the next engine
+# in a folder that is deleted at the end.
 caches=$(mktemp -d) || exit 1
 trap 'rm -rf "$caches"' EXIT
 export TUMBLE_CACHE_DIR="" MESA_SHADER_CACHE_DIR=$caches __GL_SHADER_DISK_CACHE_PATH=$caches
@@ -115,7 +115,7 @@ say "$loader; $chosen"
     command -v nvidia-smi >/dev/null && timeout 20 nvidia-smi -q
 } >"$results/environment.txt" 2>&1
 
-# A step: its name, its limit, the command. What it says goes into files; its last line into the summary.
+# A step: its name, its limit, the command. Its output goes into files; its last line into the summary.
 worst=0
 step() {
     local name=$1 limit=$2 started=$SECONDS code=0 outcome

@@ -360,7 +360,7 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         if self.device.may_destroy() {
-            // SAFETY: created from this device and no longer in use: whoever submits
+            // SAFETY: created from this device and no longer in use: the code that submits
             // work keeps its buffers until the fence is signalled. Freeing memory
             // unmaps it; null handles are allowed.
             unsafe {

@@ -177,9 +177,9 @@ pub enum CommandUsers {
     Host,
 }
 
-/// Between which of an application's commands a target is recorded. What it records waits for those before it and
-/// their writes, and those after it see its results. Fewer users are waited for in less time: all commands, the default,
-/// wait for drawing, too.
+/// Between which of an application's commands a target is recorded. Its commands wait for those before them and
+/// their writes, and those after them see its results. Fewer users are waited for in less time: all commands, the
+/// default, wait for drawing, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CommandScopes {
     /// The users before it of its inputs and of the memory of its result.

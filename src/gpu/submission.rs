@@ -90,7 +90,7 @@ impl Submission {
     /// The command buffer in the recording state, after `begin`, for commands before the submission's work. The caller
     /// keeps the used resources alive until `wait`.
     pub(crate) fn commands(&mut self) -> Commands<'_> {
-        // SAFETY: the command buffer is this device's, and nobody else records while `self` is lent; callers
+        // SAFETY: the command buffer is this device's, and no other code records while `self` is lent; callers
         // have called `begin`, so recording is on.
         unsafe { Commands::new(&self.device, self.commands) }
     }
@@ -314,7 +314,7 @@ impl Drop for Semaphore {
             if !self.is_exported {
                 self.device.settle(); // timelines that can be exported are no such
             }
-            // SAFETY: created from this device; whoever submits with it waits for that before.
+            // SAFETY: created from this device; the code that submits with it has waited for the work.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
         }
     }

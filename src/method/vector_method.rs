@@ -1,4 +1,4 @@
-//! The interpolation methods for translations, scales and scalars, and what is evaluated of them.
+//! The interpolation methods for translations, scales and scalars, and the quantities evaluated of them.
 
 use crate::names::names;
 use crate::tracks::per_track::PerTrack;

@@ -229,8 +229,8 @@ impl Watch for () {
     fn block(&self, _: u32, _: usize) {}
 }
 
-/// A kernel's buffers, what comes with its dispatch, and the memory of a workgroup. Stores make a buffer longer; what
-/// is loaded from behind its end is [`UNTOUCHED`].
+/// A kernel's buffers, the constants of its dispatch, and the memory of a workgroup. Stores make a buffer longer; loads
+/// from behind its end give [`UNTOUCHED`].
 pub(crate) struct Memory {
     code: usize,
     variables: Vec<RefCell<Vec<u32>>>,

@@ -141,7 +141,7 @@ fn both_ends_of_a_fade_are_exact() {
     }
 }
 
-/// A fade that is set while another runs goes on from the weight that was reached; what is set ends it.
+/// A fade that is set while another runs goes on from the weight that was reached; setting the layer ends it.
 #[test]
 fn fades_take_over_from_each_other() {
     let mut random = Random(47);

@@ -1,4 +1,4 @@
-//! States of a library's clips: a crowd's rotations, and what follows from them as differences say.
+//! States of a library's clips: a crowd's rotations, and rates that agree with their differences.
 
 use super::{clip, skeleton};
 use crate::support::{Random, vulkan_devices};

@@ -78,8 +78,8 @@ impl Listing {
         count_vector(&self.instructions)
     }
 
-    /// The vector instructions of the longest loop without a loop inside, else of all: what a
-    /// sample takes where a kernel walks over the samples of an item, or evaluates one.
+    /// The vector instructions of the longest loop without a loop inside, or of the whole kernel: those
+    /// for a sample, whether a kernel walks over the samples of an item or evaluates one.
     pub(super) fn vector_instructions_a_sample(&self) -> usize {
         let mut loops = Vec::new();
         for (index, instruction) in self.instructions.iter().enumerate() {
@@ -134,8 +134,8 @@ fn count_vector(instructions: &[String]) -> usize {
 }
 
 /// Whether an instruction gives the bits that the shader's operations give: it is not one on
-/// floats, or it rounds once what the shader rounds once. A list of what is allowed, so that what
-/// nobody thought of is refused.
+/// floats, or it rounds once where the shader rounds once. The allowed instructions are listed, so
+/// that an unknown one is refused.
 fn is_exact(instruction: &str, generation: Generation) -> bool {
     let (name, operands) = instruction.split_once(' ').unwrap_or((instruction, ""));
     let Some(name) = name.strip_prefix("v_").or_else(|| name.strip_prefix("s_")) else {

@@ -149,8 +149,8 @@ fn blocks(assembly: &str) -> Vec<Block> {
 }
 
 /// Whether an instruction gives the bits that the shader's operations give: it is not one on floats, or it rounds once,
-/// to the nearest, what the shader rounds once. A list of what is allowed. With `.ftz` subnormal numbers count as 0,
-/// which no value depends on.
+/// to the nearest, where the shader rounds once. The allowed instructions are listed. With `.ftz` subnormal numbers
+/// count as 0, which no value depends on.
 fn is_exact(instruction: &str) -> bool {
     let (name, operands) = instruction.split_once(' ').unwrap_or((instruction, ""));
     let mut parts = name.split('.').filter(|&part| part != "ftz");

@@ -1,6 +1,6 @@
 //! AMD's real compiler over every kernel, for six families of processors, none of which need be there:
 //! with `RADV_FORCE_FAMILY` set, Mesa's RADV makes a device that cannot compute, and
-//! compiles for it. What it made is read, and every instruction on floats must round as the shader
+//! compiles for it. Its listing is read, and every instruction on floats must round as the shader
 //! says.
 //!
 //! The system's RADV and a newer one are asked. Catches a driver that fuses in spite of the

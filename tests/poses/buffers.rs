@@ -206,7 +206,7 @@ fn long_passes_run_at_once() {
         let (whole, size) = (result.range(0, size as u64 + 256), size as u64);
         let pass = |pass| {
             let request = engine.pass(pass, LONG_TRACKS, samples, Layout::FrameMajor);
-            // SAFETY: the buffers are as they must be, and nobody uses them meanwhile.
+            // SAFETY: the buffers are as they must be, and nothing uses them meanwhile.
             unsafe { request.to_buffer(whole) }.unwrap();
             let found = result.bytes();
             assert!(found[size as usize..].iter().all(|&byte| byte == 0xff));

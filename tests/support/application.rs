@@ -289,7 +289,7 @@ impl<'a> Commands<'a> {
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
             let fence = vk::Fence::null();
             let _lock = self.application.queue_lock.lock().unwrap();
-            // SAFETY: whoever uses the queue has its lock.
+            // SAFETY: every user of the queue holds its lock.
             unsafe {
                 let device = &self.application.device;
                 device

@@ -62,8 +62,8 @@ fn kernel_options() -> &'static [(Reads, Mapping)] {
     }
 }
 
-/// Every Vulkan device in all of [`KERNEL_OPTIONS`]. Tests share the engines of the same options: what takes
-/// longest of most of them is that drivers compile kernels.
+/// Every Vulkan device in all of [`KERNEL_OPTIONS`]. Tests share the engines of the same options, because the
+/// driver's compiling of kernels takes longest in most of them.
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     static OPEN: Mutex<BTreeMap<String, Engine>> = Mutex::new(BTreeMap::new());
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);

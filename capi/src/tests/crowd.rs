@@ -383,8 +383,8 @@ pub(super) fn rust_crowd(library: &CrowdLibrary, (instances, layers): (usize, us
     engine.crowd(library, instances, layers).unwrap()
 }
 
-/// Threads that set and evaluate one crowd at once are served one after another; one that frees it ends
-/// nobody's call.
+/// Threads that set and evaluate one crowd at once are served one after another; a call goes on when another
+/// thread frees the crowd.
 #[test]
 fn crowds_may_be_used_by_threads() {
     let shape = (64, 2);

@@ -179,7 +179,7 @@ fn rig(folder: &TempDir) -> PathBuf {
     write(folder, "rig.gltf", text)
 }
 
-/// The joints are those of all clips; what a clip does not have rests.
+/// The joints are those of all clips; joints that a clip does not have rest.
 #[test]
 fn clips_of_a_file_that_move_different_joints_share_a_library() {
     let folder = tempfile::tempdir().unwrap();

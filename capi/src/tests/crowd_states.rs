@@ -264,7 +264,7 @@ fn results_and_states_are_checked() {
             state,
             "nothing is in flight",
         );
-        // Freed with a result that nobody took.
+        // Freed with a result that was not read.
         done(tumble_crowd_submit(crowd, 0, 1));
     }
     done(tumble_crowd_free(crowd));

@@ -617,8 +617,8 @@ impl GatheredInputs {
         }
     }
 
-    /// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
-    /// too, which fails when it is opened.
+    /// Every file of a format that can be read below a directory, by name. A directory that cannot be listed is an
+    /// input too, which fails when it is opened.
     fn below(&mut self, directory: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
         let root: Arc<Path> = directory.into();
         let relative = |path: &Path| path.strip_prefix(directory).unwrap_or(path).to_owned();

@@ -1,4 +1,4 @@
-//! The lines of a manifest, those of earlier batches, and what records new ones.
+//! The lines of a manifest: those of earlier batches, and the recorder of new ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

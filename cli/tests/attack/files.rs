@@ -1,4 +1,4 @@
-//! Nothing that is somebody's is lost, and nothing leaves its folder.
+//! No file of the user's is lost, and nothing is written outside the folder of results.
 
 use std::fs;
 use std::io::Write as _;
@@ -576,7 +576,7 @@ fn results_are_no_inputs_of_the_next_run() {
     assert_eq!(entries(&folder.join("walks/shards")).len(), 4);
 }
 
-/// Results of one directory, as somebody who copied it by hard links has them too.
+/// Results that a copy by hard links shares with another directory are replaced in one directory alone.
 #[test]
 fn a_copy_by_links_keeps_its_manifest() {
     let temporary = sample_folder();

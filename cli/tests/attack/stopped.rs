@@ -1,4 +1,4 @@
-//! Kills, signals, full disks and folders that nobody may write into: what is there is whole, and
+//! Kills, signals, full disks and folders that may not be written: all files under their names are whole, and
 //! nothing is left behind.
 
 use std::collections::BTreeMap;
@@ -322,7 +322,7 @@ impl Drop for Unmount {
     }
 }
 
-/// Where nobody may write, every command says so, and nothing is changed.
+/// In a folder that may not be written, every command says so and changes nothing.
 #[test]
 fn a_read_only_folder_is_refused_by_every_command() {
     use std::os::unix::fs::PermissionsExt;

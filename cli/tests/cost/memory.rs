@@ -209,7 +209,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
             evaluating >> 10,
             streaming >> 10
         );
-        // Of a part of a set, what its samples need.
+        // A part of a set takes the memory that its samples need.
         let (count, of_part) = peak_of(|| {
             let mut count = 0;
             let request = engine.request(&set, method, &frames).layout(layout);
@@ -228,7 +228,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         match memory {
             None => {
                 assert!(uploading > segments && streaming > 4 * limit);
-                // Segments, keys and spans, and what the threads work with.
+                // Segments, keys and spans, and the working memory of the threads.
                 let allowed = set.key_count() * (176 + 16 + 20) + 4 * MIB;
                 assert!(uploading <= allowed, "{uploading}");
             }

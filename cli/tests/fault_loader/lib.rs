@@ -150,7 +150,7 @@ macro_rules! name {
 }
 
 /// Calls that can fail: fails them, or passes them on and logs what they made. `wait` is
-/// passed on in any case: what the device does must have ended before anything goes.
+/// passed on in any case: the device's work must have ended before objects are destroyed.
 macro_rules! fallible {
     ($($call:ident($($argument:ident),*) $kind:ident;)*) => {
         $(

@@ -1,6 +1,6 @@
 //! Leaves out what a written file no longer uses: the keys that samples have replaced, with their accessors, buffer
 //! views and bytes. Only data of animations is left out. Everything else keeps its bytes; indices and offsets of
-//! what stays change where something before it is left out.
+//! the remaining data change where something before it is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -53,7 +53,7 @@ struct References<'a> {
     pinned: Option<usize>,
 }
 
-/// A text, and what is left out of the BIN chunk that belongs to it.
+/// A text, and the bytes that are left out of its BIN chunk.
 type PrunedText = (String, Cut);
 
 /// The text of a file with other keys, without what `before`, the file as it was, used for its animations and the new

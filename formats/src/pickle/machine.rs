@@ -1,8 +1,8 @@
 //! The machine that carries out the opcodes of a pickle, as data: no class is looked up and no function is called.
 //!
 //! Values are nodes of one list and refer to each other by index. So objects may share values and change after they
-//! are referred to, as in Python, and neither reading nor freeing them is recursive. What the names of a few classes
-//! mean stands in `globals`; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
+//! are referred to, as in Python, and neither reading nor freeing them is recursive. `globals` has the meanings of the
+//! names of a few classes; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
 
 pub(super) mod arrays;
 pub(super) mod joblib;

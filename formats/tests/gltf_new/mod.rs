@@ -46,7 +46,7 @@ fn rest(translation: [f32; 3], rotation: Quat, scale: f32) -> Transform {
     }
 }
 
-/// Tracks without keys of note: what is written are the samples.
+/// Tracks whose keys do not matter: only the samples are written.
 fn set(names: &[&str]) -> TrackSet {
     let mut set = TrackSet::new();
     for name in names {

@@ -384,7 +384,7 @@ class MotionLibrary:
     def open(
         cls, path: _Path, *, mmap: bool = True, engine: Engine | None = None
     ) -> MotionLibrary:
-        """Opens what `save` wrote. With `mmap` the file is mapped: what is not sampled is not read, and
+        """Opens a file of `save`. With `mmap` the file is mapped: motions that are not sampled are not read, and
         several processes share its memory.
 
         >>> import tumble

@@ -202,8 +202,8 @@ impl VulkanEngine {
         if let Some(pipeline) = kept() {
             return Ok(pipeline);
         }
-        // Made outside the lock, because drivers take up to seconds for it; of several callers
-        // who make this one, the first one's is kept.
+        // Made outside the lock, because drivers take up to seconds for it. If several callers
+        // make this one, the first is kept.
         let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
         self.trust(kernel, &made)?;
         let mut all = lock(&self.pipelines);

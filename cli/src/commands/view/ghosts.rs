@@ -1,4 +1,4 @@
-//! Which clips of several inputs are shown at once, at the same moment, and what of them can be compared.
+//! Which clips of several inputs are shown at once, at the same moment, and which of their joints are compared.
 
 use tumble_formats::compare::{ClipPair, CommonTimes, CompareError, MatchedTracks};
 

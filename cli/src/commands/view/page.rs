@@ -182,7 +182,7 @@ pub(crate) struct StoredSet {
     results: Vec<StoredResult>,
     /// The clip that the page's engine evaluates; `None` where the page only shows the stored results.
     clip: Option<StoredClip>,
-    /// Whether joints have scales: what follows them is drawn by the engine's matrices alone then.
+    /// Whether joints have scales: meshes that follow them are then drawn by the engine's matrices alone.
     has_scales: bool,
     /// The index of the skin that its joints move, among the page's.
     pub(crate) skin: Option<usize>,

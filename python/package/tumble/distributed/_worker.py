@@ -32,7 +32,7 @@ from tumble.distributed._stores import Store, objects, put_text, read_text, stor
 
 
 def run(job: Job, task: Task) -> Entry:
-    """Evaluates a shard; what comes back is counts and failures."""
+    """Evaluates a shard; returns counts and failures."""
     started = time.monotonic()
     installed = wheel()
     reply: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
