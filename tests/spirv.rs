@@ -147,7 +147,7 @@ fn vectors_times_scalars_become_products_of_vectors() {
     assert_eq!(passed[3], module[3] + found as u32, "the bound of the ids");
     assert_eq!(splat_products(&passed).unwrap(), passed);
     assert!(no_contraction(&passed).is_ok());
-    // Of a type that is no vector.
+    // A component of a type that is no vector.
     let header = [0x0723_0203, 0x1_0300, 0, 9, 0];
     let stray = [&header[..], &[5 << 16 | 142, 1, 2, 3, 4]].concat();
     assert_eq!(splat_products(&stray), Err(SpirvError::Incomplete));

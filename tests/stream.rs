@@ -203,7 +203,7 @@ fn parts_are_those_of_the_whole() {
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
                     }
-                    // Of the set only that part is prepared.
+                    // Only that part of the set is prepared.
                     let of_set = engine.request(&set, interpolation, frames).layout(layout);
                     let of_set = of_set.tracks(tracks.clone()).samples(part.clone());
                     let bytes = of_set.clone().encoding(encoding).evaluate_bytes().unwrap();

@@ -101,9 +101,8 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
     assert!(unsafe_lines > 200, "only {unsafe_lines} were found");
 }
 
-/// Of the system's library, the compiler's (`powi`), or glam's that call them: their last bit is another on
-/// another system, or with another compiler. `libm`'s are the same everywhere, and so are those of
-/// `math::quaternion`.
+/// Functions of the system's library, the compiler's (`powi`), or glam's that call them: their last bit is another on
+/// another system, or with another compiler. Those of `libm` and of `math::quaternion` are the same everywhere.
 const DIFFERS_BY_SYSTEM: [&str; 36] = [
     ".sin()",
     ".cos()",

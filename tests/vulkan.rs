@@ -315,7 +315,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
         }
     }
     let cpu = Engine::new(Device::Cpu).unwrap();
-    // Of a set, some samples of some tracks: only what they need is prepared.
+    // Some samples of some tracks of a set: only the segments that they need are prepared.
     for (frames, samples) in [(&frames, 100..150), (&sparse, 1..2)] {
         for method in [method::SLERP, method::C2] {
             let part = |engine: &Engine| {

@@ -38,7 +38,7 @@ def scipy(curve, times, keys, at):
 
 
 def intervals(times, at):
-    """Of each track and sample: the interval, and where in it."""
+    """The interval of each sample of each track, and the part of the interval before it."""
     index = numpy.stack([numpy.searchsorted(row, at, side="right") for row in times]) - 1
     index = index.clip(0, times.shape[1] - 2)
     start, end = (numpy.take_along_axis(times, index + step, 1) for step in (0, 1))
@@ -53,7 +53,7 @@ def numpy_slerp(times, keys, at):
         dot = numpy.einsum("tfc,tfc->tf", a, b)
         b = numpy.where(dot[..., None] < 0, -b, b)
         angle = numpy.arccos(numpy.abs(dot).clip(0, 1))
-        # Of equal keys any weights serve.
+        # For equal keys, all weights give the same result.
         sine = numpy.where(angle < 1e-4, 1, numpy.sin(angle))
         wa = numpy.where(angle < 1e-4, 1 - t, numpy.sin((1 - t) * angle) / sine)
         wb = numpy.where(angle < 1e-4, t, numpy.sin(t * angle) / sine)

@@ -294,7 +294,7 @@ fn joints_are_matched_by_name_and_parent() {
         assert_eq!(run.code, 4, "{line}: {}", run.words);
         assert!(run.words.contains(says), "{line}: {}", run.words);
     }
-    // Of names that one file alone has, the others are compared.
+    // Joints whose names only one file has are left out; the others are compared.
     let compared = succeed(folder, &["compare", "one.bvh", "named.bvh"]);
     let report = String::from_utf8(compared.out).unwrap();
     assert!(report.contains("only in one.bvh: left, right"), "{report}");

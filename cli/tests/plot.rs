@@ -9,7 +9,7 @@ use roxmltree::{Document, Node};
 const SLERP: &str = "#D55E00";
 const BESSEL_OVERHAUSER: &str = "#009E73";
 const AUTHORED: &str = "#E7298A";
-/// Of an SVG's units, for one of its pixels.
+/// The number of an SVG's units in one of its pixels.
 const FINER: f64 = 10.0;
 
 /// An SVG file's marks.
@@ -366,7 +366,7 @@ fn an_axis_of_zeros_has_labels_that_differ() {
     skeleton(folder.path(), 1, &[1]);
     for (arguments, labels) in [
         ("--show speed", &["0", "0.2", "0.8"][..]),
-        // Of a turn about z, this is x.
+        // Dimension 2 is x of a turn about z.
         ("--dimension 2", &["-0.6", "0", "0.6"]),
     ] {
         let arguments: Vec<&str> = arguments.split(' ').collect();

@@ -177,7 +177,7 @@ mod system {
 
     use super::{File, Folder, OsStr, Path, fs, io};
 
-    /// Of a directory that may be entered but not listed.
+    /// The flags for a directory that may be entered but not listed.
     #[cfg(target_os = "linux")]
     const ENTERED: OFlags = OFlags::PATH;
     #[cfg(not(target_os = "linux"))]

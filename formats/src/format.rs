@@ -462,7 +462,7 @@ impl WriteResults {
         shape: &ResultShape<'a>,
     ) -> io::Result<Box<dyn ResultWriter + 'a>> {
         let writer = (self.rotations)(out, shape)?;
-        // Of other representations q and -q are the same numbers; vectors have no sign to choose.
+        // In other representations, q and -q are the same numbers; vectors have no sign to choose.
         if !shape.encoding.is_quaternion() {
             return Ok(writer);
         }

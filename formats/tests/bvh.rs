@@ -174,7 +174,7 @@ pub(crate) fn read(text: &str, options: &ReadOptions) -> Result<Motion, Diagnost
     read_bvh("t", text.as_bytes(), options).map(|loaded| loaded.clips[0].clone())
 }
 
-/// Of a position with one channel the other coordinates are those of OFFSET.
+/// If a position has only one channel, the other coordinates are those of OFFSET.
 #[test]
 fn positions_replace_their_own_coordinate() {
     let text = format!("{HEAD}Frame Time: 0.04\n7 0 0 0\n8 0 0 0\n9 0 0 0\n");

@@ -455,7 +455,7 @@ fn shared_samplers_are_replaced_only_where_others_need_them() {
 fn no_error_is_new_to_khronos_validator() {
     let folder = tempfile::tempdir().unwrap();
     let mut pairs = Vec::new();
-    // Of times below 0 the validator says as well that those from 0 on do not increase.
+    // The validator reports times below 0, and then also that those from 0 on do not increase.
     let is_valid = |path: &PathBuf| !path.ends_with("negative_time.gltf");
     for (number, path) in files().into_iter().filter(is_valid).enumerate() {
         let to = folder.path().join(format!("{number}.glb"));
@@ -466,7 +466,7 @@ fn no_error_is_new_to_khronos_validator() {
         return;
     };
     for (paths, both) in pairs.chunks(2).zip(reports.chunks(2)) {
-        // Of each error its code and its pointer, without indices: entries that nothing uses are left out, so that
+        // The code and the pointer of each error, without indices: entries that nothing uses are left out, so that
         // others have new ones. The error of a number names the number.
         let errors = |report: &Report| -> Vec<String> {
             let cut = |error: &String| {

@@ -145,7 +145,7 @@ struct SemaphoreHandle {
 #[derive(Default)]
 struct Wait {
     value: u64,
-    /// Of semaphores of other kinds.
+    /// Parameters for semaphores of other kinds.
     others: [u64; 3],
     other: [c_uint; 10],
     flags: c_uint,

@@ -39,7 +39,7 @@ fn of_cuda(error: &CudaError) -> PyErr {
 }
 
 impl DeviceArray {
-    /// Of a result of that shape. Called without the interpreter's lock.
+    /// The array of a result of that shape. Called without the interpreter's lock.
     pub(crate) fn new(
         result: ExportedResult,
         shape: Vec<usize>,

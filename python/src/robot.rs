@@ -256,7 +256,7 @@ impl Robot {
 
 /// Numbers for each configuration.
 struct JointArray {
-    /// Of the configurations.
+    /// The shape of the configurations.
     shape: Vec<usize>,
     each: usize,
     values: Vec<f64>,

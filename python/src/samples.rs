@@ -31,7 +31,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// Of (samples,) or, in that layout, (tracks, samples).
+    /// The axes of the shape (samples,) or, in that layout, (tracks, samples).
     fn of(shape: &[usize], layout: Layout, name: &str) -> PyResult<Self> {
         Ok(match (shape, layout) {
             (&[], _) => Self {

@@ -171,7 +171,7 @@ for engine in all:
     del array
     assert (alive(), files()) == (0, opened)
 
-    # Of a device that is lost nothing is read, and nothing that a stream may wait for in vain is waited for.
+    # After a device is lost, nothing is read from it, and no stream waits for a semaphore that is never signalled.
     array = evaluate(engine)
     array.numpy()
     os.environ["STUB_VULKAN_LOST"] = "1"

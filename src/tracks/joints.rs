@@ -573,7 +573,7 @@ mod tests {
             [0, 1]
         );
         assert!(!unnamed.is_named());
-        // Of names that occur twice, only equal lists can be matched.
+        // Lists in which a name occurs twice are matched only if they are equal.
         let mut twice = chain(&["hip", "toe", "toe"]);
         assert_eq!(twice.extend(&twice.clone(), LABELS).unwrap(), [0, 1, 2]);
         assert!(twice.extend(&chain(&["hip", "toe"]), LABELS).is_err());

@@ -163,7 +163,7 @@ pub(crate) fn both<A: Copy, B: Copy, R, const N: usize>(
     std::array::from_fn(|i| operation(a[i], b[i]))
 }
 
-/// Of each component the accepted one or the rejected one.
+/// For each component, that of `accept` where the condition holds, else that of `reject`.
 #[inline]
 pub(crate) fn choose<T: Copy, const N: usize>(
     conditions: [bool; N],

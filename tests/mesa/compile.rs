@@ -324,7 +324,7 @@ pub(super) fn divisions(kernel: &str) -> usize {
         .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
     let words: Vec<u32> = words.collect();
     let (mut offset, mut main, mut function) = (5, 0, 0);
-    // Of each function its divisions, and the functions that it calls.
+    // The number of divisions of each function, and the functions that it calls.
     let mut functions = BTreeMap::<u32, (usize, Vec<u32>)>::new();
     while let Some(&word) = words.get(offset) {
         let body = functions.entry(function).or_default();

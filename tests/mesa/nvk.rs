@@ -164,7 +164,7 @@ fn is_exact(instruction: &str) -> bool {
         "ffma" => rest.is_empty() && operands.split_whitespace().take(2).any(is_power_of_two),
         // To half precision, to the nearest; with `.ftz` subnormal inputs count as 0.
         "f2f" => rest == ["f16", "f32", "re"],
-        // Of whole numbers below 2^24.
+        // Exact for whole numbers below 2^24.
         "i2f" | "i2f32" => rest
             .iter()
             .all(|part| ["f32", "i32", "u32", "re"].contains(part)),

@@ -82,7 +82,7 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     engines
 }
 
-/// Of the engines of one or more calls of [`vulkan_engines`] those that are due in this round: each device with
+/// The engines, from one or more calls of [`vulkan_engines`], that are due in this round: each device with
 /// one of [`KERNEL_OPTIONS`], in the next round with the next.
 pub fn round_robin(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
     let is_next =

@@ -537,8 +537,8 @@ impl GatheredInputs {
         Ok(gathered)
     }
 
-    /// Of files that were found several times, keeps the path without symbolic links, whatever the order in which they
-    /// were found, and says so.
+    /// Keeps the path without symbolic links of a file that was found several times, in whatever order, and warns about
+    /// the others.
     fn settle(&mut self, repeated: Vec<(usize, FoundInput)>) {
         const LISTED: usize = 3;
         let count = repeated.len();

@@ -268,7 +268,7 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// Of these methods those that draw a clip differently: the method of a file that states none is
+/// The methods among these that draw a clip differently: the method of a file that states none is
 /// bessel-overhauser, which is not drawn twice.
 pub(crate) fn distinct_methods(methods: &[MethodChoice], clip: &Motion) -> Vec<MethodChoice> {
     if !clip.channels.is_empty() {
@@ -307,7 +307,7 @@ impl CurveChoice {
         Self { quantity, ..self }
     }
 
-    /// Of these methods those that draw a clip, each differently.
+    /// The methods among these that draw a clip, each differently.
     ///
     /// # Errors
     /// When an option has no effect on any of them.

@@ -197,7 +197,7 @@ pub(crate) fn is_whole(folder: &Path, name: &str, bytes: u64, sha256: &str) -> i
     Ok(file.metadata()?.len() == bytes && of_file(file)? == sha256)
 }
 
-/// Of a whole file.
+/// The SHA-256 of a whole file.
 fn of_file(mut file: File) -> io::Result<String> {
     let mut digest = Digest::default();
     let mut buffer = vec![0; 1 << 16];
@@ -211,7 +211,7 @@ fn of_file(mut file: File) -> io::Result<String> {
     }
 }
 
-/// Of bytes in memory.
+/// The SHA-256 of bytes in memory.
 pub(crate) fn of_bytes<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut digest = Digest::default();
     for piece in pieces {

@@ -211,7 +211,7 @@ impl ManifestEntry {
     }
 }
 
-/// Of every kernel's SPIR-V, one behind the other.
+/// The SHA-256 of all kernels' SPIR-V, one behind the other.
 pub(crate) fn kernels_sha256() -> &'static str {
     static HASH: LazyLock<String> =
         LazyLock::new(|| digest::of_bytes(tumble::vulkan::kernels().map(|(_, code)| code)));

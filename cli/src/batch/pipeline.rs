@@ -218,7 +218,7 @@ struct BatchRecords<'a> {
 }
 
 impl<'a> Pipeline<'a> {
-    /// Of a single result, without a manifest.
+    /// The pipeline of a single result, without a manifest.
     pub(crate) fn of_one(reader: impl InputReader, inputs: PipelineInputs) -> Self {
         let PipelineInputs {
             jobs,
@@ -237,7 +237,7 @@ impl<'a> Pipeline<'a> {
         pipeline
     }
 
-    /// Of results that `records` records.
+    /// The pipeline of results that `records` records.
     pub(crate) fn of_batch(
         reader: impl InputReader,
         inputs: PipelineInputs,

@@ -72,13 +72,13 @@ struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     animation: Option<String>,
     tracks: usize,
-    /// Of each track that has one.
+    /// The names of the tracks; absent if none has one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     names: Vec<String>,
     /// The parent of each track, for files with a skeleton.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parents: Vec<Option<usize>>,
-    /// Of all tracks together.
+    /// The number of keys of all tracks together.
     keys: usize,
     /// Seconds.
     first_time: f64,
@@ -118,7 +118,8 @@ struct Summary {
     metres: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     up: Option<[f64; 3]>,
-    /// Of the whole file, with its first animation, and of the curves of each: `FILE:PLACE: warning[CODE]: …`
+    /// The warnings about the animation's curves, and with the first one those about the whole file:
+    /// `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
 }
 
@@ -238,7 +239,7 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Of all tracks; `None` where no track has two keys.
+    /// The steps of all tracks; `None` if no track has two keys.
     pub(crate) fn of(set: &TrackSet) -> Option<Self> {
         let steps = set.tracks().flat_map(|track| track.times.windows(2));
         let each = steps.map(|times| Self {

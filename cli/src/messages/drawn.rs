@@ -14,7 +14,7 @@ pub(crate) struct DrawnFile {
     inputs: Vec<String>,
     /// The file, or the directory of a picture for each frame.
     output: String,
-    /// Of a directory, those of the pictures together; `None` of standard output.
+    /// The size of the file, or of all pictures of a directory; `None` for standard output.
     output_bytes: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<usize>,

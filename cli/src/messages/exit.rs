@@ -256,7 +256,7 @@ pub(crate) struct Outcomes {
 }
 
 impl Outcomes {
-    /// Of a command with that many inputs.
+    /// The outcomes of a command with that many inputs, none of which has one yet.
     pub(crate) fn of(total: usize) -> Self {
         Self {
             total,

@@ -251,7 +251,7 @@ fn a_full_disk_leaves_what_was_there() {
         succeed(folder, &line);
         let before = tree(&folder.join("out"));
         let largest = before.values().map(Vec::len).max().unwrap();
-        // Of the largest file half is written; of some commands a small one is whole before.
+        // Half of the largest file is written; some commands finish a smaller one before.
         let blocks = (largest / 2 / 512).max(1);
         let script = format!(
             "ulimit -f {blocks}; exec '{program}' {} --overwrite 2>words",

@@ -256,14 +256,14 @@ impl ChannelFollower<'_> {
 
     fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
-        // Of half a turn an arc may go either way.
+        // The arc of half a turn may go either way.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Ok(false);
         }
         let at = |u: f64| match self.kind {
             ChannelKind::Vector => p.lerp(q, u),
             ChannelKind::Rotation => {
-                // Of unit quaternions that are no half turn apart; libm's sine is the same on every system.
+                // The unit quaternions are less than half a turn apart; libm's sine is the same on every system.
                 let half = libm::atan2((q - p).length(), (q + p).length());
                 let weight = |u: f64| match half < 1e-9 {
                     true => u,

@@ -85,7 +85,7 @@ pub(crate) struct RobotArrays {
 }
 
 impl RobotArrays {
-    /// Of a dialect without bodies.
+    /// The arrays of a dialect without bodies.
     pub(crate) fn of(dialect: &'static str, names_joints: bool) -> Self {
         Self {
             dialect,

@@ -143,7 +143,7 @@ mod tests {
         host.bytes(0..bytes).to_vec()
     }
 
-    /// Of tracks with keys of each kind: equal ones, close ones, half turns (exact, and within rounding), other
+    /// Tracks with keys of each kind: equal ones, close ones, half turns (exact, and within rounding), other
     /// signs, components below 2^-64 and between, and lengths that are not quite 1; at uneven times. One track has
     /// one key.
     fn keys_of_all_kinds(tracks: usize, keys: usize) -> TrackSet {

@@ -395,7 +395,7 @@ impl VulkanEngine {
         spare: &mut Vec<Buffer>,
     ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
-        // Of spare ones the host writes those that kernels have read in place.
+        // The host can write a spare buffer in place if it is mapped and large enough.
         let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size >= size;
         let (mut upload, is_staged) = match spare.iter().position(fits) {
             Some(index) => (spare.swap_remove(index), false),

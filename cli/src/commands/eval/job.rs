@@ -44,7 +44,7 @@ pub(crate) struct EvaluationReport {
     format: &'static str,
     tracks: usize,
     frames: usize,
-    /// Of the first and the last frame, seconds; null where there are none.
+    /// The times of the first and the last frame, seconds; null if there are none.
     first_time: Option<f64>,
     last_time: Option<f64>,
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
@@ -58,7 +58,7 @@ pub(crate) struct EvaluationReport {
     order: Option<&'static str>,
     method: String,
     device: String,
-    /// Of a robot's motion in the layout of another program.
+    /// The report of a robot's motion in the layout of another program; absent for other results.
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<RobotReport>,
 }

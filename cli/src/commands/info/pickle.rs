@@ -20,7 +20,7 @@ pub(super) struct PickleSummary {
 
 #[derive(Serialize)]
 struct ValueSummary {
-    /// Of the entry `b` of a dict that is the entry `a`: `a.b`.
+    /// The path of the value: `a.b` for the entry `b` of a dict that is the entry `a`.
     name: String,
     /// Its shape and its type as in NumPy, or its class.
     kind: String,

@@ -21,11 +21,11 @@ const UPRIGHTS: usize = 200;
 /// The quantity of a body that a panel shows, computed from two neighbouring samples.
 #[derive(Clone, Copy)]
 enum PathQuantity {
-    /// Units a second.
+    /// The speed, units a second.
     Speed,
-    /// Of its direction, rad/s.
+    /// The angular speed of its direction, rad/s.
     Turning,
-    /// About its direction since the start, degrees.
+    /// The angle about its direction since the start, degrees.
     Roll,
 }
 

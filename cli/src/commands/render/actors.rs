@@ -21,7 +21,7 @@ use crate::messages::colours::Colour;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Of a box that is 1 long.
+/// The breadth of a box that is 1 long.
 const BREADTH: f32 = 0.28;
 /// How many samples determine the extent of a motion.
 const REACHES: usize = 200;

@@ -188,7 +188,7 @@ pub(crate) fn trails(travel: &Travel, axes: usize, length: f32, ink: Colour) -> 
 /// Curves of more bodies than this hide each other.
 const MAX_TRAILS: usize = 256;
 
-/// Of the first mesh, which is the ground, and of what stands on it.
+/// The colours of the first mesh, which is the ground, and of the meshes that stand on it.
 const GROUND: Colour = [0xa9, 0xc2, 0x8f];
 const OTHERS: Colour = [0x9c, 0x96, 0x90];
 

@@ -133,7 +133,7 @@ const MAX_KEY_BYTES: usize = 32_000_000;
 /// How bodies on paths are drawn.
 #[derive(Serialize)]
 struct StoredBodies {
-    /// Of a body, along z before `rotation`.
+    /// The length of a body, along z before `rotation`.
     length: f32,
     /// `x y z w`.
     #[serde(rename = "turn")]
@@ -160,11 +160,11 @@ pub(crate) struct StoredSet {
     length: f64,
     /// The parent of each joint, -1 for roots; empty where tracks are the boxes of a chain.
     parents: Vec<i64>,
-    /// Of the joints.
+    /// The names of the joints.
     names: Vec<String>,
     /// Whether rotations are relative to the world instead of the parent.
     is_world: bool,
-    /// Of bodies on paths, where tracks are these.
+    /// How tracks are drawn that are bodies on paths; `None` for other tracks.
     bodies: Option<StoredBodies>,
     /// Whether results are named after frames, not after methods.
     has_frames: bool,
@@ -256,7 +256,7 @@ impl StoredSet {
 }
 
 impl<'a> Page<'a> {
-    /// Of clips by these methods.
+    /// The page of clips by these methods.
     pub(crate) fn new(
         methods: &[ResultChoice],
         sets: Vec<StoredSet>,

@@ -192,7 +192,7 @@ fn filtered(level: u32) -> Quantization {
 /// The tolerance of each joint's curve.
 struct Tolerances {
     angles: Vec<f64>,
-    /// Of translations.
+    /// The tolerances of translations.
     distances: Vec<f64>,
 }
 

@@ -225,7 +225,7 @@ def _hash(path: str) -> str | None:
 
 
 def _hash_of_all(inputs: list[tuple[str, str]]) -> str:
-    """Of the hashes of a shard's inputs, in their order."""
+    """The hash of the hashes of a shard's inputs, in their order."""
     hashes = "".join(f"{_tumble.input_sha256(path)}\n" for path, _ in inputs)
     return hashlib.sha256(hashes.encode()).hexdigest()
 
