@@ -211,7 +211,7 @@ impl Renderer {
 
     /// The content of memory that the host sees.
     fn read(&self, memory: vk::DeviceMemory, size: u64) -> Result<Vec<[f32; 4]>, vk::Result> {
-        // SAFETY: the memory is as long as what is read, and what writes it has ended.
+        // SAFETY: the memory has at least `size` bytes, and the commands that write it have ended.
         unsafe {
             let flags = vk::MemoryMapFlags::empty();
             let pointer = self.device.map_memory(memory, 0, size, flags)?;

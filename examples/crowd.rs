@@ -251,7 +251,7 @@ impl Renderer {
     }
 
     fn read(&self, memory: vk::DeviceMemory, rows: usize) -> Result<Vec<[f32; 4]>, vk::Result> {
-        // SAFETY: nothing is in flight, and the memory is as long as what is read.
+        // SAFETY: nothing is in flight, and the memory is long enough.
         unsafe {
             let flags = vk::MemoryMapFlags::empty();
             let pointer = self.device.map_memory(memory, 0, vk::WHOLE_SIZE, flags)?;

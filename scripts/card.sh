@@ -95,7 +95,7 @@ try() {
         chroot "$root" apt-get -qq update
         DEBIAN_FRONTEND=noninteractive chroot "$root" \
             apt-get -qq install --yes --no-install-recommends mesa-vulkan-drivers >/dev/null
-        # The loader is what the archive brings.
+        # The loader must be that of the archive.
         chroot "$root" dpkg --force-depends --purge libvulkan1 >/dev/null 2>&1 || true
         touch "$root/complete"
     fi

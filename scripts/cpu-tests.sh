@@ -11,7 +11,7 @@ target=()
 # Where CI is set every test demands a Vulkan device.
 unset CI
 
-# Khronos' validator and what runs the program are left out: they are for the machine itself.
+# Tests by Khronos' validator and tests that run the program are left out: they are for the machine itself.
 engine=() parts=() files=(--skip validator)
 case ${1:-} in
 wasm32-*)

@@ -138,7 +138,7 @@ start_beside() { # a file for what it says, a command
 others() {
     local failed=0
     cargo test --workspace --no-fail-fast --test cost --test fuzz || failed=$?
-    # Thousands of lines are what the program tells its users of each result.
+    # The log has thousands of lines: the program's messages about each result.
     cargo test --workspace --test options 2>target/options.log || {
         failed=$?
         tail -n 100 target/options.log

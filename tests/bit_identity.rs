@@ -172,7 +172,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let variants = transfers.map(|transfer| KERNEL_OPTIONS.map(|kernel| (transfer, kernel)));
     for (variant, (transfer, (reads, mapping))) in variants.concat().into_iter().enumerate() {
         for (budget, memory) in budgets.into_iter().enumerate() {
-            // Opening a device takes longer than what is asked of it.
+            // Opening a device takes longer than evaluating on it.
             if !is_due(variant, budget, 2) {
                 continue;
             }

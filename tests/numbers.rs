@@ -12,7 +12,7 @@ use tumble::{
 
 type Computed = Result<Vec<f64>, Box<dyn std::error::Error>>;
 
-/// A number of an interface: its name, the word that its error must have, and what is made with it.
+/// A number of an interface: its name, the word that its error must have, and the call that takes it.
 struct Number {
     name: &'static str,
     word: &'static str,

@@ -29,7 +29,7 @@ fn child(test: &str) -> Command {
     command
 }
 
-/// Many times what a loaded machine needs for what takes seconds.
+/// Many times the time that a loaded machine needs for work of seconds.
 const LIMIT: Duration = Duration::from_secs(300);
 
 /// Waits for a process, and ends it after a while.

@@ -199,7 +199,7 @@ fn every_shader_function_has_its_twin() {
         let name = shader.file_stem().unwrap().to_str().unwrap();
         let Some(twin) = text.lines().find_map(|line| line.split("Twin: ").nth(1)) else {
             let glue = [
-                // Entry points and what leads samples through them.
+                // Entry points, and the functions that lead samples through them.
                 "from_keys",
                 "poses",
                 "runs",

@@ -218,7 +218,7 @@ fn every_way_of_copying_gives_the_same_bits() {
     }
 }
 
-/// A renderer hands in what it has.
+/// A renderer passes its own instance, device and queue.
 #[test]
 fn an_applications_own_device_gives_the_same_bits() {
     if vulkan_devices().is_empty() {
@@ -275,7 +275,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 .encoding(encoding)
                 .evaluate_bytes()
                 .unwrap();
-            // Not at the start, and not aligned to what devices like.
+            // Not at the start, and not at an alignment that devices prefer.
             let offset = 5 * encoding.bytes() as u64;
             let size = expected.len() as u64;
             let (buffer, memory) = application.buffer(offset + size);

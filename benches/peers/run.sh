@@ -8,7 +8,7 @@
 #   benches/peers/run.sh --bevy         with Bevy's curves, which take ten minutes to compile
 #   benches/peers/run.sh --rounds 9     turns; 5 by default
 #
-# PEERS_PYTHON names a Python that has NumPy, SciPy and what else is to be raced (roma and torch).
+# PEERS_PYTHON names a Python that has NumPy, SciPy and other libraries to race (roma and torch).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

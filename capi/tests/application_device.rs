@@ -74,7 +74,7 @@ pub(crate) fn handles(application: &Application) -> TumbleVulkan {
 struct Uses([AtomicUsize; 2]);
 
 unsafe extern "C" fn lock_queue(user: *mut c_void) {
-    // SAFETY: what the application gave with the function.
+    // SAFETY: the pointer that the application passed with the function.
     let Uses([locked, unlocked]) = unsafe { &*user.cast() };
     let before = locked.fetch_add(1, Ordering::SeqCst);
     assert_eq!(

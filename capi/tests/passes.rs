@@ -377,7 +377,7 @@ fn passes_that_cannot_be_are_refused() {
     ] {
         let raw = buffer.buffer.as_raw();
         let mut target = null_mut();
-        // SAFETY: what is refused is not used.
+        // SAFETY: a refused buffer is not used.
         unsafe {
             let refused = tumble_pass_to_buffer(engine, &raw const pass, raw, 1024, 1024);
             fails(refused, code, says);

@@ -223,7 +223,7 @@ fn every_device_writes_the_cpu_s_file() {
     }
 }
 
-/// Every output, as NPY and as CSV: its shape, and that it says what it holds.
+/// Every output, as NPY and as CSV: its shape, and the names of its components.
 #[test]
 fn outputs_have_their_shapes_and_names() {
     let folder = sample_folder();

@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 
 use crate::program::{Run, finish, root, succeed};
 
-/// Examples that take minutes, each with what runs instead: a shorter part of the same, or nothing where tests of their
-/// own run the command.
+/// Examples that take minutes, each with the line that runs instead: a shorter part of the same, or nothing where other
+/// tests run the command.
 const LONG: [(&str, Option<&str>); 11] = [
     ("tumble prove", None),
     ("tumble lab", None),
@@ -204,7 +204,7 @@ fn shell(folder: &Path, line: &str) -> Run {
     finish(command.output().unwrap())
 }
 
-/// The lines after `Examples:`, without what is said of them; a line may go on in the next.
+/// The lines after `Examples:`, without their comments; a line may go on in the next.
 fn examples(help: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let after = help
@@ -242,7 +242,7 @@ fn every_example_of_the_help_runs() {
         .collect();
     commands.retain(|command| *command != "help");
     assert!(commands.len() > 15, "{commands:?}");
-    // In place of the browser, and of what may not be installed.
+    // Stand-ins for the browser, and for programs that may not be installed.
     for (name, text) in [
         ("tumble", format!("exec '{program}' \"$@\"")),
         ("xdg-open", String::new()),

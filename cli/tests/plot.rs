@@ -92,7 +92,7 @@ fn plot(folder: &Path, arguments: &[&str]) -> Marks {
 fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
     let folder = sample_folder();
     let (times, keys) = pendulum();
-    // z of box 1 and x of box 2 are what turns.
+    // Only z of box 1 and x of box 2 turn.
     for (dimension, title, track, component) in [
         ("4", "dimension 4: z of box 1", 0, 2),
         ("6", "dimension 6: x of box 2", 1, 0),

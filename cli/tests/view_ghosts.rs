@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::browser::Page;
 use crate::program::{run, sample_folder, succeed};
 
-/// A joint of a BVH file at `offset` from its parent, with what hangs on it.
+/// A joint of a BVH file at `offset` from its parent, with its children.
 fn joint(name: &str, offset: &str, children: &str) -> String {
     let children = match children {
         "" => "End Site\n{\nOFFSET 0.5 0 0\n}\n",

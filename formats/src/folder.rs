@@ -1,4 +1,4 @@
-//! A directory that is open, and what is done to the files in it.
+//! An open directory, and operations on the files in it.
 //!
 //! While a program works, others may rename the directory of its results and put another one, or a link, in its place.
 //! A program that opens the path again would then write into the wrong one. A [`Folder`] is opened once: files are

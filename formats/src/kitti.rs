@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(refused("\n", &options), Code::TumEmpty);
     }
 
-    /// A fourth row says nothing; what else is after the matrix is left out with a warning, once.
+    /// A fourth row is skipped; other numbers after the matrix are left out with one warning.
     #[test]
     fn numbers_after_a_matrix_are_a_fourth_row_or_named() {
         let options = ReadOptions {

@@ -1,5 +1,5 @@
-//! Clips of motion files: keys of joints over a skeleton. The modules below are what is done with clips: they are
-//! sampled, reduced, compared, trimmed and so on. None of them knows a format; formats and programs use them.
+//! Clips of motion files: keys of joints over a skeleton. The modules below are operations on clips: sampling,
+//! reducing, comparing, trimming and so on. None of them knows a format; formats and programs use them.
 
 pub mod adjust;
 pub mod carried_mesh;

@@ -612,7 +612,7 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
         Ok(_) if !overwrite => Err(OutputError::Exists {
             path: path.to_owned(),
         }),
-        // Its name is too long, or has what no name may have.
+        // Its name is too long, or has characters that no name may have.
         Err(source) if source.kind() == io::ErrorKind::InvalidFilename => Err(OutputError::Write {
             path: path.to_owned(),
             source,

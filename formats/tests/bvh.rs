@@ -37,7 +37,7 @@ pub(crate) fn moved(clip: &Motion) -> Vec<Vec3> {
     keyed(clip).unwrap().translations
 }
 
-/// Compares a clip with what another program made of it.
+/// Compares a clip with the numbers of another program.
 fn compare(name: &str, clip: &Motion, expected: &Value) {
     let joints = expected["joints"].as_array().unwrap();
     assert_eq!(clip.set.track_count(), joints.len(), "{name}");

@@ -1,4 +1,4 @@
-//! Every kind of file, good and bad, with what is reported of it: the fixtures of all formats (`cases.rs`).
+//! Every kind of file, good and bad, with the messages about it: the fixtures of all formats (`cases.rs`).
 
 use std::path::Path;
 

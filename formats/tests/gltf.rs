@@ -1,4 +1,4 @@
-//! glTF files are read as their specification says: broken files, and what no fixture holds.
+//! glTF files are read as their specification says: broken files, and cases that are in no fixture.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -349,7 +349,7 @@ proptest! {
     }
 }
 
-/// Each clip has the names of its tracks, and a name may be as long as the file: what all of them take is counted.
+/// Each clip has the names of its tracks, and a name may be as long as the file: the memory of all of them counts.
 #[test]
 fn a_long_name_counts_in_every_animation() {
     let animation = r#"{"samplers":[{"input":0,"output":1}],"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}}]}"#;

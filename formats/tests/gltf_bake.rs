@@ -450,7 +450,7 @@ fn shared_samplers_are_replaced_only_where_others_need_them() {
     assert_eq!(json["accessors"].as_array().unwrap().len(), 2);
 }
 
-/// Khronos' validator finds no error in what is written that it did not find before.
+/// Khronos' validator finds no error in a written file that it did not find in the file before.
 #[test]
 fn no_error_is_new_to_khronos_validator() {
     let folder = tempfile::tempdir().unwrap();

@@ -77,7 +77,7 @@ fn as_bvh(clip: &Motion, sequence: Option<&str>) -> String {
     String::from_utf8(written(&[clip], "bvh", &options)).unwrap()
 }
 
-/// The words of a file, and its numbers within what f32 leaves of angles.
+/// Asserts the same words, and the same numbers within the accuracy that f32 has for angles.
 fn assert_same(text: &str) {
     let [written, expected] = [text, BVH].map(|text| text.split_once("Frame Time").unwrap());
     assert_eq!(written.0, expected.0);

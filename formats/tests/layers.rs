@@ -1,5 +1,5 @@
-//! The table of formats lies above all formats: it names each of them, and none of them imports it. Clips and what is
-//! done with them lie below.
+//! The table of formats lies above all formats: it names each of them, and none of them imports it. Clips and the
+//! operations on them lie below.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -24,7 +24,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// The modules that read and write files: those that the tables of `lib.rs` name, and what they share.
+/// The modules that read and write files: those that the tables of `lib.rs` name, and the modules that they share.
 fn format_modules() -> BTreeSet<String> {
     let text = fs::read_to_string(root().join("lib.rs")).unwrap();
     let named = text.lines().filter_map(|line| {

@@ -20,8 +20,8 @@ STEP = 1 / 60
 
 
 def invented(clips: int = 200, joints: int = 24) -> tumble.MotionLibrary:
-    """A library of clips that stand for recorded ones: swinging joints. What platforms round differently is not in
-    them, so that the keys are the same everywhere."""
+    """A library of clips that stand for recorded ones: swinging joints. No function that platforms round differently
+    is used, so that the keys are the same everywhere."""
     rng = np.random.default_rng(1)
     parents = [None, *(int(rng.integers(0, joint)) for joint in range(1, joints))]
     offsets = rng.integers(-8, 9, (joints, 3)) / 16

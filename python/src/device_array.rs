@@ -31,7 +31,7 @@ pub(crate) struct DeviceArray {
     component: ComponentType,
 }
 
-/// CUDA's refusal, with what to do in Python.
+/// CUDA's refusal, with the remedy in Python.
 fn of_cuda(error: &CudaError) -> PyErr {
     device(&format!(
         "device_array: {error}; without device_array=True results are arrays of NumPy's"

@@ -186,7 +186,7 @@ pub(crate) fn capsule<'py>(
             (Box::into_raw(managed).cast(), NAME)
         }
     };
-    // SAFETY: the pointer is not null, the name stays, and the destructor is that of what the pointer is to.
+    // SAFETY: the pointer is not null, the name is static, and the destructor is that of the pointer's type.
     let capsule = unsafe { ffi::PyCapsule_New(managed, name.as_ptr(), Some(destroy)) };
     if capsule.is_null() {
         // SAFETY: the box was made just now, and has no other owner.

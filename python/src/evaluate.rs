@@ -1,4 +1,4 @@
-//! Results of clips: rotations, what follows from them, and whole poses.
+//! Results of clips: rotations, quantities derived from them, and whole poses.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -228,7 +228,7 @@ impl OutputForm {
         Ok(array.into_any())
     }
 
-    /// Refuses what is done on the host after the engine, or needs the host's memory.
+    /// Refuses forms of results that the host computes after the engine, or that need the host's memory.
     fn check_on_card(
         &self,
         samples: &SampleChoice,

@@ -27,7 +27,7 @@ pub(crate) fn set_probe(command: Vec<OsString>) {
     host::set_probe(command);
 }
 
-/// Loads the Vulkan drivers: what that process does.
+/// Loads the Vulkan drivers, in a process that the package starts for this.
 #[pyfunction]
 pub(crate) fn load_drivers(py: Python<'_>) {
     py.detach(host::load_drivers);
@@ -100,7 +100,7 @@ pub(crate) fn page(
     })
 }
 
-/// Panics, so that tests see what becomes of it.
+/// Panics, so that tests see how panics are reported.
 #[pyfunction]
 pub(crate) fn panic() -> PyResult<()> {
     guarded(|| panic!("asked for"))

@@ -305,7 +305,7 @@ pub(crate) fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
     shards::manifest_results(text)
 }
 
-/// The lines of a manifest, by what the results of their inputs are known by.
+/// The lines of a manifest, by the keys of their inputs.
 #[pyfunction]
 pub(crate) fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
     shards::manifest_by_input(text)

@@ -51,7 +51,7 @@ value!(Verification {
 });
 
 impl Verification {
-    /// Verifies the tracks of each method, and puts together what was found.
+    /// Verifies the tracks of each method, and combines their results.
     pub(crate) fn of(
         engine: &Engine,
         clip: &Motion,

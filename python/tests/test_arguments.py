@@ -108,7 +108,7 @@ def test_what_is_read_as_it_is_meant(case):
     assert np.array_equal(found * signs, EXPECTED) or np.abs(found * signs - EXPECTED).max() < 3e-7
 
 
-# Shapes of what is empty.
+# Empty arguments, and the shapes of their results.
 EMPTY = {
     "no tracks": (dict(keys=np.empty((0, 4, 4))), (0, 1, 4)),
     "no times to evaluate": (dict(fps=None, at=[]), (3, 0, 4)),

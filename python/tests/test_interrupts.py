@@ -16,7 +16,7 @@ import pytest
 
 SIGNALS = 100 if os.environ.get("SOAK") else 1
 
-# The calls, by their names: what is called, and the file that it writes, if any.
+# The calls, by their names: the code, and the file that it writes, if any.
 CALLS: dict[str, tuple[str, str | None]] = {
     "load with warnings": ("tumble.load(warns)", None),
     "load a refused file": ("refused(lambda: tumble.load(broken))", None),

@@ -38,7 +38,7 @@ mkdir "$results" 2>/dev/null || results=$(mktemp -d)/$name && mkdir -p "$results
 summary=$results/summary.txt
 say() { echo "$*" | tee -a "$summary"; }
 
-# The system's loader where there is one: it is what programs here have. Else Debian's.
+# The system's loader, which other programs use here, if there is one; else Debian's.
 if ! (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'); then
     export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
     loader="the loader of this archive"

@@ -246,7 +246,7 @@ impl Buffer {
         if external.is_some() {
             info = info.push_next(&mut kinds);
         }
-        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // SAFETY: the device is alive, here and below; created objects are destroyed
         // in `drop`, also when a later step fails.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
         // SAFETY: the buffer was just created.

@@ -223,7 +223,7 @@ const HOMEBREW: [&str; 4] = [
 
 /// The loader's library.
 fn loader() -> Result<ash::Entry, VulkanError> {
-    // SAFETY: loading a library runs its initialisers; that is what is asked for.
+    // SAFETY: loading a library runs its initialisers, which is intended.
     let default = unsafe { ash::Entry::load() };
     default.or_else(|error| {
         let others = HOMEBREW.iter().filter(|_| cfg!(target_os = "macos"));

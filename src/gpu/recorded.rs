@@ -260,7 +260,7 @@ impl<'a> Commands<'a> {
         }
     }
 
-    /// Records a dispatch of what is bound. A row of more workgroups than the limit along x continues along y.
+    /// Records a dispatch of the bound kernel. A row of more workgroups than the limit along x continues along y.
     fn dispatch(self, bound: &BoundSet, constants: &[u8], [x, y, z]: [u32; 3]) {
         let limit = self.device.physical.info.max_compute_work_group_count[0];
         let [x, y, z] = match x > limit {

@@ -58,7 +58,7 @@ impl Submission {
         };
         let raw = &device.raw;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.family(lane));
-        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // SAFETY: the device is alive, here and below; created objects are destroyed
         // in `drop`, also when a later step fails.
         submission.pool =
             unsafe { raw.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
@@ -288,7 +288,7 @@ impl Semaphore {
         if exported.is_some() {
             info = info.push_next(&mut export);
         }
-        // SAFETY: the device is alive, with the feature; what is made is destroyed in `drop`.
+        // SAFETY: the device is alive, with the feature; the semaphore is destroyed in `drop`.
         let raw = unsafe { device.raw.create_semaphore(&info, None) }.named("vkCreateSemaphore")?;
         device.name(raw, name);
         Ok(Self {

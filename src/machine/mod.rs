@@ -68,7 +68,8 @@ pub(crate) trait Machine: Any + Send + Sync {
     /// Takes prepared tracks, for any number of evaluations.
     fn clip(self: Arc<Self>, data: ClipData) -> Result<Box<dyn MachineClip>, EvaluateError>;
 
-    /// Calls `work` with what runs its passes over poses. If memory runs out, the call is repeated with smaller windows.
+    /// Calls `work` with the runner of its passes over poses. If memory runs out, the call is repeated with smaller
+    /// windows.
     fn passes(
         &self,
         work: &mut dyn FnMut(&dyn PassRunner) -> Result<(), EvaluateError>,

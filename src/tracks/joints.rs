@@ -440,7 +440,7 @@ fn numbers_of(names: &[String], numbering: Numbering) -> Option<Vec<usize>> {
     (!numbers.is_empty()).then_some(numbers)
 }
 
-/// Whether two names differ only in case, in what separates their words, or in a prefix such as `mixamorig:`.
+/// Whether two names differ only in case, in the separators of their words, or in a prefix such as `mixamorig:`.
 fn are_near(name: &str, other: &str) -> bool {
     let plain = |name: &str| -> String {
         let letters = name.chars().filter(|letter| letter.is_alphanumeric());

@@ -18,7 +18,7 @@ pub(crate) const UNTOUCHED: u32 = u32::MAX;
 pub(crate) struct Entry {
     /// The variables that it binds, in their order.
     pub(crate) bound: &'static [Global],
-    /// The variable with what comes with a dispatch.
+    /// The variable with the constants of a dispatch.
     pub(crate) pushed: Option<Global>,
     /// The invocations of a workgroup.
     pub(crate) workgroup: u32,

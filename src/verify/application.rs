@@ -376,7 +376,7 @@ impl Application {
         if self.stamps != vk::QueryPool::null() {
             let mut stamps = [0u64; 2];
             let flags = vk::QueryResultFlags::TYPE_64;
-            // SAFETY: the pool has two queries, and what writes them has ended.
+            // SAFETY: the pool has two queries, and the commands that write them have ended.
             let read =
                 unsafe { (self.device).get_query_pool_results(self.stamps, 0, &mut stamps, flags) };
             elapsed.on_device = (read.is_ok())

@@ -133,7 +133,7 @@ fn rotations_are_a_crowds_on_every_device_and_at_every_width() {
     }
 }
 
-/// Rates are the derivatives of what is sampled a few ticks before and after.
+/// Rates are near the differences of samples a few ticks before and after.
 #[test]
 fn rates_are_those_of_differences() {
     let mut random = Random(7);

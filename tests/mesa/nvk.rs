@@ -13,7 +13,7 @@ use super::compile::{divisions, listings, representations, statistics};
 use super::table::{self, Cost};
 use super::{unpacked, with_driver};
 
-/// The head of the table of docs/gpu.md: what a store costs on NVIDIA's processors, kernel by kernel.
+/// The head of the table of docs/gpu.md with the cost of a store on NVIDIA's processors, kernel by kernel.
 const TABLE: &str = "| kernel | ga102 |";
 
 /// Processors: the table's name, and the number by which the layer knows it.

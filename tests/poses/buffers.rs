@@ -239,7 +239,7 @@ fn what_does_not_fit_buffers_is_refused() {
     let mix = |from, to, weight| PosePass::Mix { from, to, weight };
     let refused = |engine: &Engine, pass: PosePass<'_>, layout, result| {
         let request = engine.pass(pass, TRACKS, 4, layout);
-        // SAFETY: what is refused is not used.
+        // SAFETY: a refused buffer is not used.
         unsafe { request.target(result) }.unwrap_err()
     };
     let frame_major = Layout::FrameMajor;

@@ -122,7 +122,7 @@ impl Application {
     pub(crate) fn refused(&self, change: impl FnOnce(&mut VulkanHandles)) -> Error {
         let mut handles = self.handles();
         change(&mut handles);
-        // SAFETY: what is changed is refused before it is used.
+        // SAFETY: the changed handle is refused before it is used.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap_err()
     }
 

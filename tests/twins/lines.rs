@@ -177,7 +177,7 @@ impl Watch for Lane {
     }
 }
 
-/// A dispatch: its kernel, and what it reads.
+/// A dispatch: its kernel, and its inputs.
 struct Launch {
     kernel: Kernel,
     groups: [u32; 3],

@@ -17,7 +17,7 @@ use super::numbers::{Rule, Spot, by, results, spots};
 /// Calls of a function of which spots are listed.
 const LISTED_CALLS: usize = 500;
 
-/// Trials of a kernel, and what they store.
+/// Trials of a kernel, and their results.
 struct Tried {
     kernel: Kernel,
     trials: Vec<(Trial, Vec<u32>)>,

@@ -40,7 +40,7 @@ pub(super) enum Kind {
     Product,
     /// Another constant.
     Constant,
-    /// A neighbour of what is loaded or stored.
+    /// The neighbour of the address that is loaded or stored.
     Address,
 }
 
@@ -51,7 +51,7 @@ const RECENT_SPOTS: usize = 1024;
 
 thread_local! {
     static RULE: Cell<Rule> = const { Cell::new(Rule::AsWritten) };
-    /// The loads and stores of buffers: a sum of what says which invocation made each, and where.
+    /// A checksum of the loads and stores of buffers: which invocation made each, and where.
     static TOUCHED: Cell<u32> = const { Cell::new(0) };
     static LISTED: RefCell<BTreeSet<Spot>> = const { RefCell::new(BTreeSet::new()) };
     /// Spots that were listed last, by some of their bits: most are met thousands of times.
@@ -66,7 +66,7 @@ pub(super) fn by<T>(rule: Rule, action: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Where there can be mistakes in what an action does.
+/// The spots of an action at which there can be mistakes.
 pub(super) fn spots(action: impl FnOnce()) -> BTreeSet<Spot> {
     RECENT.set([None; RECENT_SPOTS]);
     by(Rule::Listing, action);

@@ -38,7 +38,7 @@ impl Trial {
     }
 }
 
-/// Compares trials of a kernel with what the CPU makes of them.
+/// Compares trials of a kernel with the CPU's results.
 fn assert_is<T: NoUninit>(kernel: Kernel, of_cpu: impl Fn(&Trial) -> Vec<T>) {
     let random = &mut Random::canonical();
     for round in 0..ROUNDS {

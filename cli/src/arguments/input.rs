@@ -587,7 +587,7 @@ impl GatheredInputs {
                 false => 0,
             };
             if found.is_empty() && excluded == 0 {
-                // Opening it reports what is wrong.
+                // Opening it reports the error.
                 return Expansion {
                     found: alone(),
                     excluded,

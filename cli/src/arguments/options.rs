@@ -1,7 +1,7 @@
 //! The options of a command line: which are explicit, the values of all, and, for the commands that write
 //! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
-//! it determines the bytes of results, and what it applies to. An option that has no effect is refused, with
-//! a remedy, and never ignored.
+//! it determines the bytes of results, and which inputs or results it applies to. An option that has no effect
+//! is refused, with a remedy, and never ignored.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -42,7 +42,7 @@ pub(crate) enum Bytes {
 
 /// The inputs or results to which an option applies.
 pub(crate) enum AppliesTo {
-    /// Whatever its command does; what depends on values is refused where these are used.
+    /// Everything that its command does; combinations that depend on values are refused where these are used.
     All,
     /// Inputs of formats that take it.
     Inputs(FormatOption),

@@ -179,7 +179,7 @@ enum InGaps {
     Hold,
 }
 
-/// `--end-frame`: what a result has at the end of a clip that ends between two frames.
+/// `--end-frame`: the last sample of a result whose clip ends between two frames.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EndFrameArguments {
     /// Where a clip ends between two frames: add a sample at its end (`key`), one frame more with the value of

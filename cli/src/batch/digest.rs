@@ -1,4 +1,4 @@
-//! SHA-256 of what is read and written, as `sha256sum` prints it.
+//! SHA-256 of inputs and results, as `sha256sum` prints it.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
@@ -224,7 +224,7 @@ pub(crate) fn of_bytes<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> String
 mod tests {
     use super::*;
 
-    /// A glTF with its buffer beside it is two files, of which either one determines what is read.
+    /// A glTF with its buffer beside it is two files, and the clips depend on both.
     #[test]
     fn an_input_is_all_files_that_it_refers_to() {
         let directory = tempfile::tempdir().unwrap();

@@ -95,7 +95,7 @@ pub(crate) struct ClipWork {
 }
 
 impl ClipWork {
-    /// Adds a warning about the clips, or about what is made of them.
+    /// Adds a warning about the clips, or about their results.
     pub(crate) fn warn(&self, warning: Diagnostic) {
         if self.prints {
             words::note(&warning.to_string());
@@ -205,7 +205,7 @@ struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
     progress: Progress,
-    /// A signal ends the batch at its next input, which then says what is done.
+    /// A signal ends the batch at its next input; the batch then says how much is done.
     _until_end: BatchGuard,
     options: ResultOptions,
     inputs: usize,
@@ -357,8 +357,8 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Keeps what was made of a file's clips, or its failure; gives whether it is kept. `report` is what JSON says
-    /// of it: the fields of one record, or a list of those of several.
+    /// Keeps the result of a file's clips, or its failure; returns whether it is kept. `report` is its part of the
+    /// JSON: the fields of one record, or a list of those of several.
     pub(crate) fn keep<T: Serialize>(
         &mut self,
         work: &ClipWork,

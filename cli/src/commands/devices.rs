@@ -1,4 +1,4 @@
-//! `tumble devices`: what Vulkan offers here, and whether it is exact.
+//! `tumble devices`: the Vulkan devices of this machine, and whether they are exact.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! `tumble info`: what is in a keyframe file, or in a file with a robot.
+//! `tumble info`: the contents of a keyframe file, or of a file with a robot.
 
 mod pickle;
 mod robot;

@@ -76,7 +76,7 @@ fn common(name: &str) -> Option<Colour> {
     })
 }
 
-/// The colour of what a frame makes of a path.
+/// The colour of bodies with a path frame.
 pub(crate) fn of_frame(frame: PathFrame) -> Colour {
     FRAMES[frame as usize]
 }

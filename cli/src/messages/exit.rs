@@ -35,7 +35,7 @@ pub(crate) struct Failure {
     is_of_one: bool,
     /// The code of the first error of an input.
     input_code: Option<Code>,
-    /// The messages of what failed in an input, which were printed before.
+    /// The messages of the errors in an input, which were printed before.
     causes: Vec<String>,
 }
 
@@ -195,12 +195,12 @@ impl Failure {
         &self.message
     }
 
-    /// The same with the messages of what failed, for the manifest and for JSON: they were printed.
+    /// The same with the messages of the errors, for the manifest and for JSON: they were printed.
     pub(crate) fn with_causes(self, causes: Vec<String>) -> Self {
         Self { causes, ..self }
     }
 
-    /// The messages of what failed in an input, where its own message is a summary of them.
+    /// The messages of the errors in an input, where its own message is a summary of them.
     pub(crate) fn causes(&self) -> &[String] {
         &self.causes
     }

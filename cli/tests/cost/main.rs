@@ -21,7 +21,7 @@ mod memory;
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// For as long as what is returned is kept, no other test allocates what would be counted.
+/// As long as the guard is kept, no other test allocates memory that would be counted.
 fn one_at_a_time() -> MutexGuard<'static, ()> {
     static ONE: Mutex<()> = Mutex::new(());
     ONE.lock().unwrap_or_else(PoisonError::into_inner)

@@ -9,7 +9,7 @@
 //!
 //! * `card copies`: something was submitted to the copying queue;
 //! * `card beside`: kernels were submitted while copies were held back;
-//! * `card disorder`: a copy waits for nothing, or for what was never submitted;
+//! * `card disorder`: a copy waits for nothing, or for a semaphore that no submission signals;
 //! * `card memory TYPE`: an allocation.
 
 use std::ffi::CStr;
@@ -67,7 +67,7 @@ unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
     }
 }
 
-/// The semaphores of a submission with their values: what it waits for, and what it reaches.
+/// The semaphores of a submission with their values: those it waits for, and those it signals.
 unsafe fn points(info: &vk::SubmitInfo<'_>) -> [Vec<(vk::Semaphore, u64)>; 2] {
     let mut next = info.p_next.cast::<vk::BaseInStructure<'_>>();
     // SAFETY: a chain of structures, and the arrays of this one.

@@ -406,7 +406,7 @@ unsafe extern "system" fn vkEnumeratePhysicalDevices(
     }
 }
 
-/// Each of the properties is six words, the first of which says what a queue can do.
+/// Each of the properties is six words; the first has the flags of the queue.
 unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties(
     device: Word,
     count: *mut u32,

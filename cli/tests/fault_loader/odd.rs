@@ -146,7 +146,7 @@ unsafe extern "system" fn vkMapMemory(
         && result == SUCCESS
     {
         assert_eq!((offset, mapped.views), (0, None), "mapped as a whole, once");
-        // SAFETY: the size is not 0, and all of what is allocated is written.
+        // SAFETY: the size is not 0, and all of the allocation is written.
         unsafe {
             let host = std::alloc::alloc(layout(mapped.size));
             host.write_bytes(0xa5, mapped.size);

@@ -1,4 +1,4 @@
-//! The loader that fails on purpose, and what it logs.
+//! The loader that fails on purpose, and its log.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -68,7 +68,7 @@ impl Loader {
         command
     }
 
-    /// A run with these faults, and what it logged.
+    /// A run with these faults, and its log.
     pub(super) fn run(
         &self,
         folder: &Path,

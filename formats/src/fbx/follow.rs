@@ -300,7 +300,7 @@ impl ChannelFollower<'_> {
             };
             open.push(*piece);
             while let Some(mut piece) = open.pop() {
-                // A cut lies on the other side of 0 from what was there before.
+                // A cut lies on the other side of 0 from the curve before.
                 let last = keys.len() - 1;
                 piece = self.after(piece, keys[last].1);
                 let cubic = Cubic::through(piece.ends, piece.thirds);

@@ -756,7 +756,7 @@ impl Cut {
 mod tests {
     use super::*;
 
-    /// Whole words of what is freed, without what something else uses.
+    /// Whole words of the freed ranges are cut, without the parts that other data use.
     #[test]
     fn what_is_used_is_never_cut() {
         let layout = |freed: &[Range<u64>], used: &[Range<u64>]| Layout {

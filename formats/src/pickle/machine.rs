@@ -37,7 +37,7 @@ const LONGEST_NUMBER: usize = 64;
 /// The largest number of arguments of a call, and of fields of a state that are looked at.
 const MAX_FIELDS: usize = 64;
 
-/// How many references are followed from an object to what it stands for.
+/// How many references are followed from an object to the value that it stands for.
 const MAX_REFERENCES: usize = 64;
 
 /// The index of a node.

@@ -39,7 +39,7 @@ fn expected() -> (Vec<usize>, Vec<usize>, Vec<f64>) {
     (whole("joints"), whole("frames"), part("rotations"))
 }
 
-/// Half the angle between a key and what is expected of it.
+/// Half the angle between a key and the expected one.
 fn apart(key: Quat, expected: &[f64]) -> f64 {
     let expected = DQuat::from_slice(expected);
     let key = key.as_dquat();

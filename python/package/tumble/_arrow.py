@@ -1,4 +1,4 @@
-"""Clips as rows of Arrow tables: what Spark, Daft, Ray Data and DuckDB hand to a function."""
+"""Clips as rows of Arrow tables, which Spark, Daft, Ray Data and DuckDB pass to a function."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _NAMES: tuple[_Name, ...] = (
     "angular_velocities",
 )
 _WIDTHS = {name: 4 if name.endswith("rotations") else 3 for name in _NAMES}
-# Where the arrays of a file start: a multiple of what any processor wants, and of a cache line.
+# Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
 _ALIGNED = 64
 _VERSION = 1
 # Members that every file has, besides those that the extension module looks for.
@@ -560,7 +560,7 @@ def _read(path: str) -> dict[str, Any]:
 
 
 def _mapped(path: str) -> dict[str, Any]:
-    """The arrays of a file that `_write` wrote, mapped where they are large. What NumPy has written again is read:
+    """The arrays of a file that `_write` wrote, mapped where they are large. A file that NumPy has written is read:
     its arrays may be compressed, and start anywhere."""
     found: dict[str, Any] = {}
     with zipfile.ZipFile(path) as archive, open(path, "rb") as file:

@@ -83,7 +83,7 @@ pub(crate) struct VulkanEngine {
     /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,
     free: FreeBuffers,
-    /// The CPU, for what the host computes.
+    /// The CPU, for the host's part of the work.
     pub(super) host: CpuEngine,
     pub(crate) timings: Mutex<Timings>,
 }
@@ -430,7 +430,7 @@ impl VulkanEngine {
         let bytes = (whole.len() * encoding.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
         let in_place = self.device.placing.in_place;
-        // Memory that a card copies into is dear to make: only for what is asked for again.
+        // Memory that a card copies into takes long to allocate: only for requests that are repeated.
         let kept = self.kept(job, &whole)?;
         let pays = in_place || kept.is_some();
         let residence = match in_place {

@@ -743,7 +743,7 @@ impl EvaluationJob<'_> {
         self.note_frames(std::slice::from_ref(&samples), target);
         let frames = &samples.frames;
         let timeline = samples.written_times(clip, name)?;
-        // The rotations, and twice what becomes of them.
+        // The rotations, and twice the size of their results.
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
         self.explain(name, clip, frames, Layout::FrameMajor, Delivery::InMemory)?;

@@ -43,7 +43,7 @@ pub(crate) enum Mark {
     Upright,
 }
 
-/// One pair of axes and what is drawn between them.
+/// One pair of axes, with the curves and marks between them.
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
     pub(crate) title: String,

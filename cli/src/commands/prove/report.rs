@@ -31,7 +31,7 @@ pub(crate) enum Verdict {
     Proved,
     /// Bits differ.
     BitsDiffer,
-    /// No bit differs of what was compared, but something was not.
+    /// No bit differs in the comparisons that were made, but some were not made.
     NotProved,
 }
 
@@ -175,7 +175,7 @@ pub(crate) struct GoldenSetting {
 pub(crate) struct RandomSection {
     pub(crate) seed: u64,
     pub(crate) rounds: u64,
-    /// Rounds in which both refused what was asked for.
+    /// Rounds in which both refused the request.
     pub(crate) rounds_refused: u64,
     pub(crate) crowds: u64,
     /// Rotations, velocities, accelerations and joints.

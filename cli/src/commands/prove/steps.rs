@@ -58,7 +58,7 @@ struct DeviceSetting {
     options: EngineOptions,
 }
 
-/// How kernels read and what an invocation takes; how results and uploads are moved; a memory budget.
+/// How kernels read, and the samples of an invocation; how results and uploads are moved; a memory budget.
 type SettingParts = (
     (Reads, Mapping, &'static str),
     (Transfer, Uploads, ReadBack, PrepareArcs, &'static str),

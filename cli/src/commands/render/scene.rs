@@ -57,7 +57,7 @@ impl Theme {
     };
 }
 
-/// Bodies, with what is drawn beside them on every frame.
+/// Bodies, with the curves that are drawn beside them on every frame.
 pub(crate) struct Actor {
     pub(crate) name: String,
     pub(crate) tracks: usize,
@@ -206,7 +206,7 @@ impl Scene {
             .collect();
         let centre = (low + high) / 2.0;
         let aspect = style.size.0 as f32 / style.size.1 as f32;
-        // Names are below the actors, which move up by half of what they take.
+        // Names are below the actors, which move up by half of the names' height.
         let below = match actors.iter().any(|actor| !actor.name.is_empty()) {
             true => overlay::Labels::share(style.size.1),
             false => 0.0,

@@ -192,7 +192,7 @@ const MAX_TRAILS: usize = 256;
 const GROUND: Colour = [0xa9, 0xc2, 0x8f];
 const OTHERS: Colour = [0x9c, 0x96, 0x90];
 
-/// The triangles of meshes relative to an origin: the ground, and what stands on it.
+/// The triangles of meshes relative to an origin: the ground, and the objects on it.
 pub(crate) fn meshes(meshes: &[Mesh], origin: DVec3) -> Vec<Face> {
     let mut faces = Vec::new();
     for (index, mesh) in meshes.iter().enumerate() {

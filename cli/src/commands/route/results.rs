@@ -102,7 +102,7 @@ impl RouteResults {
         self.plot.as_ref()
     }
 
-    /// Writes what was found, each file whole or not at all.
+    /// Writes the routes, each file whole or not at all.
     pub(super) fn write(&self, outcomes: &[RouteOutcome]) -> Result<(), Failure> {
         for (outcome, destination) in outcomes.iter().zip(&self.destinations) {
             if let Ok((_, rows)) = &outcome.found {

@@ -287,7 +287,7 @@ def _keys(
 
 
 def _manifest(location: str, size: int | None) -> dict[str, list[str]]:
-    """The lines of a merged manifest of that size, by what they are of."""
+    """The lines of a merged manifest of that size, by the keys of their inputs."""
     if (location, size) in _MANIFESTS:
         return _MANIFESTS[location, size]
     text = (read_text(store(location), "manifest.jsonl") or "") if size is not None else ""
