@@ -141,7 +141,7 @@ impl Renderer {
             let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
             let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            // Drivers without all of Vulkan (MoltenVK) are listed only with this extension and flag.
             let portability = ash::khr::portability_enumeration::NAME;
             let offered = entry.enumerate_instance_extension_properties(None)?;
             let is_offered = (offered.iter())

@@ -285,7 +285,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 size,
             };
             let write = |stretch| {
-                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                // SAFETY: the buffer is as it must be, and nothing else uses it.
                 unsafe {
                     clip.request(frames)
                         .layout(Layout::FrameMajor)
@@ -328,7 +328,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 if std::ptr::eq(engine, &raw const cpu) {
                     return [bytes.clone(), bytes];
                 }
-                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                // SAFETY: the buffer is as it must be, and nothing else uses it.
                 unsafe { request.to_buffer(range) }.unwrap();
                 let found = buffer.bytes();
                 // SAFETY: as above.

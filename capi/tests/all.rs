@@ -237,7 +237,7 @@ fn handles_of_cpp_free_themselves_and_have_the_engines_bits() {
     }
 }
 
-/// A chain of three joints, for those who have no model at hand.
+/// A chain of three joints, where no model is given.
 const CHAIN: &str = "HIERARCHY\nROOT hip\n{\nOFFSET 0 1 0\nCHANNELS 6 Xposition Yposition Zposition \
     Zrotation Xrotation Yrotation\nJOINT knee\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation \
     Yrotation\nJOINT foot\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\n\

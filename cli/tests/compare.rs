@@ -323,7 +323,7 @@ fn joints_are_matched_by_name_and_parent() {
 }
 
 /// A chain goes into another format and back, and a part of it into `.dat`, without a bit of
-/// difference; what `.dat` has no room for is named.
+/// difference; contents that `.dat` cannot hold are named.
 #[test]
 fn keys_come_back_as_dat() {
     let temporary = sample_folder();

@@ -67,8 +67,8 @@ fn expect_proof(run: &Run, proof: &Value, name: &str) {
     assert_eq!(faults(&schema("proof"), proof), Vec::<String>::new());
 }
 
-/// Everything, on both software drivers, under the validation layer too; each in a time that CI has. What both
-/// CPUs made of the same random rounds is the same, and `--compare` says so.
+/// Everything, on both software drivers, under the validation layer too; each in a time that CI has. The CPU's
+/// results of the same random rounds are the same in both, and `--compare` says so.
 #[test]
 fn the_software_drivers_are_proved_and_compared() {
     if !is_there(LAVAPIPE) || !is_there(SWIFTSHADER) {

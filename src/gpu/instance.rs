@@ -86,7 +86,7 @@ impl Instance {
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
         let layers = [VALIDATION.as_ptr()];
-        // Loaders list drivers that have not all of Vulkan (MoltenVK) only to those who say they know.
+        // Loaders list drivers without all of Vulkan (MoltenVK) only with this extension and flag.
         let portability = has_extension(None, khr::portability_enumeration::NAME)?;
         let extensions = [
             (debug_utils, ext::debug_utils::NAME),

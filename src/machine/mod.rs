@@ -1,12 +1,12 @@
-//! Machines: what evaluates. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement one trait, and the
-//! layers above know no other difference.
+//! Machines evaluate. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement one trait, and the layers
+//! above know no other difference.
 //!
 //! * [`Machine`]: evaluates rows of samples, takes prepared tracks ([`MachineClip`]) and crowds ([`MachineCrowd`]), and
 //!   runs passes over poses ([`PassRunner`]). A request goes to a machine as its [`Plan`](plan::Plan) says, which depends
 //!   on the machine's [`Limits`] alone.
 //! * [`ListedDevice`]: a device that is not open yet.
 //! * [`EngineOptions`], [`EvaluateError`], [`reports`] and the files that
-//!   are kept from process to process ([`cache`]): what every build has, with and without the feature `vulkan`.
+//!   are kept from process to process ([`cache`]): every build has them, with and without the feature `vulkan`.
 //!
 //! The traits have no methods for operations of Vulkan devices alone, such as writing into an application's buffer:
 //! callers ask for the device itself (`gpu::Opened::of`).

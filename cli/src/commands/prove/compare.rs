@@ -1,5 +1,5 @@
-//! `tumble prove --compare`: two proofs, of two devices or two builds. What both compared has to have the same
-//! bits; figures stand side by side.
+//! `tumble prove --compare`: two proofs, of two devices or two builds. Comparisons that both made must have the
+//! same bits; figures stand side by side.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The page: what `web/` was built into, and the results in it.
+//! The page that was built from `web/`, and the results in it.
 
 use std::collections::BTreeMap;
 
