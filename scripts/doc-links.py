@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Dead links in what `cargo doc` wrote: `doc-links.py FOLDER` names each page, its link and what is missing."""
+"""Dead links in the output of `cargo doc`: `doc-links.py FOLDER` names each page, its link and the fault."""
 
 import os
 import re

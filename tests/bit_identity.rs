@@ -524,8 +524,8 @@ fn engines_clips_and_results_are_send_and_sync() {
     check::<tumble::Error>();
 }
 
-/// The CPU at every width, and every Vulkan device. Opening them takes longer than most of what
-/// is asked of them.
+/// The CPU at every width, and every Vulkan device. Opening them takes longer than most evaluations
+/// by them.
 fn everywhere() -> Vec<Engine> {
     let widths = VectorWidth::available().into_iter().map(|width| {
         let mut options = EngineOptions::default();

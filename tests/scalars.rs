@@ -14,7 +14,7 @@ struct Case {
     curves: Vec<VectorCurve>,
 }
 
-/// Scalars of which some share their key times and some have tangents, so that packs have every size.
+/// Scalars, some of which share their key times and some of which have tangents, so that packs have every size.
 fn case(seed: u64, scalars: usize) -> Case {
     let mut random = Random(seed);
     let mut set = TrackSet::new();

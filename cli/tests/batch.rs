@@ -188,7 +188,7 @@ fn manifest(folder: &Path) -> Vec<serde_json::Value> {
         .collect()
 }
 
-/// A glTF is what its buffer beside it says too.
+/// The hash of a glTF includes its buffer beside it.
 #[cfg(unix)]
 #[test]
 fn an_input_is_all_files_that_it_refers_to() {

@@ -358,7 +358,7 @@ fn keys_come_back_as_dat() {
     assert!(report.contains("translation"), "{report}");
 }
 
-/// Trajectories in Unix time, of which one starts a second later: the poses of the first that the second
+/// Trajectories in Unix time, one of which starts a second later: the poses of the first that the second
 /// reaches, without its gaps.
 #[test]
 fn an_estimate_beside_its_reference() {

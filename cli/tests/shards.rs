@@ -130,7 +130,7 @@ fn missing_shards_are_named_and_made() {
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
 }
 
-/// A shard is done when its file is there and its inputs and outputs are what it says.
+/// A shard is done when its record is there and its inputs and outputs have the recorded hashes.
 #[test]
 fn resuming_looks_at_bytes() {
     let (temporary, bytes) = library();

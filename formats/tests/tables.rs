@@ -288,7 +288,7 @@ fn claims_are_refused_before_any_work() {
     }
 }
 
-/// Where bytes are damaged, and to what.
+/// The places of damaged bytes, and their new values.
 fn damage() -> impl Strategy<Value = Vec<(usize, u8)>> {
     prop::collection::vec((any::<usize>(), any::<u8>()), 1..6)
 }

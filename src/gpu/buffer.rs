@@ -265,7 +265,7 @@ impl Buffer {
     fn bind(&mut self, memory: Share, is_texels: bool, name: &str) -> Result<(), VulkanError> {
         let device = &self.device.raw;
         self.memory = memory; // goes with the buffer, also when a later step fails
-        // SAFETY: memory of a type that the buffer allows, of which nothing else uses this part.
+        // SAFETY: memory of a type that the buffer allows, and nothing else uses this part of it.
         unsafe { device.bind_buffer_memory(self.raw, memory.memory, memory.offset) }
             .named("vkBindBufferMemory")?;
         if is_texels {

@@ -38,7 +38,7 @@ impl PipelineCache {
         cache
     }
 
-    /// An application's cache, of which nothing is stored.
+    /// An application's cache, which the engine does not store.
     pub(crate) fn of_application(raw: vk::PipelineCache, physical: &PhysicalDevice) -> Self {
         Self {
             raw,

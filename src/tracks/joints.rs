@@ -189,8 +189,8 @@ impl Joints {
         &self.names
     }
 
-    /// The pairs of joints with equal names, and the joints without a partner. `clips` are what this clip and the other
-    /// are called in messages. Parents are not compared ([`Joints::check_parents`]).
+    /// The pairs of joints with equal names, and the joints without a partner. `clips` are the names of this clip and the
+    /// other in messages. Parents are not compared ([`Joints::check_parents`]).
     ///
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
@@ -217,7 +217,7 @@ impl Joints {
     }
 
     /// Adds the joints of the other clip that this one does not have, behind those that it has, and returns the index
-    /// here of each joint of the other. `clips` are what this clip and the other are called in messages. Joints whose
+    /// here of each joint of the other. `clips` are the names of this clip and the other in messages. Joints whose
     /// parents are not known become roots.
     ///
     /// # Errors
@@ -285,7 +285,7 @@ impl Joints {
     }
 
     /// For each joint of this clip, the index of the same joint in the other. Both have the same joints with the same
-    /// parents, where the parents of both are known. `clips` are what this clip and the other are called in messages.
+    /// parents, where the parents of both are known. `clips` are the names of this clip and the other in messages.
     ///
     /// # Errors
     /// The first difference.

@@ -161,7 +161,7 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
     };
     match name {
         "add_f32" | "sub_f32" | "subrev_f32" | "mul_f32" => true,
-        // One of its operands, and so does not round: made of a comparison and a selection, which
+        // The result is one of the operands, so it is not rounded: made of a comparison and a selection, which
         // differ from it for NaN and for the sign of zero alone.
         "min_f32" | "max_f32" => true,
         "cvt_f32_i32" | "cvt_f32_u32" | "cvt_f32_ubyte0" | "cvt_f32_ubyte1" | "cvt_f32_ubyte2"

@@ -76,8 +76,8 @@ pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Ve
     wrong
 }
 
-/// Why a cell of the table differs from what was measured. Another version of the compiler may differ by a
-/// little; a bound that is far above what is measured bounds nothing.
+/// Why a cell of the table differs from the measured number. Another version of the compiler may differ by a
+/// little; a bound that is far above the measured number is no use.
 fn differs(documented: &str, found: Cost) -> Option<String> {
     let numbers = documented.split_once(", ");
     let numbers = numbers.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));

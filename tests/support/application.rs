@@ -265,7 +265,7 @@ impl<'a> Commands<'a> {
         Self { application, pool }
     }
 
-    /// A command buffer with what `record` leaves in it.
+    /// A command buffer with the commands of `record`.
     pub(crate) fn recorded(&self, record: impl FnOnce(vk::CommandBuffer)) -> vk::CommandBuffer {
         let device = &self.application.device;
         let info = vk::CommandBufferAllocateInfo::default()

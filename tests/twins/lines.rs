@@ -535,7 +535,7 @@ fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     }
 }
 
-/// The CPU's result has the bits of what a dispatch stores: all of it, or as much as it stores.
+/// Asserts that a dispatch stores the bits of the CPU's result: all of it, or a part.
 fn assert_is_the_cpus(
     launch: &Launch,
     (set, frames): (&TrackSet, &SampleTimes),

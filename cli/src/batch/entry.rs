@@ -154,8 +154,8 @@ impl InputEntry {
             .then_some(entry)
     }
 
-    /// By what entries of one input are known to be of one: its result, or else its name behind a character that
-    /// no result begins with.
+    /// The key that entries of one input share: its result, or else its name behind a character that no result
+    /// begins with.
     pub(crate) fn key(&self) -> String {
         let by_input = || Self::key_by_input(&self.input);
         self.result.clone().unwrap_or_else(by_input)

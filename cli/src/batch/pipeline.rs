@@ -131,8 +131,8 @@ impl ClipWork {
         self.input.file.path()
     }
 
-    /// The result of this work: `done` says in its message what was done. `device` is what computed it;
-    /// `None` where nothing was computed.
+    /// The result of this work. `done` is the participle in its message. `device` is the device that computed it;
+    /// `None` if nothing was computed.
     pub(crate) fn result(
         &self,
         written: WrittenFile,

@@ -94,7 +94,7 @@ impl Failure {
         }
     }
 
-    /// An input of which nothing could be read: each of its parts was refused.
+    /// The failure of an input all of whose parts were refused.
     pub(crate) fn parts(refused: &[Diagnostic]) -> Self {
         let mut each = refused.iter().map(ToString::to_string);
         let first = each.next().unwrap_or_default();
@@ -249,7 +249,7 @@ fn is_of_one(error: &io::Error) -> bool {
 pub(crate) struct Outcomes {
     total: usize,
     failed: usize,
-    /// Inputs of which some animations are done.
+    /// The number of inputs with results of some animations only.
     failed_in_part: usize,
     /// The failure that ends the command.
     end: Option<Failure>,

@@ -46,7 +46,7 @@ fn somebodys_manifest_is_kept() {
             assert_eq!(fs::read_to_string(&path).unwrap(), content);
             assert_eq!(entries(&out).len(), 1, "{:?}", entries(&out));
         }
-        // A batch of which nothing comes is no reason either.
+        // A batch without any result does not replace it either.
         run(folder, &["eval", "bad.dat", "none.dat", "-o", "out"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), content);
     }
@@ -249,7 +249,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         let check = run(folder, &["check", "out"]);
         assert_eq!(check.code, 8, "{name}: {}", check.words);
     }
-    // Nor does anybody take such a file for a result that is there.
+    // Such a file does not count as an existing result.
     let result = out.join("a.npy");
     let others: [(&str, &dyn Fn()); 3] = [
         ("link", &|| symlink("../outside", &result).unwrap()),

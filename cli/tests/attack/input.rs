@@ -83,7 +83,7 @@ const COMMANDS: [&[&str]; 3] = [
     &["render", "-o", "film.gif", "--fps", "2", "--size", "32x32"],
 ];
 
-/// The commands that take any inputs, with what they need beside these: by [`COMMANDS`], a format and an output of
+/// The commands that take any inputs, with their other arguments: by [`COMMANDS`], a format and an output of
 /// all that make a result of each input, else nothing.
 fn taking_inputs() -> Vec<Vec<String>> {
     // One takes two inputs; the other writes one page for all of them.

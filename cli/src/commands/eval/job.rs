@@ -309,7 +309,7 @@ impl EvaluationJob<'_> {
         self.evaluated_as(&counted, (tracks, frames, span), method, written, order)
     }
 
-    /// As [`Self::evaluated`], with other words for what was evaluated.
+    /// As [`Self::evaluated`], with another noun for the samples in the message.
     fn evaluated_as(
         &self,
         counted: &str,
