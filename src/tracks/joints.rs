@@ -189,8 +189,8 @@ impl Joints {
         &self.names
     }
 
-    /// The pairs of joints with equal names, and the joints without a partner. `clips` are the names of this clip and the
-    /// other in messages. Parents are not compared ([`Joints::check_parents`]).
+    /// The pairs of joints with equal names, and the joints without a partner. `clips` are the names of this clip and
+    /// the other in messages. Parents are not compared ([`Joints::check_parents`]).
     ///
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
