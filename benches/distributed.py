@@ -1,4 +1,4 @@
-"""What a library costs over processes and machines: measured here, and modelled for a cluster.
+"""The cost of a library over processes and machines: measured here, and modelled for a cluster.
 
     python benches/distributed.py measure --tumble target/release/tumble 200 2000 20000
     python benches/distributed.py simulate --clips 1000000 --nodes 100 --cores 16
@@ -6,7 +6,7 @@
 `measure` wants the Python package and Ray; it makes clips of 22 tracks of 120 random keys, four seconds,
 whose 241 frames at 60 a second are 85 kB of NPY, and evaluates them by one process, by two that divide the
 shards, and by a Ray cluster of two nodes of one processor. `simulate` plays a run through, event by event,
-with constants that `measure` gave; docs/distributed.md has what came out.
+with constants that `measure` gave; docs/distributed.md has the results.
 """
 
 from __future__ import annotations

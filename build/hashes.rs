@@ -19,8 +19,8 @@ pub(crate) fn hash(bytes: &[u8]) -> String {
     format!("{hash:016x}")
 }
 
-/// The hashes of the shaders and of what is compiled of them, below a folder. Hidden files do not
-/// count, nor does how lines end, which a checkout may change.
+/// The hashes of the shaders and of the files compiled from them, below a folder. Hidden files do not
+/// count, nor do line endings, which a checkout may change.
 pub(crate) fn of_folder(root: &Path, folder: &str) -> io::Result<Hashes> {
     let mut found = Hashes::new();
     for entry in fs::read_dir(root.join(folder))? {

@@ -25,14 +25,14 @@ const WORLD: u64 = 2 * SIZE;
 /// Bytes from one pose to the next in a buffer of several: passes bind ranges from multiples of 256 on.
 const STEP: u64 = SIZE.next_multiple_of(256);
 
-/// What a renderer has: a device, a queue for the engine, and one for drawing.
+/// A renderer's objects: a device, a queue for the engine, and one for drawing.
 struct Renderer {
     entry: ash::Entry,
     instance: ash::Instance,
     physical_device: vk::PhysicalDevice,
     device: ash::Device,
     has_int64: bool,
-    /// For the engine alone: it submits to this queue, and nobody else may at the same time.
+    /// For the engine alone: it submits to this queue, and the application must not do so at the same time.
     compute: (vk::Queue, u32),
     /// The renderer's. The same one where the device has no other: then they alternate.
     graphics: (vk::Queue, u32),
@@ -46,7 +46,7 @@ impl Renderer {
             let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
             let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            // Drivers without all of Vulkan (MoltenVK) are listed only with this extension and flag.
             let portability = ash::khr::portability_enumeration::NAME;
             let offered = entry.enumerate_instance_extension_properties(None)?;
             let is_offered = (offered.iter())
@@ -134,7 +134,7 @@ impl Renderer {
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
     }
 
-    /// A buffer that both queue families may use, so that nobody needs to hand it over.
+    /// A buffer that both queue families may use, so that no transfer of ownership is needed.
     fn buffer(
         &self,
         size: u64,
@@ -169,7 +169,7 @@ impl Renderer {
         }
     }
 
-    /// What a renderer does with the poses: here its queue copies them to memory that the host reads.
+    /// Stands for the drawing of a renderer: its queue copies the poses to memory that the host reads.
     fn draw(&self, from: vk::Buffer, to: vk::Buffer) -> Result<(), Box<dyn Error>> {
         self.submit(self.graphics, |commands| {
             let region = vk::BufferCopy::default().size(SIZE);
@@ -209,9 +209,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// What is in memory that the host sees.
+    /// The content of memory that the host sees.
     fn read(&self, memory: vk::DeviceMemory, size: u64) -> Result<Vec<[f32; 4]>, vk::Result> {
-        // SAFETY: the memory is as long as what is read, and what writes it has ended.
+        // SAFETY: the memory has at least `size` bytes, and the commands that write it have ended.
         unsafe {
             let flags = vk::MemoryMapFlags::empty();
             let pointer = self.device.map_memory(memory, 0, size, flags)?;

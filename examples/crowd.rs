@@ -97,7 +97,7 @@ fn library() -> Result<CrowdLibrary, Box<dyn Error>> {
     Ok(library)
 }
 
-/// Everybody plays some clip from somewhere.
+/// Sets a clip, a time and a speed for every instance.
 fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
     for instance in 0..crowd.instance_count() {
         let plays = CrowdLayer {
@@ -122,7 +122,7 @@ fn go_on(crowd: &mut Crowd, frame: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a renderer has: a device and a queue.
+/// A renderer's objects: a device and a queue.
 struct Renderer {
     entry: ash::Entry,
     instance: ash::Instance,
@@ -141,7 +141,7 @@ impl Renderer {
             let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
             let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            // Drivers without all of Vulkan (MoltenVK) are listed only with this extension and flag.
             let portability = ash::khr::portability_enumeration::NAME;
             let offered = entry.enumerate_instance_extension_properties(None)?;
             let is_offered = (offered.iter())
@@ -251,7 +251,7 @@ impl Renderer {
     }
 
     fn read(&self, memory: vk::DeviceMemory, rows: usize) -> Result<Vec<[f32; 4]>, vk::Result> {
-        // SAFETY: nothing is in flight, and the memory is as long as what is read.
+        // SAFETY: nothing is in flight, and the memory is long enough.
         unsafe {
             let flags = vk::MemoryMapFlags::empty();
             let pointer = self.device.map_memory(memory, 0, vk::WHOLE_SIZE, flags)?;
@@ -270,7 +270,7 @@ struct Slot {
     memory: vk::DeviceMemory,
 }
 
-/// What was found on the device.
+/// The results and the times of the run on the device.
 struct DeviceRun {
     name: String,
     /// The result of the last frame.
@@ -342,7 +342,7 @@ fn on_device(
             let (from, before) = (Instant::now(), ALLOCATIONS.get());
             go_on(&mut crowd, frame)?;
             crowd.record(target, slot.commands)?;
-            // Most of the first frame is to tell the device what everybody plays.
+            // The first frame mostly uploads the layers of all instances.
             if frame > 0 {
                 host += from.elapsed();
             }
@@ -354,7 +354,7 @@ fn on_device(
             device.queue_submit(renderer.queue, &submit, slot.fence)?;
         }
     }
-    // SAFETY: nobody else uses the device.
+    // SAFETY: nothing else uses the device.
     unsafe { device.device_wait_idle()? };
     let wall = began.elapsed();
     let found = renderer.read(slots[(FRAMES - 1) % IN_FLIGHT].memory, rows)?;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The recorded hashes on aarch64 (NEON), by qemu: what CI has room for of scripts/platforms.sh.
+# The recorded hashes on aarch64 (NEON), by qemu: the part of scripts/platforms.sh that CI has room for.
 # `--fetch` only fetches what that needs beside qemu: Rust's standard library. The program is linked
 # statically, with the linker that comes with Rust, so no other compiler is needed.
 set -euo pipefail

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What mdBook needs to make a book of pages that are read in the repository too.
+"""Prepares pages that are read in the repository too for mdBook.
 
     mdbook build                       calls it for each chapter (book.toml)
     scripts/book.py check target/book  finds links that lead nowhere in the finished book

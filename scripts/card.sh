@@ -89,13 +89,13 @@ try() {
         rm -rf "$root"
         debootstrap --variant=minbase bookworm "$root" "$mirror" >"$place/debootstrap.log" 2>&1 ||
             fail "debootstrap failed: see $place/debootstrap.log"
-        # What apt is told of the network here.
+        # The settings of this system for names and proxies, which apt needs.
         cp /etc/resolv.conf "$root/etc/" 2>/dev/null || true
         cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
         chroot "$root" apt-get -qq update
         DEBIAN_FRONTEND=noninteractive chroot "$root" \
             apt-get -qq install --yes --no-install-recommends mesa-vulkan-drivers >/dev/null
-        # The loader is what the archive brings.
+        # The loader must be that of the archive.
         chroot "$root" dpkg --force-depends --purge libvulkan1 >/dev/null 2>&1 || true
         touch "$root/complete"
     fi

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What is promised of the CPU, on this machine or for another target that cargo has a runner for
+# Tests of all promises about the CPU, on this machine or for another target that cargo has a runner for
 # (`scripts/cpu-tests.sh TARGET`): recorded hashes at every vector width, bit identity between widths, accuracy
 # against the f64 reference, the twins of the shaders, and files that are written and read again. No Vulkan
 # device is asked for, and none is compared: `scripts/test.sh` does that, on Linux.
@@ -11,7 +11,7 @@ target=()
 # Where CI is set every test demands a Vulkan device.
 unset CI
 
-# Khronos' validator and what runs the program are left out: they are for the machine itself.
+# Tests by Khronos' validator and tests that run the program are left out: they are for the machine itself.
 engine=() parts=() files=(--skip validator)
 case ${1:-} in
 wasm32-*)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Dead links in what `cargo doc` wrote: `doc-links.py FOLDER` names each page, its link and what is missing."""
+"""Dead links in the output of `cargo doc`: `doc-links.py FOLDER` names each page, its link and the fault."""
 
 import os
 import re
@@ -24,7 +24,7 @@ def page(path):
 
 
 def missing(origin, link):
-    """What a link leads to that is not there."""
+    """The fault of a link: the file or the anchor is missing; else None."""
     path, _, anchor = link.partition("#")
     path = unquote(path.partition("?")[0])
     target = os.path.normpath(os.path.join(os.path.dirname(origin), path)) if path else origin

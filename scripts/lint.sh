@@ -11,7 +11,7 @@ if ! rustc --version | grep -q "^rustc $oldest\b" &&
     ./scripts/oldest.sh
 fi
 
-# What the dependencies may be (deny.toml), where the tool is installed.
+# The rules for dependencies (deny.toml), where the tool is installed.
 if cargo deny --version >/dev/null 2>&1; then
     cargo deny --log-level error check bans licenses sources
 else
@@ -24,7 +24,7 @@ if cargo clippy --version >/dev/null 2>&1; then
     # No other call compiles the tests that run on demand.
     cargo clippy --workspace --test load --quiet -- -D warnings
 fi
-# What users see, with links that lead somewhere; then what authors see.
+# The documentation for users, whose links must lead somewhere; then that for authors, with private items.
 export RUSTDOCFLAGS="-D warnings"
 rm -rf target/doc
 cargo doc --workspace --no-deps --quiet
@@ -34,8 +34,8 @@ cargo doc --workspace --no-deps --document-private-items --quiet
 # The engine without Vulkan, as an application builds it that wants the CPU alone.
 CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/without_vulkan/Cargo.toml
 
-# What would be published can be packed: versions, licences, files. It is not built once more: that all
-# that a package includes lies in it is a test (tests/tidy.rs).
+# The packages to publish can be packed: versions, licences, files. They are not built once more, because a test
+# (tests/tidy.rs) checks that a package has all files that it includes.
 cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \
     -p tumble -p tumble-formats -p tumble-routes -p tumble-cli
 

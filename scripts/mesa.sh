@@ -49,7 +49,7 @@ extract() {
             --no-anchored --exclude '*/lib64/*' --transform 's|.*/||' "$@" 2>/dev/null || true # not every package has each
     done
 }
-# NVK, and what it is linked to.
+# NVK and the libraries that it is linked to.
 nvk=(mesa-vulkan-drivers mesa-drm-shim libc6 libgcc-s1 libstdc++6 libdrm2 libexpat1 zlib1g libzstd1
     libwayland-client0 libffi8 libxau6 libxdmcp6 libxcb1 libx11-xcb1 libxcb-dri3-0 libxcb-present0
     libxcb-xfixes0 libxcb-sync1 libxcb-randr0 libxcb-shm0 libxshmfence1)

@@ -20,7 +20,8 @@ module() {
     built=$target/$name/$1/tumble_npm.wasm
 }
 
-# What decides the module's border and its bits; a test of the program compares it (cli/tests/view_live.rs).
+# The hash of the files that decide the module's interface and its bits; a test of the program compares it
+# (cli/tests/view_live.rs).
 sources() {
     cat npm/Cargo.toml npm/src/*.rs formats/src/motion/{packed,sample,world}.rs \
         src/verify/golden.txt | sha1sum | cut -d ' ' -f 1

@@ -71,8 +71,8 @@ fetch_validator() {
     fi
 }
 
-# What the tests need, fetched beside what is compiled. A newer lavapipe, and AMD's compiler for cards
-# of today (tests/mesa), come with scripts/mesa.sh.
+# Fetches the tools that the tests need, while the workspace is compiled. A newer lavapipe, and AMD's compiler
+# for cards of today (tests/mesa), come with scripts/mesa.sh.
 fetch() {
     [ $# -eq 0 ] || install_packages "$@"
     running=()
@@ -90,7 +90,7 @@ sudo=""
 missing=$(missing_packages | tr '\n' ' ')
 if [ -n "$missing" ]; then
     if command -v apt-get >/dev/null; then
-        # A password is asked for here: what runs beside the rest has no terminal.
+        # A password is asked for here, because commands in the background have no terminal.
         [ "$(id -u)" -eq 0 ] || { sudo="sudo" && { sudo -n true 2>/dev/null || sudo -v || true; }; }
     else
         echo "the tests want these packages of Debian's, or your system's for the same: $missing." >&2
@@ -110,7 +110,7 @@ if [ -z "${CI:-}" ]; then
 elif cargo fmt --version >/dev/null 2>&1; then
     cargo fmt --check
 fi
-# What the tests are, and the Python package's extension: one after the other would leave a core idle.
+# The tests and the Python package's extension in one build: two builds in turn would leave a core idle.
 cargo build --workspace --lib --bins --tests --examples --quiet
 wait "$fetching" || {
     echo "what the tests need could not be fetched: see above" >&2
@@ -126,8 +126,8 @@ fi
 
 # Three seconds for each fuzz target, about a quarter for files of each format; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
-# The Python package waits for processes that it starts more than it computes, and other tests for their last
-# one: what runs beside the engine's tests keeps both cores busy.
+# The Python package's tests wait for processes more than they compute, and other tests wait for their last
+# one: run beside the engine's tests, they keep both cores busy.
 beside=()
 start_beside() { # a file for what it says, a command
     local said=$1
@@ -138,7 +138,7 @@ start_beside() { # a file for what it says, a command
 others() {
     local failed=0
     cargo test --workspace --no-fail-fast --test cost --test fuzz || failed=$?
-    # Thousands of lines are what the program tells its users of each result.
+    # The log has thousands of lines: the program's messages about each result.
     cargo test --workspace --test options 2>target/options.log || {
         failed=$?
         tail -n 100 target/options.log

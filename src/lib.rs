@@ -6,7 +6,7 @@
 //! use tumble::{Device, Engine, SampleTimes, TrackSet, method};
 //! use glam::Quat;
 //!
-//! // 1. What was loaded: tracks of unit quaternions with key times in seconds.
+//! // 1. The loaded motion: tracks of unit quaternions with key times in seconds.
 //! let mut set = TrackSet::new();
 //! let keys = [0.0, 0.7, 2.0, 1.1].map(Quat::from_rotation_z);
 //! set.push("elbow", &[0.0, 0.5, 1.25, 2.0], &keys)?;

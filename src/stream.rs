@@ -113,7 +113,7 @@ pub(crate) fn run<E: From<Error>>(
             let (window, rotations) = result?;
             let count = window.len();
             sink(Chunk::new(window, &rotations[..count], quantity))?;
-            let _ = give_back.send(rotations); // nobody needs it after the last
+            let _ = give_back.send(rotations); // fails after the last chunk
         }
         Ok(())
     })

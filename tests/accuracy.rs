@@ -384,7 +384,7 @@ fn times_of_frames_are_within_rounding_of_frames() {
     }
 }
 
-/// Catches infinities times zero: intervals at the end of what f64 can tell apart.
+/// Catches infinities times zero: intervals between neighbouring numbers of f64.
 #[test]
 fn keys_next_to_nothing_apart_give_unit_quaternions() {
     let tiny = 5e-324;

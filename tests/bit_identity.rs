@@ -172,7 +172,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let variants = transfers.map(|transfer| KERNEL_OPTIONS.map(|kernel| (transfer, kernel)));
     for (variant, (transfer, (reads, mapping))) in variants.concat().into_iter().enumerate() {
         for (budget, memory) in budgets.into_iter().enumerate() {
-            // Opening a device takes longer than what is asked of it.
+            // Opening a device takes longer than evaluating on it.
             if !is_due(variant, budget, 2) {
                 continue;
             }
@@ -475,7 +475,7 @@ fn reused_buffers_hold_nothing_of_older_results() {
     }
 }
 
-/// What a user of several threads does; a Vulkan queue takes one at a time.
+/// Several threads evaluate one clip at the same time; a Vulkan queue takes one submission at a time.
 #[test]
 fn several_threads_share_an_engine() {
     let set = hostile_set(31, 32);
@@ -512,7 +512,7 @@ fn nothing_to_evaluate_is_no_error() {
     }
 }
 
-/// What callers move into threads and share between them.
+/// The types that callers move into threads and share between them.
 #[test]
 fn engines_clips_and_results_are_send_and_sync() {
     fn check<T: Send + Sync>() {}
@@ -524,8 +524,8 @@ fn engines_clips_and_results_are_send_and_sync() {
     check::<tumble::Error>();
 }
 
-/// The CPU at every width, and every Vulkan device. Opening them takes longer than most of what
-/// is asked of them.
+/// The CPU at every width, and every Vulkan device. Opening them takes longer than most evaluations
+/// by them.
 fn everywhere() -> Vec<Engine> {
     let widths = VectorWidth::available().into_iter().map(|width| {
         let mut options = EngineOptions::default();
@@ -957,8 +957,8 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
     }
 }
 
-/// Tracks of two keys alone have their own route on the CPU, and have polynomials that
-/// nobody fitted: the same bits as by segments, at every width, and near the reference.
+/// Sets whose tracks all have two keys take another route on the CPU, with polynomials that
+/// were not fitted: the same bits as by segments, at every width, and near the reference.
 #[test]
 fn crowds_of_two_keys_have_the_same_bits() {
     let mut random = Random(79);

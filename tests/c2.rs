@@ -175,7 +175,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
     assert_eq!(other.warnings(&set), []);
 }
 
-/// Of hostile keys the reference's acceleration, which is a difference of velocities along the curve, is the same
+/// For hostile keys the reference's acceleration, which is a difference of velocities along the curve, is the same
 /// on both sides of every key but those that the engine's warning counts: both took one solution.
 #[test]
 fn engine_and_reference_take_one_solution_of_hostile_keys() {

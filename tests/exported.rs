@@ -1,4 +1,4 @@
-//! Results in memory that a device exports: the bits of the CPU, whoever drops what first.
+//! Results in memory that a device exports have the bits of the CPU, in whatever order their objects are dropped.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -8,7 +8,7 @@ use tumble::{Device, Encoding, Engine, EngineOptions, Error, Layout, SampleTimes
 
 use crate::support::{dense_set, hostile_set, vulkan_devices};
 
-/// What lies in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
+/// The bytes in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
 /// second word says where the memory starts.
 fn bytes(result: &ExportedResult) -> Vec<u8> {
     let file = File::from(result.memory_file().unwrap());
@@ -68,7 +68,7 @@ fn exported_results_have_the_bits_of_the_cpu() {
     assert!(exported > 0, "no device of this machine exports memory");
 }
 
-/// The memory outlives its clip, its engine and all handles of ours, and what is dropped at once was waited for.
+/// The memory outlives its clip, its engine and all handles of ours; dropping a result waits for its work.
 #[test]
 fn exported_memory_lives_as_long_as_somebody_has_it() {
     let cpu = Engine::new(Device::Cpu).unwrap();

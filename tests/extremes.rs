@@ -325,7 +325,7 @@ impl Generator {
     }
 }
 
-/// What a set tells about itself.
+/// Calls the methods by which a set is read and selected from, with any arguments.
 fn ask(generate: &mut Generator, set: &TrackSet) {
     let index = generate.count();
     let _ = (
@@ -374,7 +374,7 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     let _ = engine
         .explain_route(set, interpolation, &frames, layout)
         .is_ok();
-    // What is large and still fits is evaluated elsewhere, in time; what does not fit is refused here.
+    // A large result that fits takes too long here and is tested elsewhere; one that does not fit is refused below.
     if (limit as u64..1 << 32).contains(&(count as u64)) {
         return;
     }
@@ -486,7 +486,7 @@ fn combine(generate: &mut Generator, engine: &Engine) {
     }
 }
 
-/// What takes numbers alone.
+/// Calls functions that take numbers alone.
 fn small_things(generate: &mut Generator) {
     let layout = generate.layout();
     let _ = layout.index(

@@ -77,7 +77,7 @@ fn results_have_the_recorded_hashes() {
     );
 }
 
-/// Names are what hashes are recorded by.
+/// Hashes are recorded by names.
 #[test]
 fn no_two_cases_have_one_name() {
     let golden = Golden::new();

@@ -1,4 +1,4 @@
-//! What lists the methods beside `METHODS`: the table of the guide, that of the errors, and the names in the
+//! The lists of methods besides `METHODS`: the table of the guide, that of the errors, and the names in the
 //! Python package's stubs. `UPDATE_EXPECTED=1 cargo test -p tumble --test all -- method_lists accuracy motion`
 //! writes them.
 

@@ -1,5 +1,5 @@
-//! Every number that a caller gives: what is not finite is refused by a typed error that names the option
-//! and the value, and whatever is accepted gives finite results.
+//! Every number that a caller gives: one that is not finite is refused by a typed error that names the option
+//! and the value, and every accepted one gives finite results.
 
 use glam::{Affine3A, DQuat, DVec3, Quat, Vec3};
 use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues};
@@ -12,7 +12,7 @@ use tumble::{
 
 type Computed = Result<Vec<f64>, Box<dyn std::error::Error>>;
 
-/// A number of an interface: its name, the word that its error must have, and what is made with it.
+/// A number of an interface: its name, the word that its error must have, and the call that takes it.
 struct Number {
     name: &'static str,
     word: &'static str,

@@ -39,7 +39,7 @@ fn set(seed: u64, keys: usize) -> TrackSet {
     set
 }
 
-/// What the words say, by the reference.
+/// The reference's rotation, with the wrap modes as the documentation defines them.
 fn expected(curve: &ReferenceCurve, track: Track, sides: [WrapMode; 2], time: f64) -> DQuat {
     let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
     let length = last - first;
@@ -236,7 +236,7 @@ fn two_keys_go_on_turning() {
     );
 }
 
-/// However far away, what is repeated or goes on stays a rotation. (Found by fuzzing.)
+/// However far away, a repeated or extrapolated motion consists of rotations. (Found by fuzzing.)
 #[test]
 fn times_beyond_counting_give_rotations() {
     let set = set(3, 6);
@@ -260,8 +260,8 @@ fn times_beyond_counting_give_rotations() {
     }
 }
 
-/// Turns of nearly 360° within a nanosecond, as authored: c2's iteration flees, and what it
-/// gives is its curve without the bends. (Found by fuzzing.)
+/// Turns of nearly 360° within a nanosecond, as authored: c2's iteration diverges, and the result
+/// is its curve without the bends. (Found by fuzzing.)
 #[test]
 fn wild_turns_as_authored_give_rotations() {
     let mut set = TrackSet::new();

@@ -51,7 +51,7 @@ fn exact(layer: &Rotations, index: usize) -> DQuat {
     layer.as_quats()[index].as_dquat().normalize()
 }
 
-/// The same bits from all, and what the first gives.
+/// Asserts the same bits of all engines; the result of the first.
 fn agreed(label: &str, of: impl Fn(&Engine) -> Rotations) -> Rotations {
     let engines = engines();
     let first = of(&engines[0]);

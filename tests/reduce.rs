@@ -16,7 +16,7 @@ const CURVES: [ReducedCurve; 3] = [
     ReducedCurve::GltfCubic,
 ];
 
-/// What an evaluation in f32 may add, radians; of positions relative to their size.
+/// The error that an evaluation in f32 may add: radians, or for positions a part of their size.
 const ROUNDING: f64 = 1e-6;
 
 fn angle(a: DQuat, b: DQuat) -> f64 {
@@ -173,7 +173,7 @@ fn what_needs_few_keys_gets_few() {
         leaving.distance(DVec3::new(0.0, -1.0, -2.0)) < 1e-3,
         "{leaving}"
     );
-    // What stands still has no tangents.
+    // A joint that stands still has tangents of 0.
     let found = reduce_rotations(&times, &still, 1e-6, ReducedCurve::GltfCubic).unwrap();
     assert_eq!(
         found.tangents[0].map(|tangent| tangent.to_array()),

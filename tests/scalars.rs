@@ -1,4 +1,4 @@
-//! Scalars: what the textbook says, with the same bits on every device.
+//! Scalars agree with the textbook, with the same bits on every device.
 
 use glam::DVec3;
 use tumble::reference::VectorCurve;
@@ -14,7 +14,7 @@ struct Case {
     curves: Vec<VectorCurve>,
 }
 
-/// Scalars of which some share their key times and some have tangents, so that packs have every size.
+/// Scalars, some of which share their key times and some of which have tangents, so that packs have every size.
 fn case(seed: u64, scalars: usize) -> Case {
     let mut random = Random(seed);
     let mut set = TrackSet::new();

@@ -169,7 +169,7 @@ fn the_same_bits_on_every_device() {
             let norm = q.as_dquat().length();
             assert!((norm - 1.0).abs() < 1e-6, "{method}, {index}: {q}");
         }
-        // What takes long is to prepare the curves, again for each.
+        // Only some devices, because preparing the curves for each takes long.
         for (i, vulkan) in devices.iter().enumerate() {
             if !is_due(round, i, devices.len()) {
                 continue;

@@ -147,7 +147,7 @@ fn vectors_times_scalars_become_products_of_vectors() {
     assert_eq!(passed[3], module[3] + found as u32, "the bound of the ids");
     assert_eq!(splat_products(&passed).unwrap(), passed);
     assert!(no_contraction(&passed).is_ok());
-    // Of a type that is no vector.
+    // A component of a type that is no vector.
     let header = [0x0723_0203, 0x1_0300, 0, 9, 0];
     let stray = [&header[..], &[5 << 16 | 142, 1, 2, 3, 4]].concat();
     assert_eq!(splat_products(&stray), Err(SpirvError::Incomplete));
@@ -270,7 +270,7 @@ fn textures_of_one_dimension_become_texel_buffers() {
     );
     let passed = texel_buffers(&module).unwrap();
     validate("texels", "vulkan1.1", &passed);
-    // Dimension and whether it is an array; capabilities; what a fetch says of levels.
+    // The dimension and whether it is an array; capabilities; the level of a fetch.
     let all = instructions(&passed);
     let of = |requested: u16| all.iter().filter(move |(opcode, _)| *opcode == requested);
     let mut dimensions: Vec<u32> = of(25).map(|(_, operands)| operands[2]).collect();

@@ -11,7 +11,7 @@ fn devices() -> Vec<Device> {
     [vec![Device::Cpu], vulkan_devices()].concat()
 }
 
-/// What a file of the chunks would hold.
+/// The chunks put together, as a file would hold them.
 #[derive(Default)]
 struct Collected {
     rotations: Vec<Quat>,
@@ -203,7 +203,7 @@ fn parts_are_those_of_the_whole() {
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
                     }
-                    // Of the set only that part is prepared.
+                    // Only that part of the set is prepared.
                     let of_set = engine.request(&set, interpolation, frames).layout(layout);
                     let of_set = of_set.tracks(tracks.clone()).samples(part.clone());
                     let bytes = of_set.clone().encoding(encoding).evaluate_bytes().unwrap();
@@ -398,7 +398,7 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
     }
 }
 
-/// What a set cannot be is refused when it is uploaded, also where nothing is prepared yet.
+/// An interpolation that a set cannot have is refused when the set is uploaded, even if nothing is prepared yet.
 #[test]
 fn what_cannot_be_interpolated_is_refused_before_it_is_made_piece_by_piece() {
     let mut options = EngineOptions::default();

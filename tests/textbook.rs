@@ -1,5 +1,5 @@
-//! The reference against the textbook: what is true of these curves whatever the
-//! keys. The engine is measured against the reference in `accuracy.rs`.
+//! The reference against the textbook: properties of these curves for all keys.
+//! The engine is measured against the reference in `accuracy.rs`.
 
 use std::f64::consts::TAU;
 

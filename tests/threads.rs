@@ -1,5 +1,5 @@
-//! Whoever calls from whatever thread: nothing hangs, and no thread that is refused ends the program.
-//! What may hang runs in a process of its own, which is ended after a while.
+//! Calls from any thread do not hang, and a thread that the system refuses does not end the program.
+//! Tests that may hang run in a process of their own, which is ended after a while.
 #![allow(unsafe_code)] // the buffers of an application's device
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -29,7 +29,7 @@ fn child(test: &str) -> Command {
     command
 }
 
-/// Many times what a loaded machine needs for what takes seconds.
+/// Many times the time that a loaded machine needs for work of seconds.
 const LIMIT: Duration = Duration::from_secs(300);
 
 /// Waits for a process, and ends it after a while.
@@ -53,8 +53,8 @@ fn runs(mut command: Command) -> Result<(), String> {
     finish(command.stdout(Stdio::null()).spawn().unwrap())
 }
 
-/// Rayon's workers take up other tasks while they wait: what a call has locked meanwhile, the next task
-/// on the same thread would wait for, for ever.
+/// Rayon's workers take up other tasks while they wait: if a call held a lock meanwhile, the next task on the
+/// same thread would wait for it for ever.
 #[test]
 fn tasks_of_a_callers_own_pool_may_call_everything_at_once() {
     let rounds = std::env::var("SOAK").map_or(2, |_| 200);
@@ -341,8 +341,8 @@ fn to_application_buffers() {
     }
 }
 
-/// What fits one thread needs no others; what does not is refused with an error, and a copy is made by
-/// one thread. Address space for a thousand stacks is more than this process may have.
+/// Work for one thread starts no others. Work for several is refused with an error, and a copy is made by one
+/// thread. Address space for a thousand stacks is more than this process may have.
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_the_system_refuses_are_an_error() {

@@ -101,9 +101,8 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
     assert!(unsafe_lines > 200, "only {unsafe_lines} were found");
 }
 
-/// Of the system's library, the compiler's (`powi`), or glam's that call them: their last bit is another on
-/// another system, or with another compiler. `libm`'s are the same everywhere, and so are those of
-/// `math::quaternion`.
+/// Functions of the system's library, the compiler's (`powi`), or glam's that call them: their last bit is another on
+/// another system, or with another compiler. Those of `libm` and of `math::quaternion` are the same everywhere.
 const DIFFERS_BY_SYSTEM: [&str; 36] = [
     ".sin()",
     ".cos()",
@@ -200,7 +199,7 @@ fn every_shader_function_has_its_twin() {
         let name = shader.file_stem().unwrap().to_str().unwrap();
         let Some(twin) = text.lines().find_map(|line| line.split("Twin: ").nth(1)) else {
             let glue = [
-                // Entry points and what leads samples through them.
+                // Entry points, and the functions that lead samples through them.
                 "from_keys",
                 "poses",
                 "runs",
@@ -425,7 +424,7 @@ fn every_page_is_listed_and_no_link_is_dead() {
     assert!(links > 100, "only {links} links were found");
 }
 
-/// A crate that nobody can say the use of is one to leave out.
+/// A dependency without a stated use can be left out.
 #[test]
 fn every_dependency_is_justified() {
     let manifest = read("Cargo.toml");
@@ -449,8 +448,6 @@ fn every_dependency_is_justified() {
     assert!(count > 30, "only {count} dependencies were found");
 }
 
-/// The oldest Rust that works is the one that the tests run with; a newer one may be used,
-/// and is not asked for.
 /// Catches a program with its symbols, a fifth of its size: a profile's entry for a package takes the profile's
 /// `strip` away.
 #[test]
@@ -467,6 +464,8 @@ fn the_program_is_stripped() {
     );
 }
 
+/// The oldest Rust that works is the one that the tests run with; a newer one may be used,
+/// and is not asked for.
 #[test]
 fn the_oldest_rust_is_declared_once() {
     let declared = read("Cargo.toml")
@@ -792,6 +791,91 @@ fn a_retired_word_is_found() {
         (11, "what"),
     ];
     assert_eq!(retired_identifiers(text), expected);
+}
+
+/// Folders with other sources than Rust, and the endings of these.
+const OTHER_SOURCES: [(&str, &str); 7] = [
+    ("shaders", "wgsl"),
+    ("web/src", "js"),
+    ("npm/package", "js"),
+    ("npm/package", "ts"),
+    ("npm/tests", "js"),
+    ("npm/tests", "mts"),
+    ("formats/tests/validator", "mjs"),
+];
+
+/// Beginnings of comments whose subject is a clause.
+const CLAUSES: [&str; 4] = ["What", "Whoever", "Who", "Of several"];
+
+/// The text of a line that is a comment.
+fn comment(line: &str) -> Option<&str> {
+    let text = line.trim_start().strip_prefix("//")?;
+    Some(text.strip_prefix(['/', '!']).unwrap_or(text).trim_start())
+}
+
+/// Whether a comment begins with a clause. The help of an option may: "What to draw".
+fn begins_with_clause(comment: &str) -> bool {
+    CLAUSES.iter().any(|clause| {
+        comment.strip_prefix(clause).is_some_and(|rest| {
+            let next = rest.trim_start();
+            length_of_word(rest) == 0 && &next[..length_of_word(next)] != "to"
+        })
+    })
+}
+
+/// A reader of "What is done with X" must find the verb before the subject; "The treatment of X" says it at once.
+#[test]
+fn comments_name_their_subject_first() {
+    let rust = SOURCES.iter().flat_map(|folder| files(folder, "rs"));
+    let others = OTHER_SOURCES
+        .iter()
+        .flat_map(|(folder, extension)| files(folder, extension));
+    let (mut wrong, mut comments) = (Vec::new(), 0);
+    for path in rust.chain(others) {
+        let relative = path.strip_prefix(root()).unwrap();
+        if relative.iter().any(|part| part == "target") {
+            continue;
+        }
+        for (i, line) in read(&path).lines().enumerate() {
+            let Some(text) = comment(line) else { continue };
+            comments += 1;
+            if begins_with_clause(text) {
+                wrong.push(format!("{}:{}: {text}", relative.display(), i + 1));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} comments begin with a clause; name the thing instead (\"The result of …\", \"Files that …\"), or say how \
+         or why (\"How …\", \"… because …\"):\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+    assert!(comments > 10_000, "only {comments} comments were read");
+}
+
+/// The test of the comments can fail.
+#[test]
+fn a_comment_that_begins_with_a_clause_is_found() {
+    let refused = [
+        "What is drawn",
+        "Who asks",
+        "Whoever asks",
+        "Of several errors, the first",
+    ];
+    assert!(refused.into_iter().all(begins_with_clause));
+    let accepted = [
+        "What to draw",
+        "Whole numbers",
+        "Whatever it is",
+        "The result",
+        "Of a set",
+    ];
+    assert!(!accepted.into_iter().any(begins_with_clause));
+    for line in ["// a", "    /// a", "//! a"] {
+        assert_eq!(comment(line), Some("a"));
+    }
+    assert_eq!(comment("a / b // c"), None);
 }
 
 /// The type that the inherent `impl` at a token is of; none for those of traits and for types (`impl Iterator`).

@@ -18,7 +18,7 @@ const MODES: [WrapMode; 4] = [
     WrapMode::Extrapolate,
 ];
 
-/// What no result has.
+/// Numbers that no result has, to find samples that were not written.
 const POISON: [f32; 4] = [f32::NAN; 4];
 
 /// A time of any magnitude up to 1e18 s.

@@ -1,5 +1,4 @@
-//! Translations and scales beside rotations: what the textbook says, with the same bits on
-//! every device.
+//! Translations and scales beside rotations agree with the textbook, with the same bits on every device.
 
 use crate::support::{KERNEL_OPTIONS, Random, is_due, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};

@@ -40,7 +40,7 @@ fn what_compared_nothing_has_not_passed() {
     assert!(Verdict::Failed > Verdict::Nothing && Verdict::Nothing > Verdict::ReferenceOnly);
 }
 
-/// Somebody's results: the engine's bits, the other sign of one, glam's slerp, a wrong one, NaN and none.
+/// Results of other programs: the engine's bits, the other sign of one, glam's slerp, a wrong one, NaN and none.
 #[test]
 fn results_of_others_are_told_apart() {
     let (set, frames) = (set(), SampleTimes::fps(60));

@@ -218,7 +218,7 @@ fn every_way_of_copying_gives_the_same_bits() {
     }
 }
 
-/// A renderer hands in what it has.
+/// A renderer passes its own instance, device and queue.
 #[test]
 fn an_applications_own_device_gives_the_same_bits() {
     if vulkan_devices().is_empty() {
@@ -275,7 +275,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 .encoding(encoding)
                 .evaluate_bytes()
                 .unwrap();
-            // Not at the start, and not aligned to what devices like.
+            // Not at the start, and not at an alignment that devices prefer.
             let offset = 5 * encoding.bytes() as u64;
             let size = expected.len() as u64;
             let (buffer, memory) = application.buffer(offset + size);
@@ -285,7 +285,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 size,
             };
             let write = |stretch| {
-                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                // SAFETY: the buffer is as it must be, and nothing else uses it.
                 unsafe {
                     clip.request(frames)
                         .layout(Layout::FrameMajor)
@@ -315,7 +315,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
         }
     }
     let cpu = Engine::new(Device::Cpu).unwrap();
-    // Of a set, some samples of some tracks: only what they need is prepared.
+    // Some samples of some tracks of a set: only the segments that they need are prepared.
     for (frames, samples) in [(&frames, 100..150), (&sparse, 1..2)] {
         for method in [method::SLERP, method::C2] {
             let part = |engine: &Engine| {
@@ -328,7 +328,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 if std::ptr::eq(engine, &raw const cpu) {
                     return [bytes.clone(), bytes];
                 }
-                // SAFETY: the buffer is as it must be, and nobody else uses it.
+                // SAFETY: the buffer is as it must be, and nothing else uses it.
                 unsafe { request.to_buffer(range) }.unwrap();
                 let found = buffer.bytes();
                 // SAFETY: as above.
@@ -350,8 +350,8 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
     assert!(result.is_err());
 }
 
-/// Catches a store beside the caller's memory, which software devices write where it is, and
-/// what is left out there: at any offset in its pages, in windows, repaired by the host, in every encoding.
+/// Catches a store beside the caller's memory, which software devices write in place, and samples that are
+/// left out: at any offset in its pages, in windows, repaired by the host, in every encoding.
 #[test]
 fn the_callers_memory_gets_the_result_and_nothing_else() {
     let cpu = Engine::new(Device::Cpu).unwrap();
@@ -453,7 +453,7 @@ fn the_callers_keys_are_read_where_they_are() {
     }
 }
 
-/// What no result is.
+/// No result is this, so that samples that were not written are found.
 const SENTINEL: Quat = Quat::from_xyzw(7.0, 7.0, 7.0, 7.0);
 
 /// That `work` writes what is expected, and nothing `beside` it on either side.
@@ -841,7 +841,7 @@ fn engines_with_files() {
     unsafe { application.device.destroy_pipeline_cache(pipelines, None) };
 }
 
-/// What is compiled beforehand is what evaluating uses, and it is kept for the next process.
+/// The kernels compiled beforehand are those that evaluating uses, and they are kept for the next process.
 #[test]
 fn kernels_are_compiled_beforehand() {
     for engine in vulkan_engines(|_| {}) {

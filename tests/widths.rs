@@ -1,6 +1,6 @@
 //! Keys are prepared, and paths followed, in the widest vectors that the process may use: those of
-//! the processor, or those that `TUMBLE_VECTOR_WIDTH` names. What processes with narrower vectors
-//! make is compared here with what this process makes.
+//! the processor, or those that `TUMBLE_VECTOR_WIDTH` names. The results of processes with narrower
+//! vectors are compared here with those of this process.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -106,7 +106,7 @@ fn hashes() -> String {
     said
 }
 
-/// What these tests say in a process whose vectors have a width, and that has no Vulkan device.
+/// The output of these tests in a process whose vectors have a width, and that has no Vulkan device.
 fn said_with(width: VectorWidth, tests: &[&str]) -> String {
     let output = Command::new(std::env::current_exe().unwrap())
         .args(tests)

@@ -23,7 +23,7 @@ WORKS = {
     "smooth": "Smooth curves through the same keys",
     "one sample": "One sample of one track, ten thousand calls",
 }
-# Of the first row: what differs by more is other work. Smooth curves are each its own.
+# The largest difference from the first row: a contestant that differs by more does other work. Smooth curves differ.
 SAME = 1e-3
 
 
@@ -38,7 +38,7 @@ def machine():
 def distance(a, b):
     """The largest angle between the rotations of two rows."""
     dot = numpy.abs(numpy.sum(a.astype(float) * b.astype(float), axis=1))
-    # Of small angles the arc sine of the chord is exact.
+    # The arc sine of the chord is exact for small angles.
     chord = numpy.minimum(numpy.linalg.norm(a - b, axis=1), numpy.linalg.norm(a + b, axis=1))
     return float(numpy.max(numpy.where(dot > 0.999, 2 * numpy.arcsin((chord / 2).clip(0, 1)) * 2, 2 * numpy.arccos(dot.clip(0, 1)))))
 

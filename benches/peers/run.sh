@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Tumble beside the libraries that people use today, on the same keys, in turns, in one run. It builds what
 # it needs into target/race: the Rust peers for this machine's own vectors (Tumble chooses them when it
-# runs), Python's from PyPI, three.js from npm; what is not to be had is named under the table.
+# runs), Python's from PyPI, three.js from npm; missing ones are named under the table.
 #
 #   benches/peers/run.sh                prints the table
 #   benches/peers/run.sh --write        writes it into docs/figures.md
 #   benches/peers/run.sh --bevy         with Bevy's curves, which take ten minutes to compile
 #   benches/peers/run.sh --rounds 9     turns; 5 by default
 #
-# PEERS_PYTHON names a Python that has NumPy, SciPy and what else is to be raced (roma and torch).
+# PEERS_PYTHON names a Python that has NumPy, SciPy and other libraries to race (roma and torch).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What Python has, on the keys that the other contestants read: SciPy's Slerp and RotationSpline, a
-slerp of NumPy's arrays as one would write it, and roma's (torch) where it is installed.
+"""Python's contestants, on the keys that the others read: SciPy's Slerp and RotationSpline, a slerp of
+NumPy's arrays as one would write it, and roma's (torch) where it is installed.
 
     scipy_peers.py KEYS FOLDER    called by race.py
 """
@@ -15,7 +15,7 @@ import time
 import numpy
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
-# Of a contestant in one call: what counts is the median of several calls of this program.
+# Of a contestant in one call of this program; the result is the median of several calls.
 ROUNDS = 1
 # SciPy makes a curve for each track in Python: of so many tracks, and the time is for all of them.
 MAX_TRACKS = 512
@@ -38,7 +38,7 @@ def scipy(curve, times, keys, at):
 
 
 def intervals(times, at):
-    """Of each track and sample: the interval, and where in it."""
+    """The interval of each sample of each track, and the part of the interval before it."""
     index = numpy.stack([numpy.searchsorted(row, at, side="right") for row in times]) - 1
     index = index.clip(0, times.shape[1] - 2)
     start, end = (numpy.take_along_axis(times, index + step, 1) for step in (0, 1))
@@ -53,7 +53,7 @@ def numpy_slerp(times, keys, at):
         dot = numpy.einsum("tfc,tfc->tf", a, b)
         b = numpy.where(dot[..., None] < 0, -b, b)
         angle = numpy.arccos(numpy.abs(dot).clip(0, 1))
-        # Of equal keys any weights serve.
+        # For equal keys, all weights give the same result.
         sine = numpy.where(angle < 1e-4, 1, numpy.sin(angle))
         wa = numpy.where(angle < 1e-4, 1 - t, numpy.sin((1 - t) * angle) / sine)
         wb = numpy.where(angle < 1e-4, t, numpy.sin(t * angle) / sine)

@@ -400,7 +400,7 @@ typedef uint32_t TumbleMatrixOrder;
 #endif // __cplusplus
 
 /*
- What a pass does. Each has the bits of the same operation on the CPU.
+ The operation of a pass. Each has the bits of the same operation on the CPU.
  */
 enum TumblePassOperation
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -838,7 +838,7 @@ typedef struct TumbleVulkan {
 } TumbleVulkan;
 
 /*
- What a layer of an instance plays: a clip, and its time, speed, wrap mode and weight. If all members except
+ The clip that a layer of an instance plays, and its time, speed, wrap mode and weight. If all members except
  `size`, `instance` and `layer` are 0, the layer stands still at the start of the first clip, with weight 0.
  */
 typedef struct TumbleCrowdLayer {

@@ -15,7 +15,7 @@ use crate::samples::layout;
 use crate::skeleton::joints;
 use crate::vulkan::buffer_range;
 
-/// What a pass does. Each has the bits of the same operation on the CPU.
+/// The operation of a pass. Each has the bits of the same operation on the CPU.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumblePassOperation {

@@ -13,7 +13,7 @@ use crate::result::{Failure, TumbleResult, code, guarded};
 use crate::samples::{TumbleSamples, layout};
 use crate::set::TumbleSet;
 
-/// What is evaluated of scalars.
+/// The quantity evaluated of scalars.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleScalarQuantity {

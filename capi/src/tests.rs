@@ -265,7 +265,7 @@ fn pointers_and_sizes_are_checked() {
         "no keys",
     );
     let mut other = null_mut();
-    // SAFETY: what is refused before it is read.
+    // SAFETY: the call refuses the arguments before it reads memory.
     let shared = |key_count, track_count, out: *mut *mut TumbleSet| unsafe {
         tumble_set_with_shared_times(times, key_count, keys, track_count, out)
     };

@@ -92,7 +92,7 @@ impl TumbleVulkan {
             (None, None) => Ok(None),
             (Some(lock), Some(unlock)) => Ok(Some(QueueLock::new(move |submit| {
                 let user = user.pointer();
-                // SAFETY: the application's functions, with what they are to get.
+                // SAFETY: the application's functions, with the application's `user`.
                 unsafe { lock(user) };
                 submit();
                 // SAFETY: as above.

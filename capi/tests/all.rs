@@ -117,7 +117,7 @@ fn elbow() -> TrackSet {
     set
 }
 
-/// What the example must print: the bits that the engine gives to Rust.
+/// The output that the example must print: the bits that the engine gives to Rust.
 fn expected() -> String {
     let engine = Engine::new(Device::Cpu).unwrap();
     let set = elbow();
@@ -170,7 +170,7 @@ fn programs(example: &str) -> Vec<(PathBuf, &'static [&'static str])> {
             command.arg(&program);
             if is_static {
                 command.arg(libraries.join("libtumble_capi.a"));
-                // What Rust's own library is linked with.
+                // The system's libraries that Rust's standard library is linked with.
                 command.args(["-lpthread", "-ldl", "-lm"]);
             } else {
                 command.arg("-L").arg(&libraries).arg("-ltumble_capi");
@@ -237,7 +237,7 @@ fn handles_of_cpp_free_themselves_and_have_the_engines_bits() {
     }
 }
 
-/// A chain of three joints, for those who have no model at hand.
+/// A chain of three joints, where no model is given.
 const CHAIN: &str = "HIERARCHY\nROOT hip\n{\nOFFSET 0 1 0\nCHANNELS 6 Xposition Yposition Zposition \
     Zrotation Xrotation Yrotation\nJOINT knee\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation \
     Yrotation\nJOINT foot\n{\nOFFSET 0 -0.5 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\n\

@@ -46,7 +46,7 @@ pub(crate) fn fails(result: TumbleResult, code: TumbleResult, says: &str) {
     assert!(words().contains(says), "{}", words());
 }
 
-/// What an application in C would fill in.
+/// The structure as an application in C fills it in.
 pub(crate) fn handles(application: &Application) -> TumbleVulkan {
     let get = application.entry.static_fn().get_instance_proc_addr;
     TumbleVulkan {
@@ -74,7 +74,7 @@ pub(crate) fn handles(application: &Application) -> TumbleVulkan {
 struct Uses([AtomicUsize; 2]);
 
 unsafe extern "C" fn lock_queue(user: *mut c_void) {
-    // SAFETY: what the application gave with the function.
+    // SAFETY: the pointer that the application passed with the function.
     let Uses([locked, unlocked]) = unsafe { &*user.cast() };
     let before = locked.fetch_add(1, Ordering::SeqCst);
     assert_eq!(
@@ -452,8 +452,7 @@ fn requested(clip: *const TumbleClip, request: &TumbleRequest) -> Vec<u8> {
     }
 }
 
-/// What is asked of a clip is recorded into an application's commands, in every encoding: the bytes that the CPU
-/// gives.
+/// Requests of a clip, recorded into an application's commands in every encoding, give the CPU's bytes.
 #[test]
 fn clips_are_recorded_into_an_applications_commands() {
     if vulkan_devices().is_empty() {
@@ -552,7 +551,7 @@ fn clips_are_recorded_into_an_applications_commands() {
                 done(record(target, pointer(commands), 0));
                 done(record(target, pointer(commands), second));
             });
-            // What was recorded may be submitted again.
+            // Recorded commands may be submitted again.
             commands.run(&[all]);
             commands.run(&[all]);
             let found = application.bytes(memory, VALUES + second + size);
@@ -569,7 +568,7 @@ fn clips_are_recorded_into_an_applications_commands() {
         done(tumble_clip_free(expected));
     }
 
-    // What does not fit, and what is not there.
+    // Ranges that are too short, and buffers, structures and handles that are missing.
     let (clip, of_cpu) = (upload(engine, null()), upload(cpu, null()));
     let size = requested(of_cpu, &whole).len() as u64;
     let (buffer, memory) = application.buffer(16 + size);
@@ -694,7 +693,7 @@ fn clips_are_recorded_into_an_applications_commands() {
     }
 }
 
-/// What the loader and the instance can tell of handles is asked of them.
+/// The loader and the instance are asked whether handles belong to each other, as far as they know.
 #[test]
 fn handles_that_do_not_belong_together_are_refused() {
     if vulkan_devices().is_empty() {

@@ -15,7 +15,7 @@ use crate::application_device::{done, fails, handles, open, pointer};
 use crate::support::{hostile_set, vulkan_devices};
 
 const TRACKS: usize = 5;
-/// Where a result begins in its buffer: what lies before it must stay.
+/// Where a result begins in its buffer: bytes before it must not change.
 const BEFORE: u64 = 256;
 
 /// Three layers, frame by frame.
@@ -60,7 +60,7 @@ impl Inputs<'_> {
     }
 }
 
-/// What a pass reads, and by which weights.
+/// The buffers that a pass reads, and their weights.
 struct Inputs<'a> {
     ranges: Vec<TumbleBufferRange>,
     weights: &'a [f32],
@@ -377,7 +377,7 @@ fn passes_that_cannot_be_are_refused() {
     ] {
         let raw = buffer.buffer.as_raw();
         let mut target = null_mut();
-        // SAFETY: what is refused is not used.
+        // SAFETY: a refused buffer is not used.
         unsafe {
             let refused = tumble_pass_to_buffer(engine, &raw const pass, raw, 1024, 1024);
             fails(refused, code, says);

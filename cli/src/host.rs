@@ -112,7 +112,7 @@ pub fn auto(rotations: usize, options: &EngineOptions) -> Result<Option<Engine>,
     Ok(Some(engine))
 }
 
-/// The known name that is most similar to a misspelt one, if any is similar: what the program suggests.
+/// The known name that is most similar to a misspelt one, which the program suggests; `None` if none is similar.
 pub fn nearest_name<'a>(
     misspelt: &str,
     known: impl IntoIterator<Item = &'a str>,

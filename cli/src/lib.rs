@@ -95,8 +95,8 @@ mod tests {
         Arguments::command().debug_assert();
     }
 
-    /// What an option means: its help up to what is of one command alone, which comes behind a colon, a
-    /// semicolon or a bracket.
+    /// The meaning of an option: its help up to a colon, a semicolon or a bracket, behind which the part of one
+    /// command alone stands.
     fn meaning(option: &Arg) -> String {
         let help = option.get_help().unwrap_or_default().to_string();
         let end = help.find([':', ';', '[']).unwrap_or(help.len());

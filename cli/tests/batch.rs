@@ -188,7 +188,7 @@ fn manifest(folder: &Path) -> Vec<serde_json::Value> {
         .collect()
 }
 
-/// A glTF is what its buffer beside it says too.
+/// The hash of a glTF includes its buffer beside it.
 #[cfg(unix)]
 #[test]
 fn an_input_is_all_files_that_it_refers_to() {
@@ -313,7 +313,7 @@ fn resuming_does_not_replace_the_result_of_another_input() {
         // The same file by another path.
         let same = batch("./m1/x.dat", &[]);
         assert_eq!(same.code, 0, "{}", same.words);
-        // What is asked for is done, and so is what replaces nothing.
+        // A result is replaced when the user asks for it, and written where nothing is replaced.
         assert_eq!(batch("m2/x.dat", &["--overwrite"]).code, 0);
         assert_ne!(tree(&folder.join(out))["x.npy"], before["x.npy"]);
         if !shard.is_empty() {
@@ -729,8 +729,8 @@ fn results_are_discarded_only_where_that_is_asked_for() {
     assert_eq!(terminal("csv").0, 0);
 }
 
-/// Kills at random moments, each resumed: whatever lies under its name is whole at any
-/// time, and what it all comes to is what an undisturbed run gives, byte for byte. `SOAK` kills 500 times.
+/// Kills at random moments, each resumed: every file under its name is whole at any time, and
+/// the results are those of an undisturbed run, byte for byte. `SOAK` kills 500 times.
 #[cfg(unix)]
 #[test]
 fn two_hundred_kills_lose_nothing() {

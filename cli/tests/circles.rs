@@ -1,9 +1,9 @@
-//! Files import in one direction: types go down, what lists or drives them goes up. A circle of imports
+//! Files import in one direction: types lie below the code that lists or drives them. A circle of imports
 //! has no bottom where one could begin to read.
 //!
 //! The imports are taken from the text: paths that begin with `crate`, `super` or `self`. A file and its
-//! child modules count as one: what a child takes from its parent is no import. Unit tests may look wherever
-//! they like.
+//! child modules count as one: a child's imports from its parent do not count. Unit tests may import from
+//! anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -77,7 +77,7 @@ fn read_tree<'a>(
         rest = inner.trim_start();
         while !rest.is_empty() && !rest.starts_with('}') {
             let behind = read_tree(rest, prefix, found).trim_start();
-            // What is no path, such as `*`, has been read as its prefix.
+            // A part that is no path, such as `*`, has been read as its prefix.
             let end = behind.find([',', '}']).unwrap_or(behind.len());
             rest = behind[end..].trim_start_matches(',').trim_start();
         }
@@ -172,8 +172,8 @@ fn circles<'a>(imports: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> BTreeSet<BTree
     all.filter(|circle| circle.len() > 1).collect()
 }
 
-/// What is wrong with a package: circles that the table does not have, and files of the table that are in
-/// no circle any more.
+/// The faults of a package: circles that the table does not have, and files of the table that are in no circle
+/// any more.
 fn faults(sources: &BTreeMap<String, String>, known: &str) -> Vec<String> {
     let imports = imports(sources);
     let circles = circles(&imports);

@@ -12,7 +12,7 @@ fn set() -> TrackSet {
     TrackSet::with_shared_times(&times, &keys).unwrap()
 }
 
-/// What the library gives for the file that [`sample_folder`] has.
+/// The library's result for the file of [`sample_folder`].
 fn expected(frames: &SampleTimes, layout: Layout) -> Vec<Quat> {
     let engine = Engine::new(Device::Cpu).unwrap();
     engine
@@ -223,7 +223,7 @@ fn every_device_writes_the_cpu_s_file() {
     }
 }
 
-/// Every output, as NPY and as CSV: its shape, and that it says what it holds.
+/// Every output, as NPY and as CSV: its shape, and the names of its components.
 #[test]
 fn outputs_have_their_shapes_and_names() {
     let folder = sample_folder();

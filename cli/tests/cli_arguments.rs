@@ -195,7 +195,7 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
     assert!(String::from_utf8_lossy(&run.out).contains("mesa-vulkan-drivers"));
 }
 
-/// A warning about times outside the keys is for those who did not say what tracks do there.
+/// Times outside the keys cause a warning unless an option says how tracks behave there.
 #[test]
 fn chosen_motion_outside_the_keys_causes_no_warning() {
     let folder = sample_folder();

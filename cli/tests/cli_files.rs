@@ -141,7 +141,7 @@ fn names(folder: &std::path::Path) -> Vec<String> {
     names
 }
 
-/// Where nobody may write, nothing is worked out first.
+/// A folder that may not be written is refused before anything is evaluated.
 #[cfg(unix)]
 #[test]
 fn a_read_only_directory_is_refused_before_any_work() {
@@ -278,8 +278,8 @@ fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
     }
 }
 
-/// What a result takes on the disk at least is asked for before it is written, of every format; a result that stands
-/// still, and is compressed best, takes that much.
+/// Before a result is written, the program asks for the least room that its format may need. A motion that stands still
+/// is compressed best, and its file takes no less than that.
 #[test]
 fn no_result_is_smaller_than_what_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();

@@ -25,7 +25,7 @@ fn verify_passes_on_good_data_and_says_what_it_compared() {
     }
     if let Some(device) = vulkan_devices().first() {
         assert_eq!(lines[0]["device"], device.name());
-        // Of 102 rotations by each method: four rates, a pose of two values, and the encodings.
+        // For 102 rotations by each method: four rates, a pose of two values, and the encodings.
         let rotations = 102 * tumble::METHODS.len() as u64;
         let outputs = lines[0]["outputs"].as_array().unwrap();
         let values = outputs

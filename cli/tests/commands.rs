@@ -1,4 +1,4 @@
-//! What follows from the list of commands, which is clap's: the table of the guide, and what is tested of
+//! clap's list of commands, and all that follows from it: the table of the guide, and the tests that run for
 //! every command. And the list of the tests' files. `UPDATE_EXPECTED=1 cargo test -p tumble-cli --test all
 //! commands::` writes the table and the list anew.
 
@@ -66,7 +66,7 @@ fn commands_of_the_readme_work_in_a_clone() {
     assert!(folder.path().join("speed.svg").exists());
 }
 
-/// A file, its part between two lines, and what that part is to be.
+/// A file, its part between two lines, and the expected text of that part.
 struct WrittenPart {
     file: PathBuf,
     begin: &'static str,
@@ -75,7 +75,7 @@ struct WrittenPart {
 }
 
 impl WrittenPart {
-    /// Compares the part with what it is to be, or writes it.
+    /// Compares the part with the expected text, or writes it.
     fn check(&self) {
         let text = fs::read_to_string(&self.file).unwrap();
         let shown = self.file.display();

@@ -294,7 +294,7 @@ fn joints_are_matched_by_name_and_parent() {
         assert_eq!(run.code, 4, "{line}: {}", run.words);
         assert!(run.words.contains(says), "{line}: {}", run.words);
     }
-    // Of names that one file alone has, the others are compared.
+    // Joints whose names only one file has are left out; the others are compared.
     let compared = succeed(folder, &["compare", "one.bvh", "named.bvh"]);
     let report = String::from_utf8(compared.out).unwrap();
     assert!(report.contains("only in one.bvh: left, right"), "{report}");
@@ -323,7 +323,7 @@ fn joints_are_matched_by_name_and_parent() {
 }
 
 /// A chain goes into another format and back, and a part of it into `.dat`, without a bit of
-/// difference; what `.dat` has no room for is named.
+/// difference; contents that `.dat` cannot hold are named.
 #[test]
 fn keys_come_back_as_dat() {
     let temporary = sample_folder();
@@ -358,7 +358,7 @@ fn keys_come_back_as_dat() {
     assert!(report.contains("translation"), "{report}");
 }
 
-/// Trajectories in Unix time, of which one starts a second later: the poses of the first that the second
+/// Trajectories in Unix time, one of which starts a second later: the poses of the first that the second
 /// reaches, without its gaps.
 #[test]
 fn an_estimate_beside_its_reference() {

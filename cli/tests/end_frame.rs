@@ -1,4 +1,4 @@
-//! `--end-frame` through the program: what a result has where its clip ends between two frames.
+//! `--end-frame` through the program: the last sample of a result whose clip ends between two frames.
 
 use std::fs;
 use std::path::Path;

@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 
 use crate::program::{Run, finish, root, succeed};
 
-/// Examples that take minutes, each with what runs instead: a shorter part of the same, or nothing where tests of their
-/// own run the command.
+/// Examples that take minutes, each with the line that runs instead: a shorter part of the same, or nothing where other
+/// tests run the command.
 const LONG: [(&str, Option<&str>); 11] = [
     ("tumble prove", None),
     ("tumble lab", None),
@@ -33,7 +33,8 @@ const LONG: [(&str, Option<&str>); 11] = [
     ("tumble generate --boxes 4096", None),
 ];
 
-/// What is done before an example whose inputs are results of another command, or whose results are inputs of others.
+/// The commands to run before an example whose inputs are results of another command, or whose results are inputs of
+/// others.
 const BEFORE: [(&str, &str); 3] = [
     ("tumble check", "tumble eval walks -o results"),
     ("tumble merge", "tumble eval walks -o results --shard 1/1"),
@@ -203,7 +204,7 @@ fn shell(folder: &Path, line: &str) -> Run {
     finish(command.output().unwrap())
 }
 
-/// The lines after `Examples:`, without what is said of them; a line may go on in the next.
+/// The lines after `Examples:`, without their comments; a line may go on in the next.
 fn examples(help: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let after = help
@@ -234,14 +235,14 @@ fn every_example_of_the_help_runs() {
     let help = String::from_utf8(succeed(&inputs, &["--help"]).out).unwrap();
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let commands = commands.take_while(|line| !line.is_empty());
-    // What is said of a command may go on in a further line.
+    // The summary of a command may go on in a further line.
     let commands = commands.filter(|line| !line.starts_with("   "));
     let mut commands: Vec<&str> = commands
         .filter_map(|line| line.split_whitespace().next())
         .collect();
     commands.retain(|command| *command != "help");
     assert!(commands.len() > 15, "{commands:?}");
-    // In place of the browser, and of what may not be installed.
+    // Stand-ins for the browser, and for programs that may not be installed.
     for (name, text) in [
         ("tumble", format!("exec '{program}' \"$@\"")),
         ("xdg-open", String::new()),

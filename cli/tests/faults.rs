@@ -23,7 +23,7 @@ const INITIALIZATION_FAILED: i32 = -3;
 const DEVICE_LOST: i32 = -4;
 const TIMEOUT: i32 = 2;
 
-/// What calls fail with; waiting also takes too long.
+/// The codes with which calls fail; waiting may also time out.
 const RESULTS: [i32; 4] = [
     OUT_OF_HOST_MEMORY,
     OUT_OF_DEVICE_MEMORY,
@@ -238,7 +238,7 @@ fn too_little_memory_makes_smaller_pieces() {
     }
 }
 
-/// Systems take a device from whoever keeps it busy: work that takes longer than 100 ms
+/// Systems take a device from a program that keeps it busy: work that takes longer than 100 ms
 /// is handed over in smaller pieces from then on, down to a smallest.
 #[test]
 fn a_slow_device_gets_less_at_once() {
@@ -277,7 +277,7 @@ fn a_slow_device_gets_less_at_once() {
     );
 }
 
-/// What is wrong before there is a device.
+/// Faults before there is a device: no loader, and drivers that are missing, broken or crash.
 #[test]
 fn absence_is_told_within_a_second() {
     let Some(loader) = Loader::new() else { return };

@@ -140,7 +140,7 @@ fn formats() {
     }
 }
 
-/// The words that the files of a format are made of, and what numbers, lines and lengths may be.
+/// The words that the files of a format are made of, with extreme numbers, lines and lengths.
 fn words(corpus: &[Vec<u8>]) -> Vec<Vec<u8>> {
     let everywhere: [&[u8]; 24] = [
         b"\n",

@@ -1,4 +1,4 @@
-//! What `--json` prints is JSON of numbers, names and sentences, without any Rust in it.
+//! `--json` prints JSON of numbers, names and sentences, without any Rust in it.
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ use crate::program::{run, sample_folder};
 /// Marks of Rust's debug text.
 const MARKS: [&str; 7] = ["Some(", "None", "Ok(", "Err(", "::", " { ", "\\\""];
 
-/// What is wrong with a value, and where.
+/// Adds the faults of a value, with their locations.
 fn faults(value: &Value, location: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(members) => {

@@ -306,7 +306,7 @@ fn other_offsets_are_written_into_the_format_of_the_input_too() {
     .unwrap();
     let same = line(folder, "convert walk.glb --offsets same.txt -o same.glb");
     assert!(!same.words.contains("W212"), "{}", same.words);
-    // What a new file does not have is named.
+    // The warning names the members that a new file does not have.
     fs::write(
         folder.join("fox.gltf"),
         two_animations().replace("\"scenes\"", "\"cameras\":[{}],\"scenes\""),

@@ -303,8 +303,7 @@ fn every_option_is_obeyed_somewhere() {
     }
 }
 
-/// Whether an option, beside another, asks for what would be so without it: then it is obeyed, and nothing
-/// changes.
+/// Whether an option, beside another, asks for the default: then it is obeyed, and nothing changes.
 fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
     let has = |word: &str| other.contains(&word);
     let are_frames = has("csv") || has("world") || has("transform");
@@ -324,8 +323,8 @@ fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
         ["--from-zero"] => input != "keys.dat",
         // Roots alone have no length between them.
         ["--scale", _] => has("--parents"),
-        // They say what to do with what these files do not have: several animations, two keys at one
-        // time, no rate, rounded times, keys that are missing.
+        // They are about cases that these files do not have: several animations, two keys at one
+        // time, no rate, rounded times, missing keys.
         ["--animation", _] | ["--duplicates", _] | ["--source-fps", _] | ["--raw-times"] => true,
         ["--bridge-gaps"] => true,
         _ => false,

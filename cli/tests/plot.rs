@@ -1,4 +1,4 @@
-//! Pictures: what is in them, read back from SVG and PNG.
+//! The contents of pictures, read back from SVG and PNG.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use roxmltree::{Document, Node};
 const SLERP: &str = "#D55E00";
 const BESSEL_OVERHAUSER: &str = "#009E73";
 const AUTHORED: &str = "#E7298A";
-/// Of an SVG's units, for one of its pixels.
+/// The number of an SVG's units in one of its pixels.
 const FINER: f64 = 10.0;
 
 /// An SVG file's marks.
@@ -92,7 +92,7 @@ fn plot(folder: &Path, arguments: &[&str]) -> Marks {
 fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
     let folder = sample_folder();
     let (times, keys) = pendulum();
-    // z of box 1 and x of box 2 are what turns.
+    // Only z of box 1 and x of box 2 turn.
     for (dimension, title, track, component) in [
         ("4", "dimension 4: z of box 1", 0, 2),
         ("6", "dimension 6: x of box 2", 1, 0),
@@ -366,7 +366,7 @@ fn an_axis_of_zeros_has_labels_that_differ() {
     skeleton(folder.path(), 1, &[1]);
     for (arguments, labels) in [
         ("--show speed", &["0", "0.2", "0.8"][..]),
-        // Of a turn about z, this is x.
+        // Dimension 2 is x of a turn about z.
         ("--dimension 2", &["-0.6", "0", "0.6"]),
     ] {
         let arguments: Vec<&str> = arguments.split(' ').collect();
@@ -623,7 +623,7 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
                 .words
                 .contains("65 panels in one picture cannot be read")
     );
-    // What is not drawn does not count.
+    // Tracks that are not drawn do not count.
     skeleton(folder.path(), 65, &[7]);
     let marks = plot(folder.path(), &["--show", "speed"]);
     assert!(marks.says("joint65") && !marks.says("joint7"));

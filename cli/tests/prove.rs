@@ -1,4 +1,4 @@
-//! `tumble prove` on the software drivers: what it proves, what it refuses to call proved, and the page of
+//! `tumble prove` on the software drivers: its proofs, the faults for which it refuses one, and the page
 //! `docs/proofs.md`, which is written from the files in `proofs/`.
 #![cfg(target_os = "linux")]
 
@@ -40,7 +40,7 @@ pub(crate) fn read(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// What a proof of one of the software drivers must say, whatever its verdict.
+/// Asserts the numbers and the verdict that every proof of a software driver has.
 fn expect_proof(run: &Run, proof: &Value, name: &str) {
     let page = String::from_utf8_lossy(&run.out);
     assert_eq!(run.code, 0, "{page}{}", run.words);
@@ -67,8 +67,8 @@ fn expect_proof(run: &Run, proof: &Value, name: &str) {
     assert_eq!(faults(&schema("proof"), proof), Vec::<String>::new());
 }
 
-/// Everything, on both software drivers, under the validation layer too; each in a time that CI has. What both
-/// CPUs made of the same random rounds is the same, and `--compare` says so.
+/// Everything, on both software drivers, under the validation layer too; each in a time that CI has. The CPU's
+/// results of the same random rounds are the same in both, and `--compare` says so.
 #[test]
 fn the_software_drivers_are_proved_and_compared() {
     if !is_there(LAVAPIPE) || !is_there(SWIFTSHADER) {
@@ -185,7 +185,7 @@ pub(crate) fn schema(of: &str) -> Value {
     read(&root().join(format!("docs/{of}.schema.json")))
 }
 
-/// What is wrong with a value, by the parts of JSON Schema that the schema uses: `type`, `properties`,
+/// The faults of a value, by the parts of JSON Schema that the schema uses: `type`, `properties`,
 /// `required`, `additionalProperties`, `items`, `enum`, `const`.
 pub(crate) fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut found = Vec::new();
@@ -274,7 +274,7 @@ fn check(schema: &Value, value: &Value, location: &str, found: &mut Vec<String>)
     }
 }
 
-/// The check of the schema finds what is missing, what is too much and what is of another type.
+/// The check of the schema finds missing members, additional members, and members of another type.
 #[test]
 fn the_schema_refuses_what_it_does_not_describe() {
     let Some(path) = proofs().into_iter().next() else {

@@ -59,7 +59,7 @@ fn a_walk_gets_few_keys_and_compares() {
         let largest = clip["angle"]["largest"].as_f64().unwrap();
         let bound = clip["angle"]["bound"].as_f64().unwrap();
         assert!(largest > 0.01 && largest <= bound && (bound - 0.1).abs() < 1e-9);
-        // What was said holds, in the world, of the file.
+        // The file is within the reported bounds, in the world.
         let distance = clip["distance"]["bound"].as_f64().unwrap().to_string();
         let bounds = ["--tolerance", "0.1001", "--distance", &distance];
         let times = ["--fps", "60", "--end", "2"];

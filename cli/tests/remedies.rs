@@ -1,4 +1,4 @@
-//! Every remedy that a message names works: a line that is refused, what is said, and what then is done.
+//! Every remedy that a message names works: a line that is refused, its message, and the corrected line.
 
 use std::fs;
 use std::path::Path;

@@ -174,7 +174,7 @@ fn boxes_hang_where_their_rotations_say() {
         first[3] < second[1] + 12,
         "the second hangs below the first"
     );
-    // A quarter turn to the left seen against z: what pointed down points to the right.
+    // A quarter turn to the left seen against z: a box that pointed down points to the right.
     let (first, second) = still("1");
     assert!(!tall(first) && !tall(second));
     assert!(

@@ -1,5 +1,5 @@
-//! How much the program says, and what it would do: `--quiet`, `--progress`, `--dry-run`, `--color`, `--threads`,
-//! manual pages.
+//! Options about the program's messages, plans and threads: `--quiet`, `--progress`, `--dry-run`, `--color`,
+//! `--threads`; and manual pages.
 
 use std::fs;
 
@@ -246,7 +246,7 @@ fn json_tells_why_animations_failed() {
     assert_eq!(made["animation"], "even");
 }
 
-/// A batch that is interrupted says so, what is done, and how to continue; its JSON is complete.
+/// A batch that is interrupted says so, how much is done, and how to continue; its JSON is complete.
 #[cfg(unix)]
 #[test]
 fn interrupted_batches_say_what_is_done() {

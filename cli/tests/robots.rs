@@ -1,4 +1,4 @@
-//! Motion of robots through the program: the layouts of other programs, their orders, and what is refused.
+//! Motion of robots through the program: the layouts of other programs, their orders, and refusals.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -106,7 +106,7 @@ fn largest_difference(found: &[f64], expected: &[f64]) -> f64 {
 }
 
 /// From Unitree's lines to each dialect and back: positions and joints to the last bit, rotations within a step of f32.
-/// What is stored as centimetres and degrees is rounded once more.
+/// Values that are stored as centimetres and degrees are rounded once more.
 #[test]
 fn every_dialect_is_read_back() {
     let folder = folder();
@@ -208,7 +208,7 @@ fn orders_are_stated_and_checked() {
     let fps = npyz::NpyFile::new(&fps[..]).unwrap();
     assert_eq!(fps.shape(), [1]);
     assert_eq!(fps.into_vec::<i64>().unwrap(), [50]);
-    // Both are read as what they are, and other words than theirs are refused.
+    // Both orders are recognised, and an option that names the other one is refused.
     for file in ["depth", "breadth"] {
         line(
             folder,

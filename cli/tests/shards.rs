@@ -87,7 +87,7 @@ fn parts_may_run_at_once() {
     }
 }
 
-/// What is missing is said, and made by `--resume`, by shards or by one process.
+/// Messages name the missing shards, and `--resume` makes them, by shards or by one process.
 #[test]
 fn missing_shards_are_named_and_made() {
     let (temporary, bytes) = library();
@@ -130,7 +130,7 @@ fn missing_shards_are_named_and_made() {
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
 }
 
-/// A shard is done when its file is there and its inputs and outputs are what it says.
+/// A shard is done when its record is there and its inputs and outputs have the recorded hashes.
 #[test]
 fn resuming_looks_at_bytes() {
     let (temporary, bytes) = library();

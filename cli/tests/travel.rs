@@ -138,7 +138,7 @@ fn a_path_its_axes_and_a_box_are_rendered() {
         columns.iter().sum::<usize>() / columns.len()
     };
     assert!(middle(&one) + 40 < middle(&other), "it goes to the right");
-    // What `follow` has written looks the same.
+    // The result of `follow` looks the same.
     succeed(
         folder.path(),
         &words("follow road.csv --fps 100 -o road.glb"),

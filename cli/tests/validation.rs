@@ -33,7 +33,7 @@ fn each_kind_of_check_finds_its_planted_fault() {
     }
 }
 
-/// What the program does on Vulkan: all methods, forms, layouts and sources of times.
+/// All that the program does on Vulkan: all methods, forms, layouts and sources of times.
 #[test]
 fn no_layer_has_anything_to_say_of_the_program() {
     let folder = sample_folder();

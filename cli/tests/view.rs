@@ -1,4 +1,4 @@
-//! The page of `tumble view`, in a real browser: what is drawn, and that the rotations shown are the
+//! The page of `tumble view`, in a real browser: the drawings, and that the rotations shown are the
 //! engine's.
 
 mod limits;
@@ -171,7 +171,7 @@ fn the_rotations_shown_are_the_engine_s() {
         page.choose("#method", method.name);
         page.value("tumble.loaded().then(() => true)");
         let list = times.join(",");
-        // What is drawn: read back from the matrices that three.js was given.
+        // The rotations as drawn, read back from the matrices that three.js was given.
         let shown = page.value(&format!(
             "[{list}].map((time) => {{ tumble.seek(time); return [0, 1, 2, 3].map((box) => tumble.shown(box)) }})"
         ));

@@ -1,4 +1,4 @@
-//! The page of `tumble view`: what every key, click and control does.
+//! The page of `tumble view`: the effect of every key, click and control.
 
 use crate::program::sample_folder;
 use crate::view::page;

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::browser::Page;
 use crate::program::{run, sample_folder, succeed};
 
-/// A joint of a BVH file at `offset` from its parent, with what hangs on it.
+/// A joint of a BVH file at `offset` from its parent, with its children.
 fn joint(name: &str, offset: &str, children: &str) -> String {
     let children = match children {
         "" => "End Site\n{\nOFFSET 0.5 0 0\n}\n",
@@ -75,7 +75,7 @@ fn open(folder: &Path, line: &str) -> (String, Option<Page>) {
     (run.words, Page::open(&folder.join("view.html")))
 }
 
-/// What the list says of a clip, from 1: its name, how far it is from the solid one, and what is not compared.
+/// The texts of a clip in the list, by its number from 1: its name, its distance from the solid one, and its note.
 fn said(page: &mut Page, clip: usize) -> [String; 3] {
     [".clip-name", "output", ".note"].map(|part| {
         let text =

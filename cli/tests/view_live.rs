@@ -1,4 +1,4 @@
-//! The page of `tumble view`, where its engine evaluates what was not written into it.
+//! The page of `tumble view`, where its engine evaluates methods and rates that were not written into it.
 
 use std::fs;
 use std::path::Path;
@@ -116,7 +116,7 @@ fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
         let samples = number(&mut page, "tumble.state.input.samples");
         assert_eq!(samples > written, !rate.is_empty(), "{samples} at `{rate}`");
     }
-    // Back to what was written, which is kept in 16 bits.
+    // Back to the stored result, which has 16 bits.
     page.choose("#rate", "");
     page.value("tumble.loaded().then(() => true)");
     assert_eq!(number(&mut page, "tumble.state.input.samples"), written);

@@ -124,7 +124,7 @@ impl Decimal {
         match self.0.checked_sub(i128::from(whole) * SECOND) {
             // Digits and a point.
             Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
-            // Seconds are exact in f64, and of what is behind them nothing is left so far away.
+            // Seconds are exact in f64, and f64 has no fractions of numbers so large.
             None => {
                 let rest = self.0.rem_euclid(SECOND) as f64 / SECOND as f64;
                 (self.whole_seconds() - whole) as f64 + rest

@@ -50,7 +50,7 @@ pub struct Diagnostic {
     pub location: Option<Location>,
     /// The code of the problem.
     pub code: Code,
-    /// What is wrong, in words.
+    /// The message, without code and location.
     pub message: String,
     /// How often the problem occurs; the location is that of the first time.
     pub count: u64,
@@ -260,7 +260,7 @@ codes! {
     // E6xx: paths.
     Path = "E601" elsewhere, "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, where `t` and `ux,uy,uz` are optional, or NPY of shape (tracks, points, 3). An upward direction must not be 0; its cells may be blank.";
     PathTimes = "E602" elsewhere, "no times, or too many", "A path without times needs `--seconds` or `--pace`. A path with times must have neither.";
-    // E61x: what ways lead over, and who goes.
+    // E61x: surfaces, routes over them, and walkers.
     Mesh = "E610" elsewhere, "not a mesh", "A mesh is OBJ, PLY, GLB or glTF. Its faces have at least three corners, which are existing vertices with finite coordinates.";
     Net = "E611" elsewhere, "not a net", "A net of control points is NPY of floats and of shape (m, n, 3), each side 2 to 32.";
     Pairs = "E612" elsewhere, "not a pair", "Each line has six numbers: x y z of the start, then of the goal.";

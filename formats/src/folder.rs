@@ -1,9 +1,9 @@
-//! A directory that is open, and what is done to the files in it.
+//! An open directory, and operations on the files in it.
 //!
 //! While a program works, others may rename the directory of its results and put another one, or a link, in its place.
-//! What is opened by its path again would then be written into that one. A [`Folder`] is opened once: files are
+//! A program that opens the path again would then write into the wrong one. A [`Folder`] is opened once: files are
 //! created, named and removed in the directory that was opened, wherever it is by now, and [`Folder::is_in_place`] says
-//! whether its path still leads to it. On Windows, nobody can rename the directory as long as it is open.
+//! whether its path still leads to it. On Windows, a directory that is open cannot be renamed.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -177,7 +177,7 @@ mod system {
 
     use super::{File, Folder, OsStr, Path, fs, io};
 
-    /// Of a directory that may be entered but not listed.
+    /// The flags for a directory that may be entered but not listed.
     #[cfg(target_os = "linux")]
     const ENTERED: OFlags = OFlags::PATH;
     #[cfg(not(target_os = "linux"))]

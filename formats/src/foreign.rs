@@ -1,4 +1,4 @@
-//! Files of other programs that are mistaken for motion files: what they are, and what to do with them.
+//! Files of other programs that are mistaken for motion files: their kinds, and the remedies.
 
 use std::path::Path;
 
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(description("walk.txt", b"walk\n"), None);
     }
 
-    /// As a whole file is read: what it is, and what helps.
+    /// The errors of reading whole files name their kinds and the remedies.
     #[test]
     fn files_of_others_are_told_by_what_they_are() {
         for (name, bytes, program, remedy) in [

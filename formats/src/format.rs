@@ -139,7 +139,7 @@ pub struct ReadOptions {
     pub pipes: bool,
     /// Whether times stay as stored, instead of being restored to the frames from which they were rounded.
     pub raw_times: bool,
-    /// What is done with two different keys at the same time.
+    /// How two different keys at the same time are read.
     pub duplicates: Duplicates,
     /// The rate of the keys, for files that do not contain it. A file that contains another rate keeps that rate, and a
     /// warning is returned.
@@ -462,7 +462,7 @@ impl WriteResults {
         shape: &ResultShape<'a>,
     ) -> io::Result<Box<dyn ResultWriter + 'a>> {
         let writer = (self.rotations)(out, shape)?;
-        // Of other representations q and -q are the same numbers; vectors have no sign to choose.
+        // In other representations, q and -q are the same numbers; vectors have no sign to choose.
         if !shape.encoding.is_quaternion() {
             return Ok(writer);
         }

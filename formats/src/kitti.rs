@@ -343,7 +343,7 @@ mod tests {
             ),
             Code::KittiPose
         );
-        // A frame's number before the matrix, as KITTI-360 has it: what is left of it is no rotation.
+        // A frame's number before the matrix, as KITTI-360 has it: the numbers read as a matrix are no rotation.
         assert_eq!(
             refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
             Code::NoRotation
@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(refused("\n", &options), Code::TumEmpty);
     }
 
-    /// A fourth row says nothing; what else is after the matrix is left out with a warning, once.
+    /// A fourth row is skipped; other numbers after the matrix are left out with one warning.
     #[test]
     fn numbers_after_a_matrix_are_a_fourth_row_or_named() {
         let options = ReadOptions {

@@ -5,7 +5,7 @@
 //! The modules from the bottom up; each may use those before it:
 //!
 //! - inputs and errors in them: [`diagnostic`], [`budget`], [`beneath`], and the private modules `source` and `text`;
-//! - [`motion`]: clips, the contents of files, and what is done with them: [`sample`], [`reduce`](mod@reduce),
+//! - [`motion`]: clips, the contents of files, and operations on them: [`sample`], [`reduce`](mod@reduce),
 //!   [`trim`](mod@trim), [`adjust`](mod@adjust), [`compare`], [`skeleton`] and others;
 //! - [`format`](mod@format): the description of a format, and the options of reading and writing; [`feature`]: what
 //!   formats can store;

@@ -1,5 +1,5 @@
-//! Clips of motion files: keys of joints over a skeleton. The modules below are what is done with clips: they are
-//! sampled, reduced, compared, trimmed and so on. None of them knows a format; formats and programs use them.
+//! Clips of motion files: keys of joints over a skeleton. The modules below are operations on clips: sampling,
+//! reducing, comparing, trimming and so on. None of them knows a format; formats and programs use them.
 
 pub mod adjust;
 pub mod carried_mesh;
@@ -56,7 +56,7 @@ pub struct Motion {
     pub skeleton: Vec<Joint>,
     /// How each track's channels are interpolated; empty if rotations have keys and the file specifies no method.
     pub channels: Vec<Channels>,
-    /// What the scalars of `set` are, in their order; empty if nothing is known of them.
+    /// The kinds and limits of the scalars of `set`, in their order; empty if none is known.
     pub scalars: Vec<Scalar>,
     /// The rate of which all key times are frames, if there is one.
     pub rate: Option<FrameRate>,
@@ -75,7 +75,7 @@ pub struct Motion {
     pub written_joints: Vec<WrittenJoint>,
     /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
-    /// What the file says of the robot that moves, if it is in a dialect.
+    /// The robot that moves, as the file describes it; `None` if the file is in no dialect.
     pub robot: Option<RecordedRobot>,
 }
 
@@ -108,7 +108,7 @@ impl Motion {
         }
     }
 
-    /// The time in the set of a time that somebody asks for. If the times of the set are counted from a
+    /// The time in the set of a requested time. If the times of the set are counted from a
     /// [`time_offset`](Self::time_offset), a time that is nearer to it than to 0 is one of the file, for example
     /// 1700000000.5; others count from it.
     #[must_use]

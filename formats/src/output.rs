@@ -478,8 +478,8 @@ impl Temporary {
             }
             Self::Named { file, name } => {
                 name.rename(to, overwrite)?;
-                // It has a writer still, perhaps, but nobody looks for it any more. Windows lets nobody else
-                // read what is locked.
+                // It may still have a writer, but its name is not looked up any more. On Windows, other processes
+                // cannot read a locked file.
                 let _ = file.unlock();
                 Ok(file)
             }
@@ -612,7 +612,7 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
         Ok(_) if !overwrite => Err(OutputError::Exists {
             path: path.to_owned(),
         }),
-        // Its name is too long, or has what no name may have.
+        // Its name is too long, or has characters that no name may have.
         Err(source) if source.kind() == io::ErrorKind::InvalidFilename => Err(OutputError::Write {
             path: path.to_owned(),
             source,
@@ -700,7 +700,7 @@ mod tests {
         written.try_lock().unwrap();
     }
 
-    /// Writers and those who look for abandoned files run at once.
+    /// Processes that write and processes that look for abandoned files run at once.
     #[test]
     fn what_is_being_written_is_never_removed() {
         use std::sync::mpsc::{TryRecvError, channel};

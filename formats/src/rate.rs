@@ -187,7 +187,7 @@ const UNNOTICED: f64 = 5e-3;
 /// The largest change of a duration that few digits may cause.
 const MAX_CHANGE: f64 = 0.025;
 
-/// By which part a clip becomes longer if its frame time is read as that of a rate; `None` if nobody notices it.
+/// By which part a clip becomes longer if its frame time is read as that of a rate; `None` if it is hardly noticed.
 pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
     let change = rate.time_of(1) / period - 1.0;
     (change.abs() > UNNOTICED).then_some(change)

@@ -25,7 +25,7 @@ pub struct RetargetOptions {
     pub bones: Vec<(String, String)>,
     /// How the rest poses are compared.
     pub rest: RestAlignment,
-    /// What the way of the hips is multiplied by.
+    /// The factor for the translations of the hips.
     pub scale: HipsScale,
     /// The rotation from the axes of the source to those of the target; `None` to find it from where hips, head and
     /// legs are at rest.
@@ -51,7 +51,7 @@ names! {
     Directions => "directions",
 }
 
-/// What the way of the hips is multiplied by.
+/// The factor for the translations of the hips, since the skeletons may differ in size.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum HipsScale {
     /// The ratio of the heights of the hips above the lowest joint at rest.
@@ -63,7 +63,7 @@ pub enum HipsScale {
     Factor(f64),
 }
 
-/// What was done.
+/// How a motion was retargeted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RetargetReport {
     /// Joints of the target and the joints of the source that they follow, by names.
@@ -74,7 +74,7 @@ pub struct RetargetReport {
     pub dropped: Vec<String>,
     /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
     pub aligned: Vec<(String, f64)>,
-    /// What the way of the hips was multiplied by.
+    /// The factor by which the translations of the hips were multiplied.
     pub scale: f64,
     /// The rotation from the axes of the source to those of the target.
     pub axes: DQuat,

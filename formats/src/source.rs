@@ -154,7 +154,7 @@ impl Source {
     }
 }
 
-/// The first bytes of what zstd compresses.
+/// The first bytes of data that zstd compressed.
 pub(super) const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// How many first bytes are enough to recognise a format.

@@ -37,7 +37,7 @@ pub(crate) fn moved(clip: &Motion) -> Vec<Vec3> {
     keyed(clip).unwrap().translations
 }
 
-/// Compares a clip with what another program made of it.
+/// Compares a clip with the numbers of another program.
 fn compare(name: &str, clip: &Motion, expected: &Value) {
     let joints = expected["joints"].as_array().unwrap();
     assert_eq!(clip.set.track_count(), joints.len(), "{name}");
@@ -174,7 +174,7 @@ pub(crate) fn read(text: &str, options: &ReadOptions) -> Result<Motion, Diagnost
     read_bvh("t", text.as_bytes(), options).map(|loaded| loaded.clips[0].clone())
 }
 
-/// Of a position with one channel the other coordinates are those of OFFSET.
+/// If a position has only one channel, the other coordinates are those of OFFSET.
 #[test]
 fn positions_replace_their_own_coordinate() {
     let text = format!("{HEAD}Frame Time: 0.04\n7 0 0 0\n8 0 0 0\n9 0 0 0\n");

@@ -1,4 +1,4 @@
-//! BVH as it is written: hierarchies, angles, what is refused, and all of it read back.
+//! BVH as it is written: hierarchies, angles, refusals, and all of it read back.
 
 use glam::{DQuat, Quat, Vec3};
 use proptest::prelude::*;
@@ -173,7 +173,7 @@ fn what_bvh_cannot_hold_is_refused() {
     assert_eq!(warnings[0].code, Code::StartMoved);
 }
 
-/// 167/10000 s is no rounded 1/60 s, and is written so that nobody takes it for one.
+/// 167/10000 s is no rounded 1/60 s, and is written so that no reader takes it for one.
 #[test]
 fn frame_times_are_short_and_mean_their_rate() {
     let rotations = [Quat::IDENTITY];

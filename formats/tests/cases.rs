@@ -1,4 +1,4 @@
-//! The fixtures: of each format a table, `tests/fixtures/FORMAT.cases`, with files and what is reported of each:
+//! The fixtures: a table for each format, `tests/fixtures/FORMAT.cases`, with files and the messages about each:
 //!
 //! ```text
 //! === NAME

@@ -28,7 +28,7 @@ fn fixtures() -> Vec<PathBuf> {
     files
 }
 
-/// The sources of tests, of files and of what reads and writes them.
+/// The texts of all tests and fixtures, and of the sources, which have unit tests.
 fn texts_of_tests() -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let folders = [
@@ -74,7 +74,7 @@ fn mentions(text: &str, code: Code) -> bool {
         })
 }
 
-/// A code that no fixture shows is a code that nobody has seen. It takes the files of all formats.
+/// Every code has a fixture that causes it, because no other test shows its message. It takes the files of all formats.
 #[test]
 fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
     let all: String = fixtures().iter().map(|path| verdict(path)).collect();
@@ -88,7 +88,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
     }
 }
 
-/// `docs/codes.md`: every code, why, and what is said of a file that has it.
+/// `docs/codes.md`: every code, the reason for it, and the message about a file that has it.
 /// `UPDATE_EXPECTED=1` writes it.
 #[test]
 fn the_page_of_codes_is_up_to_date() {

@@ -1,4 +1,4 @@
-//! Every kind of file, good and bad, with what is reported of it: the fixtures of all formats (`cases.rs`).
+//! Every kind of file, good and bad, with the messages about it: the fixtures of all formats (`cases.rs`).
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use tumble_formats::{FORMATS, Format, ReadOptions, Severity};
 
 use crate::cases;
 
-/// What a user reads: the verdict, then each message.
+/// The text that a user reads: the verdict, then each message.
 pub(crate) fn verdict(path: &Path) -> String {
     let folder = path.parent().unwrap();
     let format = Format::of(path).unwrap();

@@ -1,4 +1,4 @@
-//! glTF files are read as their specification says: broken files, and what no fixture holds.
+//! glTF files are read as their specification says: broken files, and cases that are in no fixture.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -245,7 +245,7 @@ fn half_turns_go_the_way_of_a_product_that_is_not_negative() {
     }
 }
 
-/// What is missing or not followed is said of the buffer that names it, once for all animations.
+/// A file that is missing or not followed is an error at the buffer that names it, once for all animations.
 #[test]
 fn files_beside_that_are_missing_are_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -349,7 +349,7 @@ proptest! {
     }
 }
 
-/// Each clip has the names of its tracks, and a name may be as long as the file: what all of them take is counted.
+/// Each clip has the names of its tracks, and a name may be as long as the file: the memory of all of them counts.
 #[test]
 fn a_long_name_counts_in_every_animation() {
     let animation = r#"{"samplers":[{"input":0,"output":1}],"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}}]}"#;

@@ -153,8 +153,8 @@ fn referred(json: &Value) -> (Vec<u64>, Vec<u64>) {
     (all, keys.collect())
 }
 
-/// Of every file: what is not animation stays, keys that samples replace are left out, and what was
-/// sampled is read again.
+/// Every file keeps all that is not animation, loses the keys that samples replace, and gives the samples when it is
+/// read again.
 #[test]
 fn everything_but_the_samples_comes_back() {
     let files = files();
@@ -216,7 +216,7 @@ fn everything_but_the_samples_comes_back() {
         let count = |json: &Value, list: &str| json[list].as_array().map_or(0, Vec::len);
         let unused = count(&before, "accessors") - distinct([&kept, &old_keys]).len();
         let still = count(&after, "accessors") - distinct([&now, &keys]).len();
-        // Its unknown extensions have numbers that may be indices: what they may name stays.
+        // Its unknown extensions have numbers that may be indices: data that these may name stay.
         let is_pinned = path.ends_with("keep_everything.gltf");
         assert!(
             unused == still || is_pinned,
@@ -380,7 +380,7 @@ fn nothing_to_bake_is_the_same_file() {
     assert!(bytes == fs::read(fixture("step_scale.gltf")).unwrap());
 }
 
-/// What is nested deeper than a thread's stack is copied.
+/// JSON that is nested deeper than a thread's stack is copied.
 #[test]
 fn deeply_nested_extras_are_copied() {
     let extras = format!("{}7{}", "[".repeat(100_000), "]".repeat(100_000));
@@ -450,12 +450,12 @@ fn shared_samplers_are_replaced_only_where_others_need_them() {
     assert_eq!(json["accessors"].as_array().unwrap().len(), 2);
 }
 
-/// Khronos' validator finds no error in what is written that it did not find before.
+/// Khronos' validator finds no error in a written file that it did not find in the file before.
 #[test]
 fn no_error_is_new_to_khronos_validator() {
     let folder = tempfile::tempdir().unwrap();
     let mut pairs = Vec::new();
-    // Of times below 0 the validator says as well that those from 0 on do not increase.
+    // The validator reports times below 0, and then also that those from 0 on do not increase.
     let is_valid = |path: &PathBuf| !path.ends_with("negative_time.gltf");
     for (number, path) in files().into_iter().filter(is_valid).enumerate() {
         let to = folder.path().join(format!("{number}.glb"));
@@ -466,8 +466,8 @@ fn no_error_is_new_to_khronos_validator() {
         return;
     };
     for (paths, both) in pairs.chunks(2).zip(reports.chunks(2)) {
-        // Of each error its code and its pointer, without indices: entries that nothing uses are left out, so that
-        // others have new ones. What is wrong with a number names the number.
+        // The code and the pointer of each error, without indices: entries that nothing uses are left out, so that
+        // others have new ones. The error of a number names the number.
         let errors = |report: &Report| -> Vec<String> {
             let cut = |error: &String| {
                 let pointer = error.split(": ").next().unwrap();

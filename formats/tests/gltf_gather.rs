@@ -27,8 +27,8 @@ fn json_and_bin(glb: &[u8]) -> (Value, Vec<u8>) {
     (json, glb[28 + length..].to_vec())
 }
 
-/// Buffers keep their order in the BIN chunk, each view its bytes; images that are files are views,
-/// and what cannot be found keeps its URI.
+/// Buffers keep their order in the BIN chunk, each view its bytes; images that are files become views,
+/// and files that are not found keep their URI.
 #[test]
 fn buffers_and_images_are_taken_in() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! When a glTF file is sampled, and what of it is refused before it is.
+//! The times at which a glTF file is sampled, and inputs that are refused before sampling.
 
 use std::path::Path;
 

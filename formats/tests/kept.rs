@@ -1,4 +1,4 @@
-//! What a conversion does not change stays: channels and End Sites of BVH, names, skeletons that
+//! A conversion keeps all that it does not change: channels and End Sites of BVH, names, skeletons that
 //! several animations share, joints of a skin that rest, files that are written again.
 
 use std::path::Path;
@@ -77,7 +77,7 @@ fn as_bvh(clip: &Motion, sequence: Option<&str>) -> String {
     String::from_utf8(written(&[clip], "bvh", &options)).unwrap()
 }
 
-/// The words of a file, and its numbers within what f32 leaves of angles.
+/// Asserts the same words, and the same numbers within the accuracy that f32 has for angles.
 fn assert_same(text: &str) {
     let [written, expected] = [text, BVH].map(|text| text.split_once("Frame Time").unwrap());
     assert_eq!(written.0, expected.0);
@@ -335,7 +335,7 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
         assert_eq!(found.channels, part.channels);
         for (track, other) in part.set.tracks().zip(found.set.tracks()) {
             assert_eq!(track.keys, other.keys);
-            // What rests does so from the first key on.
+            // A joint that rests has only one key, which may be at another time.
             let is_moved = track.keys.len() > 1;
             assert!(!is_moved || track.times == other.times, "{:?}", other.times);
         }
@@ -375,7 +375,7 @@ fn weights_are_not_cut_and_that_is_said() {
     assert!(channels.any(|channel| *channel == weights), "{written}");
 }
 
-/// The clips of a file from 0.5 to 1.5 s, the file with them, and what was said of it.
+/// The clips of a file from 0.5 to 1.5 s, the file with them, and the warnings.
 fn cut(loaded: &Loaded) -> (Vec<Motion>, Vec<u8>, Vec<Diagnostic>) {
     let engine = Engine::new(Device::Cpu).unwrap();
     let parts: Vec<Motion> = (loaded.clips.iter())
@@ -406,7 +406,7 @@ fn cut(loaded: &Loaded) -> (Vec<Motion>, Vec<u8>, Vec<Diagnostic>) {
     (parts, glb, warnings.unwrap())
 }
 
-/// The body's pelvis is at `trans` and where its shape puts it; what is written again is `trans`.
+/// The body's pelvis is at `trans` plus an offset by its shape; `trans` is written again without it.
 #[test]
 fn the_pelvis_of_a_body_is_at_both_its_places() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/npz/smpl.npz");

@@ -1,11 +1,11 @@
-//! The table of formats lies above all formats: it names each of them, and none of them imports it. Clips and what is
-//! done with them lie below.
+//! The table of formats lies above all formats: it names each of them, and none of them imports it. Clips and the
+//! operations on them lie below.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What names all formats, and the module with which they are asked for.
+/// The tables that name all formats, and the module that looks up formats.
 const TABLES: [&str; 4] = ["FORMATS", "SURFACES", "PATHS", "format::registry"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -24,7 +24,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// The modules that read and write files: those that the tables of `lib.rs` name, and what they share.
+/// The modules that read and write files: those that the tables of `lib.rs` name, and the modules that they share.
 fn format_modules() -> BTreeSet<String> {
     let text = fs::read_to_string(root().join("lib.rs")).unwrap();
     let named = text.lines().filter_map(|line| {

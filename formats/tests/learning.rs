@@ -212,7 +212,7 @@ fn left_and_right_change_places() {
             mirrored_rotation(mirrored_rotation(rotation, axis), axis),
             rotation
         );
-        // What is rotated and mirrored is mirrored and rotated by the mirrored rotation.
+        // Mirroring a rotated point gives the mirrored point, rotated by the mirrored rotation.
         let other = mirrored_point(rotation * mirrored_point(point, axis), axis);
         assert!((q - other).length() < 1e-14);
     }

@@ -1,4 +1,4 @@
-//! What is in a file and no part of its motion is said, by name, whatever the format.
+//! Warnings name the contents of a file that are no part of its motion, in every format.
 
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
 
@@ -63,7 +63,7 @@ fn what_is_no_part_of_the_motion_is_named() {
     }
 }
 
-/// Catches a warning of what another option uses, and of what our own files say.
+/// Catches a warning about data that another option uses, and about notes in our own files.
 #[test]
 fn what_is_used_is_not_named() {
     for fixture in [

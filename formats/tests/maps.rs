@@ -383,7 +383,7 @@ fn tables_of_others_have_their_values() {
         read(&x1, None, false).unwrap_err().code,
         Code::ColumnsAmbiguous
     );
-    // Of Unitree's robots, without names.
+    // Files of Unitree's robots, without names.
     let robot = read(&text("csv-messages/g1.csv"), None, false).unwrap();
     assert_eq!(positions(&robot)[1], Vec3::new(0.033_333, 0.066_667, 0.0));
     assert_eq!(robot.clips[0].set.scalar_count(), 29);

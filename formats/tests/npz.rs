@@ -1,4 +1,4 @@
-//! NPZ and NPY: what is read of each layout, and that it is written again.
+//! NPZ and NPY: each layout is read, and written again.
 
 mod damage;
 mod layouts;

@@ -91,7 +91,7 @@ fn a_map_s_positions_come_back_from_every_format() {
             };
             assert_eq!(found.set.track_count(), 1, "{case}");
             assert_near(&positions(found), &points, &case);
-            // What is read and written again is the same to the last byte.
+            // A file that is read and written again is the same to the last byte.
             let samples = keyed(found).unwrap();
             let mut again = Vec::new();
             let sampled = [samples.of(found, found.rate, &[])];
@@ -242,7 +242,7 @@ fn a_joint_that_rests_far_from_its_parent_comes_back() {
         clip.origin(track) + clip.skeleton[track].rest.translation.as_dvec3()
     };
     let clip = read("a.bvh", text.as_bytes());
-    // What f32 has exactly needs no origin.
+    // A position that f32 has exactly needs no origin.
     assert_eq!(clip.origin(1), DVec3::ZERO);
     let samples = keyed(&clip).unwrap();
     let poses = world(&clip, &samples).unwrap();

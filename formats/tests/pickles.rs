@@ -210,7 +210,7 @@ fn any_bytes_end_within_the_budget() {
     });
 }
 
-/// A value that is referred to a million times takes no memory a million times; what its references state is refused.
+/// A value that is referred to a million times takes memory once; references that expand to too much are refused.
 #[test]
 fn references_are_shared_and_their_expansion_is_refused() {
     // Each list holds the one before twice.

@@ -1,4 +1,4 @@
-//! Clips with few keys: what they are, measured apart from the code that reduces them.
+//! Clips with few keys: their errors, measured apart from the code that reduces them.
 
 use std::path::Path;
 
@@ -208,8 +208,8 @@ fn steps_rests_and_scales_are_kept() {
     }
 }
 
-/// What is read of rotations of 16 bits is within the bounds, compressed or not, and a file is smaller; the
-/// validator finds nothing in it.
+/// Rotations read from 16 bits are within the bounds, compressed or not, and a file is smaller; the validator
+/// finds nothing in it.
 #[test]
 fn rotations_of_16_bits_stay_within_the_bounds() {
     let engine = Engine::new(Device::Cpu).unwrap();
@@ -250,7 +250,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         let found = apart(&clip, again, 0.0);
         assert!(found[0] <= TENTH + 1e-7, "{found:?}");
         assert!(found[1] <= reduced.bounds[1] * (1.0 + 1e-6), "{found:?}");
-        // What is reported is what is read.
+        // The reported errors are those of the rotations as read.
         let reported = reduced
             .errors
             .iter()

@@ -1,5 +1,5 @@
-//! What is written and read again is the same motion, from every format into every other: within
-//! 1e-6, with all that both can say, or with a warning that names what is left out.
+//! A motion that is written and read again is the same, from every format into every other: within 1e-6,
+//! with all that both formats can hold, or with a warning that names the parts left out.
 
 use std::collections::HashSet;
 
@@ -408,7 +408,7 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
     }
 }
 
-/// Why a format may refuse a clip: what it has no room for.
+/// Whether a format may refuse a clip, because it cannot hold a part of it.
 fn may_be_refused(clip: &Motion, format: &Format) -> bool {
     let tracks = clip.set.track_count();
     let times = clip.key_times();

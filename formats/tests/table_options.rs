@@ -1,4 +1,4 @@
-//! CSV, and what options say of a table: units of times, names, parts, twice the same time.
+//! CSV with options about tables: units of times, names, parts, twice the same time.
 
 use proptest::prelude::*;
 use tumble::{Channel, FrameRate};

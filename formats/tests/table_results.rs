@@ -1,4 +1,4 @@
-//! What is written as Parquet, Arrow and CSV, read back: sampled clips, and results as they come.
+//! Results in Parquet, Arrow and CSV, read back: sampled clips, and results that are written in pieces.
 
 use std::io::{self, Write};
 

@@ -288,7 +288,7 @@ fn claims_are_refused_before_any_work() {
     }
 }
 
-/// Where bytes are damaged, and to what.
+/// The places of damaged bytes, and their new values.
 fn damage() -> impl Strategy<Value = Vec<(usize, u8)>> {
     prop::collection::vec((any::<usize>(), any::<u8>()), 1..6)
 }
@@ -341,7 +341,7 @@ proptest! {
     }
 }
 
-/// What is read in spite of damage is a set all the same.
+/// A clip that is read in spite of damage still has increasing times and unit quaternions.
 fn check(loaded: &Loaded) {
     for clip in &loaded.clips {
         for track in clip.set.tracks() {

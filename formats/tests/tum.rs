@@ -1,4 +1,4 @@
-//! Trajectories: a file from elsewhere, and what is written read back.
+//! Trajectories: files of other programs, and our own files read back.
 
 use std::fs;
 use std::path::Path;
@@ -43,7 +43,7 @@ fn times_near_frames_stay_what_they_are() {
     let text = written(&clip);
     assert!(text.contains("\n0.158300000 "), "{text}");
     assert_eq!(read(&text).set.track(0).times, [0.125, 0.1583, 0.1917]);
-    // What was rounded to four decimals lies on frames.
+    // Times that were rounded to four decimals lie on frames.
     let clip = read(&["0.1250", "0.1583", "0.1917"].map(line).concat());
     assert_eq!(clip.rate, FrameRate::new(30, 1).ok());
     assert_eq!(

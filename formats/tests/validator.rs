@@ -6,7 +6,7 @@ use std::process::Command;
 
 use serde::Deserialize;
 
-/// What the validator says of a file, a text each.
+/// The validator's messages about a file, a text each.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Report {
     pub(crate) errors: Vec<String>,

@@ -1,5 +1,5 @@
-//! The readers and the writers of every format. What is read are valid clips, what is refused says why and
-//! where; clips that are written in a format, and files that are written again with samples, are read again.
+//! The readers and the writers of every format. Clips that are read are valid, and errors say why and where;
+//! clips that are written in a format, and files that are written again with samples, are read again.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -37,7 +37,7 @@ pub(crate) fn format(format: &Format, bytes: &[u8]) -> u64 {
     }
     let reported = loaded.refused.iter().chain(&loaded.warnings);
     let mut codes: Vec<Option<Code>> = reported.map(|reported| Some(reported.code)).collect();
-    // What is no clip's format is written in one that holds clips of any kind.
+    // If the format cannot be written, its clips are written as NPZ, which holds clips of any kind.
     let other = FORMATS.iter().find(|other| other.name == "npz");
     let other = other.expect("NPZ is always there");
     for clip in &loaded.clips {

@@ -4,7 +4,7 @@ mod targets;
 
 use tumble_formats::FORMATS;
 
-/// Each target, by the name of what it fuzzes.
+/// Runs the target with a name on some bytes.
 pub fn target(name: &str, data: &[u8]) {
     let target: fn(&[u8]) -> u64 = match name {
         "formats" => formats,

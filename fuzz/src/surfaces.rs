@@ -15,8 +15,8 @@ fn hint(error: &Diagnostic) -> String {
     error.message.chars().rev().take(12).collect()
 }
 
-/// Every format of surfaces: what is read has the vertices that its faces name, or is refused when it becomes a
-/// mesh or a net.
+/// Every format of surfaces: a surface that is read has the vertices that its faces name, or is refused when it
+/// becomes a mesh or a net.
 pub(crate) fn surfaces(bytes: &[u8]) -> u64 {
     let outcome = |format: &&SurfaceFormat| {
         let found = (format.read_bytes)("fuzz", bytes.to_vec(), None, Limits::default());
@@ -40,7 +40,7 @@ pub(crate) fn surfaces(bytes: &[u8]) -> u64 {
     signature(SURFACES.iter().map(outcome).collect::<Vec<_>>())
 }
 
-/// Paths in CSV and NPY: what is read has points in order.
+/// Paths in CSV and NPY: a path that is read has points in order.
 pub(crate) fn paths(bytes: &[u8]) -> u64 {
     let paces = [None, Some(Pace::Seconds(2.0)), Some(Pace::Rate(1.0))];
     let outcomes = paces.map(|pace| match read_paths("fuzz", "path", bytes, pace) {

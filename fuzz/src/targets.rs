@@ -1,5 +1,5 @@
-//! What is fuzzed, and what must be true of every outcome. Each target takes bytes and gives
-//! back a signature of what became of them: inputs with a new signature are worth keeping.
+//! The targets of fuzzing, and the assertions about every outcome. Each target takes bytes and returns a
+//! signature of the outcome: inputs with a new signature are worth keeping.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -91,7 +91,7 @@ fn location_is_inside(bytes: &[u8], said: &Diagnostic) {
     }
 }
 
-/// The writers of results: what they write reads back bit for bit.
+/// The writers of results: their files read back bit for bit.
 pub(crate) fn outputs(bytes: &[u8]) -> u64 {
     let mut numbers = ByteReader(bytes);
     let (tracks, frames) = (1 + numbers.byte() as usize % 5, numbers.byte() as usize % 9);
@@ -352,8 +352,8 @@ fn sane(key: Quat) -> Quat {
     }
 }
 
-/// The exactness pass on any words: what it lets through it does not change again, and
-/// it undoes what it did.
+/// The exactness pass on any words: a second pass over an accepted module changes nothing, and the pass can be
+/// undone.
 pub(crate) fn spirv(bytes: &[u8]) -> u64 {
     let module: Vec<u32> = bytes
         .chunks_exact(4)

@@ -1,6 +1,6 @@
-"""What a trainer of humanoids asks of its clips, without the training: 4 096 environments, each at a time of
-its own in a clip of its own, step after step. Prints how long a step takes, and a sum of all bits that came
-out, which is the same on every machine.
+"""Samples clips as a trainer of humanoids does, without the training: 4 096 environments, each at a time of
+its own in a clip of its own, step after step. Prints how long a step takes, and a sum of all bits of the
+results, which is the same on every machine.
 
     python steps.py [motions.npz] [--steps 300]
 """
@@ -20,8 +20,8 @@ STEP = 1 / 60
 
 
 def invented(clips: int = 200, joints: int = 24) -> tumble.MotionLibrary:
-    """A library of clips that stand for recorded ones: swinging joints. What platforms round differently is not in
-    them, so that the keys are the same everywhere."""
+    """A library of clips that stand for recorded ones: swinging joints. No function that platforms round differently
+    is used, so that the keys are the same everywhere."""
     rng = np.random.default_rng(1)
     parents = [None, *(int(rng.integers(0, joint)) for joint in range(1, joints))]
     offsets = rng.integers(-8, 9, (joints, 3)) / 16

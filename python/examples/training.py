@@ -58,7 +58,7 @@ def run(library: tumble.MotionLibrary, steps: int, environments: int) -> tuple[f
 
 
 class Windows:
-    """What a DataLoader takes: windows of 64 frames of clips."""
+    """A data set for a DataLoader: windows of 64 frames of clips."""
 
     def __init__(self, library: tumble.MotionLibrary) -> None:
         self.library = library

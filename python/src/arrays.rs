@@ -77,7 +77,7 @@ pub(crate) fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
     Ok(module.bind(py))
 }
 
-/// What NumPy makes of an object.
+/// The NumPy array of an object: itself, or by the array protocol or DLPack.
 fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = value.py();
     if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
@@ -297,8 +297,8 @@ impl<'py, T: FromPyObjectOwned<'py>> FromPyObject<'_, 'py> for ListArgument<T> {
     }
 }
 
-/// Rounded to f32, normalised before where that is a matter of rounding; what is not a rotation is
-/// left for the set to refuse.
+/// Rounded to f32, and normalised before if only rounding made its norm differ from 1; a quaternion that is no
+/// rotation is left for the set to refuse.
 fn unit(key: DQuat) -> Quat {
     let is_near = (key.length() - 1.0).abs() <= tumble::NORM_TOLERANCE;
     match is_near {

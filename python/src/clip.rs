@@ -68,7 +68,7 @@ pub(crate) struct Source {
 }
 
 impl Clip {
-    /// The clip with other keys; what its file holds beside these stays known.
+    /// The clip with other keys; the other contents of its file stay known.
     pub(crate) fn with_keys(&self, motion: Motion) -> Self {
         let source = self.source.as_ref().map(|source| {
             Arc::new(Source {

@@ -17,7 +17,7 @@ use crate::options::{SampleChoice, samples_of};
 use crate::run::{interruptible, work};
 use crate::values::{Pickled, pickled, value};
 
-/// What many differences come to.
+/// The mean, the root mean square and the largest of many differences.
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spread {
@@ -274,7 +274,7 @@ impl ClipDifference {
     }
 }
 
-/// What errors of one kind come to, by the names of `evo`.
+/// The statistics of errors of one kind, by the names of `evo`.
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathStatistics {
@@ -343,7 +343,7 @@ pub(crate) struct PathErrors {
     in_gaps: usize,
     /// First and last time, seconds.
     span: (f64, f64),
-    /// What lays the estimate over the reference: first the scale,
+    /// The transform that lays the estimate over the reference: first the scale,
     scale: f64,
     /// then the rotation, x y z w,
     rotation: [f64; 4],

@@ -145,7 +145,7 @@ struct SemaphoreHandle {
 #[derive(Default)]
 struct Wait {
     value: u64,
-    /// Of semaphores of other kinds.
+    /// Parameters for semaphores of other kinds.
     others: [u64; 3],
     other: [c_uint; 10],
     flags: c_uint,
@@ -222,7 +222,7 @@ impl Cuda {
         if let Some(cuda) = CUDA.get() {
             return Ok(cuda);
         }
-        // SAFETY: loading a library runs its initialisers; that is what is asked for.
+        // SAFETY: loading a library runs its initialisers, which is intended.
         let library = unsafe { Library::new(LIBRARY) }
             .map_err(|error| CudaError::NoLibrary(error.to_string()))?;
         let cuda = Self {
@@ -268,7 +268,7 @@ impl Cuda {
     /// The device with that UUID, and its index among those that CUDA sees.
     fn device(&self, result: &ExportedResult) -> Result<(CuDevice, c_int), CudaError> {
         let functions = &self.functions;
-        // SAFETY: plain arguments, and pointers to what they are declared as, here and below.
+        // SAFETY: plain arguments, and pointers to values of the declared types, here and below.
         self.checked("cuInit", unsafe { (functions.init)(0) })?;
         let mut count = 0;
         // SAFETY: as above.
@@ -425,7 +425,7 @@ impl Mapping {
         self.semaphore.is_some()
     }
 
-    /// Where the first number is, for somebody whose work comes after [`Mapping::order`].
+    /// The address of the first number, for work that comes after [`Mapping::order`].
     pub(crate) fn address(&self) -> Address {
         self.is_known.store(true, Ordering::Relaxed);
         self.address.unwrap_or(0)
@@ -452,7 +452,7 @@ impl Mapping {
         };
         let stream = std::ptr::without_provenance_mut(stream);
         in_context(self.cuda, self.context, || {
-            // SAFETY: one semaphore and what it is waited for, and a stream that the caller names.
+            // SAFETY: one semaphore and its parameters, and a stream that the caller names.
             let code = unsafe {
                 let wait_for = self.cuda.functions.wait;
                 wait_for(&raw const semaphore, &raw const wait, 1, stream)
@@ -533,7 +533,7 @@ impl Drop for Mapping {
         if self.check_process().is_err() {
             return; // the driver is not there
         }
-        // Streams wait for what a lost device was to write, and would be waited for in vain: then all of it stays.
+        // Streams wait for a lost device's writing, and would be waited for for ever: then everything is leaked.
         if self.result.wait().is_err() {
             return;
         }

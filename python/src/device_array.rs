@@ -31,7 +31,7 @@ pub(crate) struct DeviceArray {
     component: ComponentType,
 }
 
-/// CUDA's refusal, with what to do in Python.
+/// CUDA's refusal, with the remedy in Python.
 fn of_cuda(error: &CudaError) -> PyErr {
     device(&format!(
         "device_array: {error}; without device_array=True results are arrays of NumPy's"
@@ -39,7 +39,7 @@ fn of_cuda(error: &CudaError) -> PyErr {
 }
 
 impl DeviceArray {
-    /// Of a result of that shape. Called without the interpreter's lock.
+    /// The array of a result of that shape. Called without the interpreter's lock.
     pub(crate) fn new(
         result: ExportedResult,
         shape: Vec<usize>,
@@ -57,7 +57,7 @@ impl DeviceArray {
     fn order(&self, stream: Option<i64>) -> PyResult<()> {
         let stream = match stream {
             None => DEFAULT_STREAM,
-            Some(-1) => return Ok(()), // whoever asks waits by themselves
+            Some(-1) => return Ok(()), // the consumer orders its work itself
             Some(0) => {
                 return Err(PyBufferError::new_err(
                     "stream: 0 may be either default stream of CUDA's; give 1, that of all threads, or 2, that of \
@@ -88,8 +88,8 @@ impl DeviceArray {
         numpy(py)?.call_method1("dtype", (type_name(self.component),))
     }
 
-    /// Who waits for the card to write it: the "stream" that takes it, or the "host", which has done so, where the
-    /// Vulkan device exports no semaphore or CUDA takes none.
+    /// How readers are ordered after the card's writing: "stream" if the stream that takes the array waits for it,
+    /// "host" if the host has waited already, because the Vulkan device exports no semaphore or CUDA takes none.
     #[getter]
     fn waited_by(&self) -> &'static str {
         match self.mapping.is_ordered_by_streams() {

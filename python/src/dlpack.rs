@@ -103,10 +103,10 @@ const _: () = {
     assert!(std::mem::offset_of!(ManagedVersioned, tensor) == 32);
 };
 
-/// Deletes what a capsule or its consumer has.
+/// Deletes the tensor of a capsule or of its consumer.
 ///
 /// # Safety
-/// The pointer is that of a box of this type, which nobody uses any more.
+/// The pointer is that of a box of this type, which is not used any more.
 unsafe extern "C" fn delete<T>(managed: *mut T) {
     if !managed.is_null() {
         // SAFETY: promised by the caller.
@@ -114,7 +114,7 @@ unsafe extern "C" fn delete<T>(managed: *mut T) {
     }
 }
 
-/// The names of a capsule that nobody has consumed.
+/// The names of capsules that were not consumed, without and with a version.
 const NAME: &CStr = c"dltensor";
 const NAME_VERSIONED: &CStr = c"dltensor_versioned";
 
@@ -186,10 +186,10 @@ pub(crate) fn capsule<'py>(
             (Box::into_raw(managed).cast(), NAME)
         }
     };
-    // SAFETY: the pointer is not null, the name stays, and the destructor is that of what the pointer is to.
+    // SAFETY: the pointer is not null, the name is static, and the destructor is that of the pointer's type.
     let capsule = unsafe { ffi::PyCapsule_New(managed, name.as_ptr(), Some(destroy)) };
     if capsule.is_null() {
-        // SAFETY: the box was made just now, and is nobody's.
+        // SAFETY: the box was made just now, and has no other owner.
         unsafe {
             match is_versioned {
                 true => delete::<ManagedVersioned>(managed.cast()),

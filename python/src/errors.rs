@@ -1,5 +1,5 @@
-//! What went wrong, as Python's exceptions. The classes are defined in `tumble/_errors.py`, because
-//! each has two bases.
+//! Errors as Python's exceptions. The classes are defined in `tumble/_errors.py`, because each has two
+//! bases.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -64,12 +64,12 @@ impl Class {
             let object = self.object(py, message, found);
             object.map_or_else(|error| error, PyErr::from_value)
         });
-        // The interpreter has ended, and nobody reads the error of work that was left behind.
+        // The interpreter has ended, and the error of work that was left behind is not read.
         made.unwrap_or_else(|| PyRuntimeError::new_err(message.to_owned()))
     }
 }
 
-/// Which fault was found, and where: what exceptions carry beside their message.
+/// The code and the location of a fault, which exceptions carry in addition to their message.
 #[derive(Debug, Default)]
 pub(crate) struct FaultDetails {
     code: Option<&'static str>,
@@ -187,7 +187,7 @@ pub(crate) fn in_python(message: &str) -> String {
     spoken
 }
 
-/// What is wrong with a file.
+/// The exception or warning of a diagnostic about a file.
 pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
     let is_missing = || !Path::new(&diagnostic.file).exists();
     let class = match diagnostic.code.severity() {
@@ -198,7 +198,7 @@ pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
     class.error(&in_python(&diagnostic.to_string()), &diagnostic.into())
 }
 
-/// Warns of what is remarkable about files: once for each code, at the line that called the package.
+/// Issues warnings about files: one for each code, at the line that called the package.
 pub(crate) fn warn<'a>(
     py: Python<'_>,
     diagnostics: impl IntoIterator<Item = &'a Diagnostic>,
@@ -220,7 +220,7 @@ pub(crate) fn warn<'a>(
     Ok(())
 }
 
-/// Warns of what is remarkable about arguments: one warning with all `messages`, which are of one kind.
+/// Issues one warning about arguments with all `messages`, which are of one kind.
 pub(crate) fn warn_of(py: Python<'_>, messages: &[String]) -> PyResult<()> {
     match messages.is_empty() {
         true => Ok(()),
@@ -244,7 +244,7 @@ fn warn_once(py: Python<'_>, messages: &[String], details: &FaultDetails) -> PyR
     Ok(())
 }
 
-/// Replaces the error of a conversion by one that says what is expected. Other errors stay as they are: Ctrl-C, for
+/// Replaces the error of a conversion by one that names the expected type. Other errors stay as they are: Ctrl-C, for
 /// example, interrupts conversions that run Python code.
 pub(crate) fn expected(py: Python<'_>, error: PyErr, message: impl FnOnce() -> String) -> PyErr {
     let is_conversion = error.is_instance_of::<PyTypeError>(py)

@@ -1,4 +1,4 @@
-//! Results of clips: rotations, what follows from them, and whole poses.
+//! Results of clips: rotations, quantities derived from them, and whole poses.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -25,7 +25,7 @@ use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::output::{array, array_of, filled, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
-/// What is made of a clip, and how it lies in memory.
+/// The quantity that is evaluated of a clip, its encoding, and its layout in memory.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OutputForm {
     pub(crate) quantity: Quantity,
@@ -82,7 +82,7 @@ impl Default for OutputForm {
     }
 }
 
-/// What is evaluated: a clip, on an engine, at some times of each track.
+/// A clip that is evaluated on an engine, at some times of each track.
 #[derive(Clone, Copy)]
 struct Work<'a> {
     engine: &'a Engine,
@@ -228,7 +228,7 @@ impl OutputForm {
         Ok(array.into_any())
     }
 
-    /// Refuses what is done on the host after the engine, or needs the host's memory.
+    /// Refuses forms of results that the host computes after the engine, or that need the host's memory.
     fn check_on_card(
         &self,
         samples: &SampleChoice,

@@ -40,7 +40,7 @@ fn rows<const N: usize>(
     }
 }
 
-/// Quaternions in f64, normalised; 0 and what is not finite is refused.
+/// Quaternions in f64, normalised; 0 and numbers that are not finite are refused.
 fn rotations(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Vec<usize>, Vec<DQuat>)> {
     let (shape, rows) = rows::<4>(value, "quaternions")?;
     let unit = |(index, row): (usize, [f64; 4])| {

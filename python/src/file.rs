@@ -1,4 +1,4 @@
-//! `tumble.load` and `tumble.File`: what a file holds.
+//! `tumble.load` and `tumble.File`: the clips of a file.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::num::NonZero;
@@ -537,7 +537,7 @@ impl FileOptions {
         found.into_iter().map(|(_, loaded)| loaded).collect()
     }
 
-    /// The file, and what to warn of.
+    /// The file, and the warnings about it.
     fn file(&self, path: PathBuf, mut loaded: Loaded) -> PyResult<(File, Vec<Diagnostic>)> {
         if let ([], Some(first)) = (&*loaded.clips, loaded.refused.first()) {
             return Err(of_diagnostic(first));

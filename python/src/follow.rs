@@ -17,7 +17,7 @@ use crate::options::{SampleChoice, ends};
 use crate::run::interruptible;
 use crate::samples::of_values;
 
-/// What is asked of bodies on paths, as it comes in.
+/// The keyword arguments about bodies on paths, before they are checked.
 pub(crate) struct FollowOptions<'a, 'py> {
     pub(crate) duration: Option<f64>,
     pub(crate) rate: Option<f64>,

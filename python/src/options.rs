@@ -102,7 +102,7 @@ impl EvaluationKeywords {
         self.samples.as_ref().ok_or_else(none_asked_for)
     }
 
-    /// What is done with times outside the keys.
+    /// How times before the first key and after the last are treated.
     pub(crate) fn outside(&self) -> Outside {
         self.outside
     }

@@ -27,7 +27,7 @@ const SAMPLERS: [ChannelInterpolation; 3] = [
     ChannelInterpolation::Cubic,
 ];
 
-/// Everything that a clip is, but what is kept of its file beside.
+/// All data of a clip, without the other contents of its file.
 pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, PyDict>> {
     let motion = &*clip.motion;
     let tracks: Vec<Track<'_>> = motion.set.tracks().collect();

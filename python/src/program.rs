@@ -27,7 +27,7 @@ pub(crate) fn set_probe(command: Vec<OsString>) {
     host::set_probe(command);
 }
 
-/// Loads the Vulkan drivers: what that process does.
+/// Loads the Vulkan drivers, in a process that the package starts for this.
 #[pyfunction]
 pub(crate) fn load_drivers(py: Python<'_>) {
     py.detach(host::load_drivers);
@@ -49,7 +49,7 @@ pub(crate) fn devices(py: Python<'_>) -> PyResult<Vec<String>> {
     })
 }
 
-/// What each method is: its name, and a few words.
+/// The names of the methods, each with a short description.
 ///
 /// >>> import tumble
 /// >>> tumble.methods()["slerp"]
@@ -63,7 +63,7 @@ pub(crate) fn methods(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(found)
 }
 
-/// What each representation of rotations is (`Engine.encoded`): its name, and a few words.
+/// The names of the representations of rotations (`Engine.encoded`), each with a short description.
 ///
 /// >>> import tumble
 /// >>> tumble.encodings()["axis-angle"]
@@ -100,7 +100,7 @@ pub(crate) fn page(
     })
 }
 
-/// Panics, so that tests see what becomes of it.
+/// Panics, so that tests see how panics are reported.
 #[pyfunction]
 pub(crate) fn panic() -> PyResult<()> {
     guarded(|| panic!("asked for"))

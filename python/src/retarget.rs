@@ -22,8 +22,8 @@ use crate::run::interruptible;
 /// `target`: a clip with the skeleton. Joints are paired by the parts of the body that their names mean (VRM, Mixamo,
 /// SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA), or by `bones`, a dict of names of the target's joints to those of the
 /// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to the
-/// directions of the source's, "auto" for that where they differ by more than 5 degrees. `scale`: what the way of the
-/// hips is multiplied by: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a number.
+/// directions of the source's, "auto" for that where they differ by more than 5 degrees. `scale`: the factor for the
+/// hips' translations: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a number.
 /// `axes`: the rotation x y z w from the axes of the source to those of the target, else it is found from where hips,
 /// head and legs are.
 ///

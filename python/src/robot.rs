@@ -132,7 +132,7 @@ impl Robot {
     ///
     /// `joint_pos`: (…, joints), a value for each of `joint_names`. `root_pos`, `root_quat`: (…, 3) and (…, 4), the pose
     /// of the free joint in the world; of a robot without one, of its base. With several free joints (…, roots, 3).
-    /// `ball_quat`: (…, balls, 4). What is left out stays where the file has it. `order`: "wxyz" or "xyzw", of all
+    /// `ball_quat`: (…, balls, 4). Poses that are left out are the file's. `order`: "wxyz" or "xyzw", of all
     /// quaternions; there is no default, because files differ.
     ///
     /// The result is a dict: `body_pos_w` (…, bodies, 3) and `body_quat_w` (…, bodies, 4), in the world. With any
@@ -256,7 +256,7 @@ impl Robot {
 
 /// Numbers for each configuration.
 struct JointArray {
-    /// Of the configurations.
+    /// The shape of the configurations.
     shape: Vec<usize>,
     each: usize,
     values: Vec<f64>,

@@ -17,7 +17,7 @@ use crate::errors::{guarded, of_engine};
 /// longer than many a call.
 const SHORT: f64 = 3e7;
 
-/// What preparing a key for constant speed takes, nanoseconds.
+/// The time that preparing a key for constant speed takes, nanoseconds.
 const CONSTANT_SPEED: f64 = 3e6;
 
 /// How long Ctrl-C may go unseen.
@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 /// How long work that was stopped may take to end before it is left alone.
 const GRACE: Duration = Duration::from_millis(40);
 
-/// What to evaluate.
+/// A set to evaluate, with the engine, the times and the form of the result.
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) engine: &'a Engine,
@@ -61,7 +61,7 @@ fn wait<T>(receiver: &Receiver<PyResult<T>>, stop: &Stop) -> PyResult<T> {
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(interrupted) = check_signals() {
                     stop.stop();
-                    let _ = receiver.recv_timeout(GRACE); // nobody asks any more what came of it
+                    let _ = receiver.recv_timeout(GRACE); // the result is not needed
                     return Err(interrupted);
                 }
             }
@@ -70,8 +70,8 @@ fn wait<T>(receiver: &Receiver<PyResult<T>>, stop: &Stop) -> PyResult<T> {
     }
 }
 
-/// Does work without the GIL, which Ctrl-C stops. Where the work does not end at once, it goes on to where it
-/// looks by itself, and nobody gets its result.
+/// Does work without the GIL, which Ctrl-C stops. Work that does not end at once goes on to the next point where it
+/// checks for a stop, and its result is dropped.
 pub(crate) fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> PyResult<T> + Send + 'static,
@@ -82,7 +82,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
         let (sender, receiver) = mpsc::sync_channel(1);
         let thread = thread::Builder::new().name("tumble".to_owned());
         thread.spawn(move || {
-            let _ = sender.send(flag.during(|| guarded(work))); // nobody listens after Ctrl-C
+            let _ = sender.send(flag.during(|| guarded(work))); // fails if Ctrl-C ended the wait
         })?;
         wait(&receiver, &stop)
     })
@@ -97,7 +97,7 @@ pub(crate) fn stoppable<T: Send>(work: impl FnOnce() -> PyResult<T> + Send) -> P
         let (sender, receiver) = mpsc::sync_channel(1);
         let thread = thread::Builder::new().name("tumble".to_owned());
         thread.spawn_scoped(scope, move || {
-            let _ = sender.send(flag.during(|| guarded(work))); // nobody listens after Ctrl-C
+            let _ = sender.send(flag.during(|| guarded(work))); // fails if Ctrl-C ended the wait
         })?;
         wait(&receiver, &stop)
     })

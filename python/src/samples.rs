@@ -23,7 +23,7 @@ use crate::options::frame_rate;
 use crate::output::{array, filled};
 use crate::run::{interruptible, work};
 
-/// What the axes of samples are, without that of their components.
+/// The lengths of the axes of samples, without that of their components.
 #[derive(Debug, Clone, Copy)]
 struct Axes {
     tracks: usize,
@@ -31,7 +31,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// Of (samples,) or, in that layout, (tracks, samples).
+    /// The axes of the shape (samples,) or, in that layout, (tracks, samples).
     fn of(shape: &[usize], layout: Layout, name: &str) -> PyResult<Self> {
         Ok(match (shape, layout) {
             (&[], _) => Self {

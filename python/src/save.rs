@@ -199,7 +199,7 @@ pub(crate) fn clips_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Clip>> {
     }
 }
 
-/// What is written, and how.
+/// The clips to write, with the format, its options, and the times at which they are evaluated.
 struct Save {
     format: &'static Format,
     motion: MotionOptions,
@@ -338,7 +338,7 @@ impl Save {
         (is_one && first.writes(self.format)).then_some(first)
     }
 
-    /// What the clips' files hold beside them, and a file that is made of the clips does not.
+    /// Warnings about contents of the clips' files that a file made of the clips does not have.
     fn left_behind(&self) -> Vec<Diagnostic> {
         let mut sources: Vec<(&Arc<dyn Document>, &Source)> = Vec::new();
         for source in self.clips.iter().filter_map(|clip| clip.source.as_ref()) {

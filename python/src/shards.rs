@@ -1,5 +1,5 @@
-//! What `tumble.distributed` is made of: a library cut into shards, a worker that evaluates them, and
-//! the merge. Outcomes are JSON, since they are sent to other machines.
+//! The parts of `tumble.distributed`: a library cut into shards, a worker that evaluates them, and the
+//! merge. Outcomes are JSON, since they are sent to other machines.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -132,7 +132,7 @@ impl Plan {
         inputs.into_iter().map(text).collect()
     }
 
-    /// What the results of a shard are called below the directory of results.
+    /// The paths of the results of a shard, relative to the directory of results.
     fn names_of(&self, shard: usize) -> Vec<String> {
         self.plan.names_of(shard).unwrap_or_default()
     }
@@ -305,7 +305,7 @@ pub(crate) fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
     shards::manifest_results(text)
 }
 
-/// The lines of a manifest, by what the results of their inputs are known by.
+/// The lines of a manifest, by the keys of their inputs.
 #[pyfunction]
 pub(crate) fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
     shards::manifest_by_input(text)

@@ -1,4 +1,4 @@
-//! What a comparison of a device with the CPU and with the reference found.
+//! The result of comparing a device with the CPU and with the reference.
 
 use pyo3::prelude::*;
 use tumble::verify::{Verdict, verify};
@@ -9,7 +9,7 @@ use crate::errors::of_engine;
 use crate::options::EvaluationKeywords;
 use crate::values::{Pickled, pickled, value};
 
-/// What `Engine.verify` found.
+/// The result of `Engine.verify`.
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Verification {
@@ -51,7 +51,7 @@ value!(Verification {
 });
 
 impl Verification {
-    /// Verifies the tracks of each method, and puts together what was found.
+    /// Verifies the tracks of each method, and combines their results.
     pub(crate) fn of(
         engine: &Engine,
         clip: &Motion,

@@ -66,7 +66,7 @@ engine = tumble.Engine(sys.argv[1] if len(sys.argv) > 1 else "vulkan")
 print("evaluates on:", engine.device, flush=True)
 
 small, large = clip(24, 300), clip(512, 60)
-# What is asked for, and by which method of the engine's.
+# The calls to compare: the method of the engine, the clip and the arguments.
 REQUESTS = [
     ("evaluate", small, dict(fps=120, method="slerp")),
     ("evaluate", small, dict(fps=120, method="bessel-overhauser", layout="frame")),

@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""The fixtures and functions that the tests share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-# What a shell starts in the background ignores Ctrl-C, and so do its children: the tests send it.
+# Processes that a shell starts in the background ignore Ctrl-C, as do their children; but the tests send it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = pathlib.Path(__file__).parents[2]

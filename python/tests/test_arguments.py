@@ -58,7 +58,7 @@ class Dlpack:
 wide = np.zeros((3, 4, 8), np.float32)
 wide[..., ::2] = KEYS
 
-# What is read as it is meant: arguments, and what they are the same as.
+# Arguments that are accepted; each gives the same result as the plain form.
 SAME = {
     "float64 keys": dict(keys=KEYS.astype(np.float64)),
     "float64 times": dict(times=TIMES.astype("f8")),
@@ -108,7 +108,7 @@ def test_what_is_read_as_it_is_meant(case):
     assert np.array_equal(found * signs, EXPECTED) or np.abs(found * signs - EXPECTED).max() < 3e-7
 
 
-# Shapes of what is empty.
+# Empty arguments, and the shapes of their results.
 EMPTY = {
     "no tracks": (dict(keys=np.empty((0, 4, 4))), (0, 1, 4)),
     "no times to evaluate": (dict(fps=None, at=[]), (3, 0, 4)),
@@ -133,7 +133,7 @@ locked = read_only(np.empty_like(EXPECTED))
 inside = np.zeros(EXPECTED.size, np.float32)
 inside[:48] = KEYS.ravel()
 
-# What is refused: arguments, the exception, its code, its place, and a part of its words.
+# Arguments that are refused, with the exception's code, its pointer, and a part of its message.
 REFUSED = {
     "keys with a NaN": (dict(keys=changed(KEYS, (1, 2, 3), np.nan)), "E022", "keys[1][2]", "norm"),
     "keys with an infinity": (dict(keys=changed(KEYS, (0, 0, 0), np.inf)), "E022", "keys[0][0]", ""),
@@ -260,7 +260,7 @@ def test_what_is_refused(case):
     assert (error.file, error.line, error.column) == (None, None, None)
 
 
-# What is no question of values: the exceptions that Python has for it.
+# Mistakes that are not about values raise Python's exceptions.
 OTHERS = {
     "an unknown keyword": (dict(speeed="constant"), TypeError, "speeed"),
     "at and times": (dict(fps=None, at=[0.0], times_=[0.0]), TypeError, "another name"),

@@ -13,7 +13,7 @@ import pytest
 
 HERE = pathlib.Path(__file__).parent
 
-# What each process begins with.
+# The code with which each process begins.
 COMMON = """
 import ctypes, gc, os, re, sys
 import numpy as np
@@ -171,7 +171,7 @@ for engine in all:
     del array
     assert (alive(), files()) == (0, opened)
 
-    # Of a device that is lost nothing is read, and nothing that a stream may wait for in vain is waited for.
+    # After a device is lost, nothing is read from it, and no stream waits for a semaphore that is never signalled.
     array = evaluate(engine)
     array.numpy()
     os.environ["STUB_VULKAN_LOST"] = "1"
@@ -299,7 +299,7 @@ for name in names:
                          "strides": None, "stream": 1}
     assert ctypes.string_at(address, expected.nbytes) == expected.tobytes()
 
-    # Capsules that nobody consumes, and those that somebody does, before and after the array has gone.
+    # Capsules that are not consumed, and capsules that are, before and after the array has gone.
     for options in [{}, {"max_version": (1, 0)}]:
         array.__dlpack__(**options)
         one, delete_one = consumed(array.__dlpack__(**options))
@@ -327,7 +327,7 @@ for name in names:
     order += ["cuDestroyExternalMemory", "cuCtxPopCurrent_v2"]
     assert given_back == order, given_back
 
-    # Nobody was told where it is: nobody's work is waited for.
+    # Its address was not read: no other work is waited for.
     evaluate(engine)
     assert not any("cuCtxSynchronize" in call for call in calls())
 

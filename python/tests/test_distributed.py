@@ -71,7 +71,7 @@ def write_clip(path, rng, tracks=4, keys=24):
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    """Clips in folders, and what one process makes of them."""
+    """Clips in folders, and their results by one process."""
     folder = tmp_path_factory.mktemp("library")
     rng = np.random.default_rng(11)
     for i in range(CLIPS):

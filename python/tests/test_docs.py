@@ -1,4 +1,4 @@
-"""What is written about the package is true: docstrings, README, guide, and types."""
+"""The package's documentation is true: docstrings, README, guide, and types."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is evaluated, its shapes, and the memory that it lies in."""
+"""Results of evaluating, their shapes, and the memory that they lie in."""
 
 from __future__ import annotations
 

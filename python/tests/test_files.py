@@ -411,7 +411,7 @@ def test_other_keys_go_into_the_file_of_a_clip(tmp_path):
     assert "meshes" in again and len(again["animations"][0]["channels"]) == 3
     found = tumble.load(tmp_path / "calm.gltf")
     assert np.array_equal(found["Turn"].keys(0), calm.keys(0)) and len(found["Nod"].keys(0)) == 2
-    # What was read otherwise than the file says is written, and not the file again.
+    # A clip that was read with other offsets is written with these, instead of the file's bytes.
     walk = tmp_path / "walk.npz"
     np.savez(walk, poses=np.zeros((4, 66)), trans=np.zeros((4, 3)), mocap_framerate=30.0)
     offsets = np.arange(66.0).reshape(22, 3)

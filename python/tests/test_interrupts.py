@@ -16,7 +16,7 @@ import pytest
 
 SIGNALS = 100 if os.environ.get("SOAK") else 1
 
-# The calls, by their names: what is called, and the file that it writes, if any.
+# The calls, by their names: the code, and the file that it writes, if any.
 CALLS: dict[str, tuple[str, str | None]] = {
     "load with warnings": ("tumble.load(warns)", None),
     "load a refused file": ("refused(lambda: tumble.load(broken))", None),
@@ -249,5 +249,5 @@ def test_ctrl_c_at_any_moment_is_a_keyboard_interrupt(tmp_path):
     assert lines and lines[-1][:3] == ["still", {}, 24], done.stdout + done.stderr
     for name, found, _, longest in lines[:-1]:
         assert found == {"KeyboardInterrupt": SIGNALS}, (name, found, done.stderr)
-        # The machine has more to do than this: what hangs on takes many seconds.
+        # The machine may be busy; a call that is not interrupted takes many seconds.
         assert longest < 5, (name, longest)

@@ -193,7 +193,7 @@ def test_a_clip_and_its_files_are_one_motion(keys, tmp_path, ending):
 
 
 def differing(keys):
-    """Clips with other joints, and what is said of them."""
+    """Clips with other joints, and the messages about them."""
     return [
         (made(keys, names=["Hip", "Left", "Right", "Left_Toe", "Right_Toe"]), "`hip`.*`Hip`"),
         (made(keys, names=["rig:hip", *NAMES[1:]]), "joint `hip`.*`rig:hip` is near, but only equal names match"),

@@ -257,7 +257,7 @@ def test_slerp_is_scipys(rng):
 
 
 def test_the_example_gives_the_bits_of_every_machine():
-    """Of the vector widths of one machine, and of machines: the sum was recorded on x86-64."""
+    """At every vector width, on every machine: the sum was recorded on x86-64."""
     spec = importlib.util.spec_from_file_location("steps", ROOT / "python/examples/steps.py")
     steps = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(steps)

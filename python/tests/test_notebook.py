@@ -1,4 +1,4 @@
-"""What notebooks show."""
+"""Plots and pages in notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made of samples and clips beside evaluating them, beside NumPy, SciPy and the program."""
+"""Operations on samples and clips other than evaluating them, compared with NumPy, SciPy and the program."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_encodings_have_one_name_each(clip, engine):
         assert np.array_equal(found, engine.axis_angle(clip, degrees=degrees, **options))
         found = engine.encoded(clip, "euler", sequence="zxz", degrees=degrees, **options)
         assert np.array_equal(found, engine.euler(clip, sequence="zxz", degrees=degrees, **options))
-    # What is no angle is not converted.
+    # `degrees` converts angles only.
     found = engine.encoded(clip, "f16", degrees=False, **options)
     assert np.array_equal(found, engine.encoded(clip, "f16", **options))
     for wrong in ["vector", "f64"]:

@@ -1,4 +1,4 @@
-"""Other processes: forked, spawned, interrupted; and what is handed on to them."""
+"""Other processes: forked, spawned, interrupted; and objects that are passed to them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def clip(rng):
 
 
 def everything(clip, engine, path):
-    """Every kind of call; what they gave."""
+    """The results of every kind of call."""
     found = [
         engine.evaluate(clip, fps=30),
         engine.evaluate(clip, fps=30, layout="frame", method="c2"),

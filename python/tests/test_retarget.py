@@ -33,7 +33,7 @@ def test_motions_keep_their_rotations_and_times(rng):
         np.testing.assert_allclose(np.abs(dots), 1, atol=1e-6)
     here, there = (tumble.Engine("cpu").world(it, fps=30, method="slerp")[0] for it in (found, source))
     np.testing.assert_allclose(here, 2 * there, atol=1e-4)
-    # What has no partner rests.
+    # Joints without a partner keep their rest rotations.
     found, report = tumble.retarget(source, target, bones={"hips": "Hips"}, scale=1.0)
     assert report["resting"] == ["arm", "elbow", "hand", "leg"] and report["dropped"] == NAMES[1:]
     np.testing.assert_allclose(np.abs(found.keys("arm")), [[0, 0, 0, 1]])

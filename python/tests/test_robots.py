@@ -44,7 +44,7 @@ def test_bodies_follow_from_joints(arm):
     np.testing.assert_allclose(found["body_ang_vel_w"][3], [0, 0, 0])
     at_mass = arm.forward([0.0, 0.0], order="wxyz", joint_vel=[0.0, 3.0], velocity_at="mass")
     np.testing.assert_allclose(at_mass["body_lin_vel_w"][2], [0, 1.5, 0], atol=1e-15)
-    # What is left out stays where the file has it.
+    # A root pose that is left out is the file's.
     np.testing.assert_allclose(at_mass["body_pos_w"][0], [0, 0, 1])
     many = arm.forward(np.zeros((5, 2, 2)), order="xyzw", body_order="breadth-first")
     assert many["body_pos_w"].shape == (5, 2, 4, 3)

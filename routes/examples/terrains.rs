@@ -1,4 +1,4 @@
-//! What a route across a rough terrain costs: time, and the memory at its peak.
+//! The cost of a route across a rough terrain: time, and the memory at its peak.
 //!
 //! `cargo run --release -p tumble-routes --example terrains [-- TRIANGLES BY ROUGHNESS]`
 

@@ -284,7 +284,7 @@ fn halve(
         let middle = |one, other| middles.get(&edge(one, other)).copied();
         let side = longest_sides[index];
         let [a, b, c] = [0, 1, 2].map(|k| triangle[(side + k) % 3]);
-        // The longest edge a-b first, then what is left of the others.
+        // The longest edge a-b first, then the rest of the others.
         let Some(ab) = middle(a, b) else { continue };
         let mut parts = Vec::with_capacity(4);
         match middle(b, c) {

@@ -109,7 +109,7 @@ fn who_cannot_pass_is_told() {
     let plans = plan(&[along_x(), back.clone()], &[]);
     assert_arrives(&plans[0], 10.0);
     assert_eq!(plans[1], Err(WalkerError::Blocked));
-    // One who blocks nobody at last: it starts after the other has gone by.
+    // A mover that blocks no other: it starts after the other has gone by.
     let aside = straight(dvec3(3.0, 0.0, 0.0), dvec3(3.0, 9.0, 0.0));
     let plans = plan(&[aside, along_x()], &[]);
     assert_arrives(&plans[1], 10.0);
@@ -125,7 +125,7 @@ fn a_start_is_waited_for_where_one_stands() {
     assert_arrives(&plans[0], 12.0);
     let times = &plans[0].as_ref().unwrap().times;
     assert_eq!((times[0].0, times[1].0, times[1].1), (0.0, 2.0, 0.0));
-    // Somebody runs it over meanwhile.
+    // Another mover runs it over meanwhile.
     let runs = Mover {
         track: vec![(0.0, dvec3(0.0, -5.0, 0.0)), (2.0, dvec3(0.0, 5.0, 0.0))],
         radius: 0.5,

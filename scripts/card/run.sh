@@ -38,7 +38,7 @@ mkdir "$results" 2>/dev/null || results=$(mktemp -d)/$name && mkdir -p "$results
 summary=$results/summary.txt
 say() { echo "$*" | tee -a "$summary"; }
 
-# The system's loader where there is one: it is what programs here have. Else Debian's.
+# The system's loader, which other programs use here, if there is one; else Debian's.
 if ! (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'); then
     export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
     loader="the loader of this archive"
@@ -46,8 +46,8 @@ else
     loader="the system's loader"
 fi
 export VK_LAYER_PATH=$here/layers
-# Nothing is known from before, and nothing is left behind: what drivers compile for one engine serves the next from
-# a folder that goes at the end.
+# Nothing is known from before, and nothing is left behind: the drivers' compiled kernels are kept for the next engine
+# in a folder that is deleted at the end.
 caches=$(mktemp -d) || exit 1
 trap 'rm -rf "$caches"' EXIT
 export TUMBLE_CACHE_DIR="" MESA_SHADER_CACHE_DIR=$caches __GL_SHADER_DISK_CACHE_PATH=$caches
@@ -115,7 +115,7 @@ say "$loader; $chosen"
     command -v nvidia-smi >/dev/null && timeout 20 nvidia-smi -q
 } >"$results/environment.txt" 2>&1
 
-# A step: its name, its limit, the command. What it says goes into files; its last line into the summary.
+# A step: its name, its limit, the command. Its output goes into files; its last line into the summary.
 worst=0
 step() {
     local name=$1 limit=$2 started=$SECONDS code=0 outcome
@@ -136,7 +136,7 @@ step prove "$prove_limit" ./tumble prove "${device[@]}" --time-limit "$prove_sec
 step prove-validate "$validate_limit" \
     ./tumble prove "${device[@]}" --time-limit "$validate_seconds" --validate -o "$results/proof-validated.json"
 proved=$worst
-# What the engine might do otherwise, and the bits and the speed of what follows.
+# Variants of the kernels; then a proof and a timing with the variants that the lab chose.
 step lab "$lab_limit" ./tumble lab "${device[@]}" --time-limit "$lab_seconds" -o "$results/lab.json"
 step prove-lab "$chosen_limit" ./tumble prove "${device[@]}" --quick --time-limit "$chosen_seconds" \
     --lab "$results/lab.json" -o "$results/proof-lab.json"

@@ -68,7 +68,7 @@ pub(crate) struct Fades {
     /// The fades that have not ended, then the others.
     all: Vec<EntryFade>,
     running: usize,
-    /// Of each entry the index of its fade among all, counted from 1; 0 where it has none. Empty before the first.
+    /// For each entry the index of its fade among all, counted from 1; 0 if it has none. Empty before the first fade.
     of_entry: Vec<u32>,
 }
 

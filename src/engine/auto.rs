@@ -24,7 +24,7 @@ const PROBE_TRACKS: usize = 512;
 const PROBE_FRAMES: usize = 1024;
 
 /// A set for measuring a device: 2^19 rotations are evaluated from it.
-#[allow(clippy::disallowed_methods)] // nobody sees the results
+#[allow(clippy::disallowed_methods)] // the results are not returned
 fn probe() -> Result<TrackSet, Error> {
     let last = (PROBE_FRAMES - 1) as f64;
     let times = (0..18u8).map(|i| last * f64::from(i) / 17.0).collect();
@@ -106,7 +106,7 @@ impl Engine {
         let cache = Cache::new(&options.cache_files);
         let (mut models, mut timed) = (HashSet::new(), Vec::new());
         for device in Device::list().unwrap_or_default() {
-            // Of several cards of one model the first serves as well as any.
+            // Cards of one model are equally fast: the first one is timed.
             let Some(model) = model(&device).filter(|_| !device.is_software()) else {
                 continue;
             };

@@ -1,4 +1,4 @@
-//! For tests: what engines did, noted where they do it.
+//! For tests: the steps that engines took, recorded as they are taken.
 
 use std::sync::Mutex;
 

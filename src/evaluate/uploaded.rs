@@ -84,7 +84,7 @@ impl Uploaded {
         Ok(Self::Unprepared(Box::new(UnpreparedSet { set, data })))
     }
 
-    /// The segments, or what is known without them.
+    /// The segments, or the data that is known without them.
     pub(crate) fn data(&self) -> &ClipData {
         match self {
             Self::Prepared(clip) => clip.data(),

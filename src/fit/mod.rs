@@ -19,7 +19,7 @@
 //!
 //! | type | what it is |
 //! |---|---|
-//! | [`block::Intervals`] | up to 128 key intervals, one a lane, and what is computed of them in f64 |
+//! | [`block::Intervals`] | up to 128 key intervals, one a lane, and their f64 intermediate results |
 //! | [`block::TrackStretch`] | which lanes are consecutive intervals of which track |
 //! | [`tangent_weights::KeyWeights`] | how the steps on both sides of a key count in its tangent |
 //! | [`fast::handles::HandlesF32`] | steps, handles and curves of the same intervals in f32 |

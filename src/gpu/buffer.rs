@@ -246,7 +246,7 @@ impl Buffer {
         if external.is_some() {
             info = info.push_next(&mut kinds);
         }
-        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // SAFETY: the device is alive, here and below; created objects are destroyed
         // in `drop`, also when a later step fails.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
         // SAFETY: the buffer was just created.
@@ -265,7 +265,7 @@ impl Buffer {
     fn bind(&mut self, memory: Share, is_texels: bool, name: &str) -> Result<(), VulkanError> {
         let device = &self.device.raw;
         self.memory = memory; // goes with the buffer, also when a later step fails
-        // SAFETY: memory of a type that the buffer allows, of which nothing else uses this part.
+        // SAFETY: memory of a type that the buffer allows, and nothing else uses this part of it.
         unsafe { device.bind_buffer_memory(self.raw, memory.memory, memory.offset) }
             .named("vkBindBufferMemory")?;
         if is_texels {
@@ -360,7 +360,7 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         if self.device.may_destroy() {
-            // SAFETY: created from this device and no longer in use: whoever submits
+            // SAFETY: created from this device and no longer in use: the code that submits
             // work keeps its buffers until the fence is signalled. Freeing memory
             // unmaps it; null handles are allowed.
             unsafe {

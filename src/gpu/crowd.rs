@@ -316,7 +316,7 @@ impl MachineCrowd for VulkanCrowd {
 
 /// A target whose result the host reads: it is in host-visible memory, and a submission does not wait.
 struct CrowdReader {
-    // It goes first: it waits for what uses the rest.
+    // Dropped first: it waits for the work that uses the rest.
     results: KernelResults,
     target: CrowdTarget,
 }

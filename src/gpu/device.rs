@@ -399,7 +399,7 @@ impl DeviceQueue {
 impl Drop for DeviceQueue {
     fn drop(&mut self) {
         let mut all = lock(&LOCKS);
-        // While the table is locked, nobody else can begin to use the lock.
+        // While the table is locked, no other thread can begin to use the lock.
         if Arc::strong_count(&self.of_engines) == 1 {
             all.remove(&self.raw.as_raw());
         }

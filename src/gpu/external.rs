@@ -23,7 +23,7 @@ const TIMEOUT_SECONDS: u64 = 60;
 
 /// The memory of a result, and the semaphore that the device signals when it has written it.
 pub(crate) struct Exported {
-    // It goes first: nobody waits for it any more when the buffer is freed.
+    // Dropped first: no thread waits for it any more when the buffer is freed.
     done: Option<Mutex<Semaphore>>,
     /// The semaphore's value when the last submitted work has ended.
     submitted: AtomicU64,

@@ -88,8 +88,8 @@ impl VulkanHandles {
 }
 
 /// The version of an instance that was made for the version `stated`, by a loader of the version `loader`; `None` if it
-/// is older than 1.1. An application may state a newer version than its loader's, which then counts: Vulkan tells for
-/// which version an instance was made to nobody, so that a mistake cannot be told from this.
+/// is older than 1.1. An application may state a newer version than its loader's, which then counts: Vulkan has no
+/// query for the version of an instance, so that a mistake cannot be told from this.
 fn usable_version(stated: u32, loader: u32) -> Option<u32> {
     let is_vulkan = vk::api_version_variant(stated) == 0; // others are other interfaces, such as Vulkan SC
     (is_vulkan && stated >= vk::API_VERSION_1_1).then_some(stated.min(loader))
@@ -174,7 +174,7 @@ impl VulkanBuffer {
         if self.buffer == vk::Buffer::null() {
             return Err(VulkanError::NullHandle { name: "buffer" });
         }
-        // SAFETY: the buffer belongs to the device, as whoever makes requests of it promises.
+        // SAFETY: the buffer belongs to the device, as the caller who makes requests of it promises.
         let memory = unsafe { device.get_buffer_memory_requirements(self.buffer) }.size;
         match self.offset.checked_add(self.size) {
             Some(end) if end <= memory => Ok(()),

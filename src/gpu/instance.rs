@@ -86,7 +86,7 @@ impl Instance {
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
         let layers = [VALIDATION.as_ptr()];
-        // Loaders list drivers that have not all of Vulkan (MoltenVK) only to those who say they know.
+        // Loaders list drivers without all of Vulkan (MoltenVK) only with this extension and flag.
         let portability = has_extension(None, khr::portability_enumeration::NAME)?;
         let extensions = [
             (debug_utils, ext::debug_utils::NAME),
@@ -223,7 +223,7 @@ const HOMEBREW: [&str; 4] = [
 
 /// The loader's library.
 fn loader() -> Result<ash::Entry, VulkanError> {
-    // SAFETY: loading a library runs its initialisers; that is what is asked for.
+    // SAFETY: loading a library runs its initialisers, which is intended.
     let default = unsafe { ash::Entry::load() };
     default.or_else(|error| {
         let others = HOMEBREW.iter().filter(|_| cfg!(target_os = "macos"));

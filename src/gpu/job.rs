@@ -306,7 +306,7 @@ impl ListCache {
                 return Ok(None);
             }
         }
-        // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
+        // Made without a lock. If several callers make the same lists, those of the last are kept.
         let made = match KeptLists::new(device, request, whole, values_per_window) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
             made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MAX_BYTES),

@@ -123,7 +123,7 @@ impl Pipeline {
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&list);
-        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // SAFETY: the device is alive, here and below; created objects are destroyed
         // in `drop`, also when a later step fails.
         pipeline.set_layout = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
             .named("vkCreateDescriptorSetLayout")?;

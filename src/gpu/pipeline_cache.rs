@@ -38,7 +38,7 @@ impl PipelineCache {
         cache
     }
 
-    /// An application's cache, of which nothing is stored.
+    /// An application's cache, which the engine does not store.
     pub(crate) fn of_application(raw: vk::PipelineCache, physical: &PhysicalDevice) -> Self {
         Self {
             raw,
@@ -73,8 +73,8 @@ impl PipelineCache {
     /// Makes a pipeline cache of Vulkan with data of the driver; null if that fails.
     fn with(device: &ash::Device, data: &[u8]) -> vk::PipelineCache {
         let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
-        // SAFETY: the device is alive, and the data is headed as its driver heads it; whoever calls destroys
-        // what is made.
+        // SAFETY: the device is alive, and the data has the header of its driver; the caller destroys the
+        // cache.
         unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default()
     }
 
@@ -99,7 +99,7 @@ impl PipelineCache {
             true => null,
             false => Self::with(device, &kept),
         };
-        // SAFETY: both caches are this device's, and nobody else uses `others`.
+        // SAFETY: both caches are this device's, and no other thread uses `others`.
         let data = unsafe {
             if others == null {
                 device.get_pipeline_cache_data(self.raw)

@@ -177,9 +177,9 @@ pub enum CommandUsers {
     Host,
 }
 
-/// Between which of an application's commands a target is recorded. What it records waits for those before it and
-/// their writes, and those after it see its results. Fewer users are waited for in less time: all commands, the default,
-/// wait for drawing, too.
+/// Between which of an application's commands a target is recorded. Its commands wait for those before them and
+/// their writes, and those after them see its results. Fewer users are waited for in less time: all commands, the
+/// default, wait for drawing, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CommandScopes {
     /// The users before it of its inputs and of the memory of its result.
@@ -227,7 +227,7 @@ impl From<CommandUsers> for Users {
 pub(crate) struct Commands<'a> {
     device: &'a LogicalDevice,
     raw: vk::CommandBuffer,
-    /// What barriers to and from any other commands order.
+    /// The work before and after these commands that their barriers order.
     scopes: CommandScopes,
 }
 
@@ -260,7 +260,7 @@ impl<'a> Commands<'a> {
         }
     }
 
-    /// Records a dispatch of what is bound. A row of more workgroups than the limit along x continues along y.
+    /// Records a dispatch of the bound kernel. A row of more workgroups than the limit along x continues along y.
     fn dispatch(self, bound: &BoundSet, constants: &[u8], [x, y, z]: [u32; 3]) {
         let limit = self.device.physical.info.max_compute_work_group_count[0];
         let [x, y, z] = match x > limit {

@@ -58,7 +58,7 @@ impl Submission {
         };
         let raw = &device.raw;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.family(lane));
-        // SAFETY: the device is alive, here and below; what is created is destroyed
+        // SAFETY: the device is alive, here and below; created objects are destroyed
         // in `drop`, also when a later step fails.
         submission.pool =
             unsafe { raw.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
@@ -90,7 +90,7 @@ impl Submission {
     /// The command buffer in the recording state, after `begin`, for commands before the submission's work. The caller
     /// keeps the used resources alive until `wait`.
     pub(crate) fn commands(&mut self) -> Commands<'_> {
-        // SAFETY: the command buffer is this device's, and nobody else records while `self` is lent; callers
+        // SAFETY: the command buffer is this device's, and no other code records while `self` is lent; callers
         // have called `begin`, so recording is on.
         unsafe { Commands::new(&self.device, self.commands) }
     }
@@ -288,7 +288,7 @@ impl Semaphore {
         if exported.is_some() {
             info = info.push_next(&mut export);
         }
-        // SAFETY: the device is alive, with the feature; what is made is destroyed in `drop`.
+        // SAFETY: the device is alive, with the feature; the semaphore is destroyed in `drop`.
         let raw = unsafe { device.raw.create_semaphore(&info, None) }.named("vkCreateSemaphore")?;
         device.name(raw, name);
         Ok(Self {
@@ -314,7 +314,7 @@ impl Drop for Semaphore {
             if !self.is_exported {
                 self.device.settle(); // timelines that can be exported are no such
             }
-            // SAFETY: created from this device; whoever submits with it waits for that before.
+            // SAFETY: created from this device; the code that submits with it has waited for the work.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
         }
     }

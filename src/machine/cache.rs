@@ -101,8 +101,8 @@ impl Cache {
     }
 }
 
-/// Whether nobody but this process's user and the system's administrator could have written a file: a driver gets the
-/// compiled kernels in it, and a checksum can be made by anybody.
+/// Whether only this process's user and the system's administrator could have written a file: a driver gets the
+/// compiled kernels in it, and a checksum is no protection, because anyone can compute it.
 #[cfg(unix)]
 fn is_trusted(metadata: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;

@@ -1,15 +1,15 @@
-//! Machines: what evaluates. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement one trait, and the
-//! layers above know no other difference.
+//! Machines evaluate. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement one trait, and the layers
+//! above know no other difference.
 //!
 //! * [`Machine`]: evaluates rows of samples, takes prepared tracks ([`MachineClip`]) and crowds ([`MachineCrowd`]), and
 //!   runs passes over poses ([`PassRunner`]). A request goes to a machine as its [`Plan`](plan::Plan) says, which depends
 //!   on the machine's [`Limits`] alone.
 //! * [`ListedDevice`]: a device that is not open yet.
 //! * [`EngineOptions`], [`EvaluateError`], [`reports`] and the files that
-//!   are kept from process to process ([`cache`]): what every build has, with and without the feature `vulkan`.
+//!   are kept from process to process ([`cache`]): every build has them, with and without the feature `vulkan`.
 //!
-//! What only a Vulkan device can do, such as write into an application's buffer, is no method of the traits: its callers
-//! ask for the device itself (`gpu::Opened::of`).
+//! The traits have no methods for operations of Vulkan devices alone, such as writing into an application's buffer:
+//! callers ask for the device itself (`gpu::Opened::of`).
 
 pub(crate) mod cache;
 // The host evaluates its crowds without them.
@@ -44,7 +44,7 @@ use crate::time::frames::Timeline;
 
 /// A machine that evaluates. All machines give the same bits.
 pub(crate) trait Machine: Any + Send + Sync {
-    /// What plans depend on.
+    /// The capabilities of the machine on which plans depend.
     fn limits(&self) -> Limits;
 
     /// The vectors in which the host computes its part.
@@ -68,7 +68,8 @@ pub(crate) trait Machine: Any + Send + Sync {
     /// Takes prepared tracks, for any number of evaluations.
     fn clip(self: Arc<Self>, data: ClipData) -> Result<Box<dyn MachineClip>, EvaluateError>;
 
-    /// Calls `work` with what runs its passes over poses. If memory runs out, the call is repeated with smaller windows.
+    /// Calls `work` with the runner of its passes over poses. If memory runs out, the call is repeated with smaller
+    /// windows.
     fn passes(
         &self,
         work: &mut dyn FnMut(&dyn PassRunner) -> Result<(), EvaluateError>,

@@ -90,7 +90,7 @@ pub enum PrepareArcs {
     OnDevice,
 }
 
-/// Where an engine keeps, from process to process, what takes time to find out: the driver's compiled kernels
+/// Where an engine keeps, from process to process, data that takes time to make: the driver's compiled kernels
 /// (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed of each model of card
 /// (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no other files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -24,7 +24,7 @@ use crate::tracks::set::TrackSet;
 /// How a clip is evaluated whose segments are prepared.
 pub(crate) const PREPARED: &str = "from the clip's segments, which are prepared already";
 
-/// What a machine can do, as far as plans depend on it.
+/// The capabilities of a machine on which plans depend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limits {
     pub(crate) kind: MachineKind,

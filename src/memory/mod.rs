@@ -58,8 +58,8 @@ pub(crate) fn refuse_more_than_there_is<T>(
     }
 }
 
-/// The memory that this process can still get without swap space, bytes: what the system has free or can free; in a
-/// container at most what its limit leaves. `None` where the system does not say, such as in a browser.
+/// The memory that this process can still get without swap space, bytes: the memory that the system has free or can
+/// free; in a container at most the rest of its limit. `None` where the system does not say, such as in a browser.
 ///
 /// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less than they need is available, swap
 /// space included. Systems may promise memory that they do not have, and then end the process that uses it.
@@ -96,7 +96,7 @@ fn left(swap: Swap) -> Option<u64> {
     Some(within_limits(free, system.total_memory(), limits))
 }
 
-/// Of the memory that a system has free, what a container's limit leaves: the limit without what its processes use.
+/// The part of a system's free memory that a container's limit leaves: the limit without the memory of its processes.
 /// Files that it has in memory give way. A limit of all memory is none.
 #[cfg(not(target_family = "wasm"))]
 fn within_limits(free: u64, total: u64, limits: Option<(u64, u64)>) -> u64 {

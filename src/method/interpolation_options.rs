@@ -1,4 +1,4 @@
-//! The options of interpolations without the method: what an [`Interpolation`] has for any of them.
+//! The options of an [`Interpolation`] besides its method.
 
 use crate::curve::options::{Ends, KeySigns, Quantity, Speed};
 use crate::method::Method;
@@ -68,7 +68,7 @@ pub enum OptionValueError {
     },
 }
 
-/// An option by its name: how it is set in [`InterpolationOptions`], and what is set there.
+/// An option by its name: how it is set in [`InterpolationOptions`], and its value there.
 #[derive(Clone, Copy)]
 pub struct InterpolationOption {
     /// The name that programs and bindings use.

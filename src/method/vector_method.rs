@@ -1,4 +1,4 @@
-//! The interpolation methods for translations, scales and scalars, and what is evaluated of them.
+//! The interpolation methods for translations, scales and scalars, and the quantities evaluated of them.
 
 use crate::names::names;
 use crate::tracks::per_track::PerTrack;
@@ -41,7 +41,7 @@ impl From<VectorMethod> for PerTrack<VectorMethod> {
     }
 }
 
-/// What is evaluated of a scalar or of a vector.
+/// The quantity evaluated of a scalar or a vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ScalarQuantity {
     /// The number itself.

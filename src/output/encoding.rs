@@ -477,7 +477,7 @@ fn of_matrix(number: &StoredNumbers, length: usize, order: u32) -> [f32; 4] {
     Quat::from_mat3(&matrix).to_array()
 }
 
-/// What stores of kernels are for.
+/// The encodings of the kernels' store functions.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 impl Encoding {
     /// Every encoding with every value of its options, in the order of [`Encoding::ALL`].

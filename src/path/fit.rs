@@ -170,7 +170,7 @@ impl InLanes for InFit<'_> {
                     }
                     continue;
                 }
-                // Of both signs the one nearer to the middle.
+                // The sign with which it is nearer to the middle.
                 let cosine = dot(*value, middle);
                 is_too_long = L::Doubles::all(MIN_HALF_ANGLE_COSINE).up_to(
                     magnitude(cosine),

@@ -65,7 +65,7 @@ impl PreparedPaths {
             })
         };
         let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
-        // Of several errors that of the first track counts.
+        // If several tracks have errors, that of the first track is returned.
         let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
         let batches = batches
             .into_iter()

@@ -157,7 +157,7 @@ impl Engine {
         Ok(Samples::new(Box::new(quats), tracks, samples, layout))
     }
 
-    /// What is prepared of vectors or scalars for these samples.
+    /// The request by which vectors or scalars are prepared for these samples alone.
     pub(super) fn vector_request<'a>(
         &self,
         quantity: ScalarQuantity,

@@ -20,7 +20,7 @@
 //! | [`fast::FastPreparation`] | its fast way, in f32 straight from four keys |
 //! | [`fitting::Fitting`] | its exact way: queues of curves that wait for a full block, and the cutter |
 //! | [`constant_speed::PendingInterval`] | a curve at constant speed, until its whole track is there |
-//! | [`prepared::Prepared`] | what comes of a batch |
+//! | [`prepared::Prepared`] | the result of preparing a batch |
 //! | [`clip_data::ClipData`] | all that is prepared of a clip, and which parts a track has |
 //!
 //! # Steps

@@ -273,7 +273,7 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
             from,
             to,
         } => {
-            // Of tracks with few keys in the span as many as may be together.
+            // As many tracks together as their keys in the span allow.
             let (mut start, mut keys) = (tracks.start, 0);
             let span = |tracks| Batch::Span { tracks, from, to };
             for (track, intervals) in whole.intervals(set) {

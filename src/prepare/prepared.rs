@@ -19,7 +19,7 @@ use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
 use crate::tracks::signs::SignBits;
 
-/// Segments of some tracks, with what is needed to find the segment of a sample.
+/// Segments of some tracks, with the tables by which the segment of a sample is found.
 pub(crate) struct Prepared {
     pub(crate) segments: Segments,
     /// Rotations that are stored without a curve: keys and end values.

@@ -188,7 +188,7 @@ fn string_words(text: &str) -> Vec<u32> {
         .collect()
 }
 
-/// The module without its `NoContraction` decorations: what a driver would compile without the exactness pass. Tests
+/// The module without its `NoContraction` decorations, as a driver would compile it without the exactness pass. Tests
 /// use it to show that the pass has an effect.
 ///
 /// # Errors

@@ -260,7 +260,7 @@ fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
     }
     let (sender, has_begun) = mpsc::channel();
     thread.spawn(move || {
-        let _ = sender.send(()); // whoever waits is there
+        let _ = sender.send(()); // the receiver waits below
         drop(sender);
         worker.run();
     })?;
@@ -316,8 +316,8 @@ mod tests {
         assert_eq!(on_threads(rayon::current_num_threads), Ok(count()));
     }
 
-    /// A worker of somebody else's pool that took up another task while it waits would meet the lock of
-    /// the one below it on its own stack.
+    /// A worker of another library's pool that took up another task while it waits would meet the lock of
+    /// the task below on its own stack.
     #[test]
     fn a_callers_worker_that_waits_takes_up_no_other_task() {
         let callers = rayon::ThreadPoolBuilder::new()

@@ -144,7 +144,7 @@ impl FromStr for FrameRate {
     }
 }
 
-/// The ratio of a decimal rounded to 15 significant digits, which is what f64 holds of any.
+/// The ratio of a decimal rounded to 15 significant digits, as many as f64 holds of any decimal.
 fn rounded_ratio(text: &str) -> Option<(u64, u64)> {
     let is_part = |byte: u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'e' | b'E' | b'-');
     let number: f64 = text.bytes().all(is_part).then(|| text.parse().ok())??;

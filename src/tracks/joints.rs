@@ -189,8 +189,8 @@ impl Joints {
         &self.names
     }
 
-    /// The pairs of joints with equal names, and the joints without a partner. `clips` are what this clip and the other
-    /// are called in messages. Parents are not compared ([`Joints::check_parents`]).
+    /// The pairs of joints with equal names, and the joints without a partner. `clips` are the names of this clip and
+    /// the other in messages. Parents are not compared ([`Joints::check_parents`]).
     ///
     /// # Errors
     /// When two joints of one clip have the same name, unless the names of both clips are equal, in the same order.
@@ -217,7 +217,7 @@ impl Joints {
     }
 
     /// Adds the joints of the other clip that this one does not have, behind those that it has, and returns the index
-    /// here of each joint of the other. `clips` are what this clip and the other are called in messages. Joints whose
+    /// here of each joint of the other. `clips` are the names of this clip and the other in messages. Joints whose
     /// parents are not known become roots.
     ///
     /// # Errors
@@ -285,7 +285,7 @@ impl Joints {
     }
 
     /// For each joint of this clip, the index of the same joint in the other. Both have the same joints with the same
-    /// parents, where the parents of both are known. `clips` are what this clip and the other are called in messages.
+    /// parents, where the parents of both are known. `clips` are the names of this clip and the other in messages.
     ///
     /// # Errors
     /// The first difference.
@@ -420,7 +420,7 @@ fn by_name<'a>(
 /// A name for each joint by its index.
 type Numbering = fn(usize) -> String;
 
-/// What BVH files call a joint without a name.
+/// The name that is read from BVH files for a joint without one.
 fn bvh_name(joint: usize) -> String {
     format!("joint{joint}")
 }
@@ -440,7 +440,7 @@ fn numbers_of(names: &[String], numbering: Numbering) -> Option<Vec<usize>> {
     (!numbers.is_empty()).then_some(numbers)
 }
 
-/// Whether two names differ only in case, in what separates their words, or in a prefix such as `mixamorig:`.
+/// Whether two names differ only in case, in the separators of their words, or in a prefix such as `mixamorig:`.
 fn are_near(name: &str, other: &str) -> bool {
     let plain = |name: &str| -> String {
         let letters = name.chars().filter(|letter| letter.is_alphanumeric());
@@ -573,7 +573,7 @@ mod tests {
             [0, 1]
         );
         assert!(!unnamed.is_named());
-        // Of names that occur twice, only equal lists can be matched.
+        // Lists in which a name occurs twice are matched only if they are equal.
         let mut twice = chain(&["hip", "toe", "toe"]);
         assert_eq!(twice.extend(&twice.clone(), LABELS).unwrap(), [0, 1, 2]);
         assert!(twice.extend(&chain(&["hip", "toe"]), LABELS).is_err());

@@ -1,5 +1,5 @@
-//! What the generated entry points run on: numbers, the memory that kernels share, and workgroups whose invocations
-//! wait for each other.
+//! The machine on which the generated entry points run: numbers, the memory that kernels share, and workgroups whose
+//! invocations wait for each other.
 
 use std::cell::RefCell;
 use std::future::Future;
@@ -18,7 +18,7 @@ pub(crate) const UNTOUCHED: u32 = u32::MAX;
 pub(crate) struct Entry {
     /// The variables that it binds, in their order.
     pub(crate) bound: &'static [Global],
-    /// The variable with what comes with a dispatch.
+    /// The variable with the constants of a dispatch.
     pub(crate) pushed: Option<Global>,
     /// The invocations of a workgroup.
     pub(crate) workgroup: u32,
@@ -163,7 +163,7 @@ pub(crate) fn both<A: Copy, B: Copy, R, const N: usize>(
     std::array::from_fn(|i| operation(a[i], b[i]))
 }
 
-/// Of each component the accepted one or the rejected one.
+/// For each component, that of `accept` where the condition holds, else that of `reject`.
 #[inline]
 pub(crate) fn choose<T: Copy, const N: usize>(
     conditions: [bool; N],
@@ -182,7 +182,7 @@ pub(crate) struct InvocationIds {
     pub(crate) local_invocation_index: u32,
 }
 
-/// What an invocation of a kernel runs on.
+/// The machine on which an invocation of a kernel runs: its indices and its memory.
 pub(crate) trait Machine {
     type F: Float;
     /// Lives as long as a block of statements runs.
@@ -229,8 +229,8 @@ impl Watch for () {
     fn block(&self, _: u32, _: usize) {}
 }
 
-/// A kernel's buffers, what comes with its dispatch, and the memory of a workgroup. Stores make a buffer longer; what
-/// is loaded from behind its end is [`UNTOUCHED`].
+/// A kernel's buffers, the constants of its dispatch, and the memory of a workgroup. Stores make a buffer longer; loads
+/// from behind its end give [`UNTOUCHED`].
 pub(crate) struct Memory {
     code: usize,
     variables: Vec<RefCell<Vec<u32>>>,

@@ -253,7 +253,7 @@ impl Application {
         let info = vk::CommandBufferAllocateInfo::default()
             .command_pool(self.pool)
             .command_buffer_count(1);
-        // SAFETY: the device, its pools and the commands are alive, and nobody else uses them.
+        // SAFETY: the device, its pools and the commands are alive, and nothing else uses them.
         let commands =
             unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?[0];
         let info = vk::CommandBufferBeginInfo::default();
@@ -334,7 +334,7 @@ impl Application {
     /// Submits commands one after another, without a wait between them, and waits for the last.
     pub(crate) fn run(&mut self, all: &[vk::CommandBuffer]) -> Result<Elapsed, VulkanError> {
         let device = &self.device;
-        // SAFETY: the device is alive, here and below, and nobody else uses its queue now.
+        // SAFETY: the device is alive, here and below, and nothing else uses its queue now.
         let fence = unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
         let started = Instant::now();
@@ -358,7 +358,7 @@ impl Application {
             });
         }
         if waited.is_err() {
-            // SAFETY: as above. What was submitted must end before the fence goes.
+            // SAFETY: as above. Submitted work must end before the fence is destroyed.
             let _ = unsafe { device.device_wait_idle() };
         }
         // SAFETY: as above.
@@ -376,7 +376,7 @@ impl Application {
         if self.stamps != vk::QueryPool::null() {
             let mut stamps = [0u64; 2];
             let flags = vk::QueryResultFlags::TYPE_64;
-            // SAFETY: the pool has two queries, and what writes them has ended.
+            // SAFETY: the pool has two queries, and the commands that write them have ended.
             let read =
                 unsafe { (self.device).get_query_pool_results(self.stamps, 0, &mut stamps, flags) };
             elapsed.on_device = (read.is_ok())
@@ -422,7 +422,7 @@ impl ApplicationBuffer {
 
 impl Drop for ApplicationBuffer {
     fn drop(&mut self) {
-        // SAFETY: created from this device, which whoever has the buffer keeps; no work uses it any more,
+        // SAFETY: created from this device, which the owner of the buffer keeps; no work uses it any more,
         // because `Application::run` waits. Null is allowed.
         unsafe {
             self.device.destroy_buffer(self.raw, None);

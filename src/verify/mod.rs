@@ -357,7 +357,7 @@ impl TrackErrors {
         let mut errors = Self::default();
         for (sample, quat) in row.iter().enumerate() {
             if sample % 64 == 0 && stop::is_stopped() {
-                return errors; // whoever verifies looks again
+                return errors; // the caller checks for the stop again
             }
             let quat = quat.as_dquat();
             let norm = worse((quat.length() - 1.0).abs());

@@ -181,7 +181,7 @@ fn rate_error(
         let (mut error, mut largest) = (0.0f64, rate_floor(times, interpolation.quantity));
         for sample in (0..samples).step_by(each) {
             if stop::check_of(stop.as_ref()).is_err() {
-                return 0.0; // whoever verifies looks again
+                return 0.0; // the caller checks for the stop again
             }
             let time = keys.of_sample(timeline, index, sample);
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();

@@ -358,7 +358,7 @@ fn crowd_round(
 mod tests {
     use super::*;
 
-    /// Each engine reports the first track that one of its threads refuses; what only one refuses is an error.
+    /// Each engine reports the first track that one of its threads refuses; a set that only one refuses is an error.
     #[test]
     fn both_may_refuse_in_other_words() {
         let cpu = Engine::new(crate::device::Device::Cpu).expect("threads");

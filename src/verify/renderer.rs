@@ -90,7 +90,7 @@ impl Renderer {
     ) -> Result<(), Error> {
         let range = buffer.range(offset, buffer.size - offset);
         let request = clip.request(frames).layout(layout).encoding(encoding);
-        // SAFETY: the buffer is of the same application, made for both uses, and nobody uses it now.
+        // SAFETY: the buffer is of the same application, made for both uses, and nothing uses it now.
         unsafe { request.to_buffer(range) }
     }
 
@@ -172,7 +172,7 @@ pub(crate) fn record(
     unsafe { crowd.record(target, commands) }
 }
 
-/// What is recorded of a target between others of the same.
+/// The scopes of a recording between others of the same target.
 const IN_ROW: CommandScopes = CommandScopes {
     before: CommandUsers::KernelsAndCopies,
     after: CommandUsers::KernelsAndCopies,
@@ -183,7 +183,7 @@ pub(crate) fn record_clip_in_row(
     target: &ClipTarget,
     commands: ash::vk::CommandBuffer,
 ) -> Result<(), Error> {
-    // SAFETY: as in `record_clip`; nobody else uses the result's memory.
+    // SAFETY: as in `record_clip`; nothing else uses the result's memory.
     Ok(unsafe { target.record_between(commands, 0, IN_ROW) }?)
 }
 
@@ -193,7 +193,7 @@ pub(crate) fn record_in_row(
     target: &CrowdTarget,
     commands: ash::vk::CommandBuffer,
 ) -> Result<(), CrowdError> {
-    // SAFETY: as in `record`; nobody else uses the result's memory.
+    // SAFETY: as in `record`; nothing else uses the result's memory.
     unsafe { crowd.record_between(target, commands, IN_ROW) }
 }
 

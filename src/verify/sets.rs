@@ -223,7 +223,7 @@ pub(crate) fn vectors_set() -> TrackSet {
     set
 }
 
-/// Scalars of which some share their key times, and some have tangents.
+/// Scalars, some of which share their key times, and some of which have tangents.
 pub(crate) fn scalars_set() -> TrackSet {
     let mut set = TrackSet::new();
     let mut random = SeededRandom(29);

@@ -6,7 +6,7 @@ use tumble::crowd::{Crowd, CrowdError, CrowdFade, CrowdLayer, CrowdValues};
 use super::{SOME, bits, cpu, crowds, evaluated, layer, library};
 use crate::support::Random;
 
-/// Three layers each: what every instance plays, and how its upper layers fade.
+/// Three layers each: the clips of every instance, and how its upper layers fade.
 const LAYERS: usize = 3;
 const INSTANCES: usize = 41;
 
@@ -141,7 +141,7 @@ fn both_ends_of_a_fade_are_exact() {
     }
 }
 
-/// A fade that is set while another runs goes on from the weight that was reached; what is set ends it.
+/// A fade that is set while another runs goes on from the weight that was reached; setting the layer ends it.
 #[test]
 fn fades_take_over_from_each_other() {
     let mut random = Random(47);
@@ -165,7 +165,7 @@ fn fades_take_over_from_each_other() {
     assert_eq!(weights(&crowd), [0.25, 0.125, 0.75, 0.625]);
     crowd.advance_ticks(300).unwrap();
     assert_eq!(weights(&crowd), [0.0, 0.125, 0.75, 1.0]);
-    // Before it began, the fade that runs is what it began from.
+    // Before its start, a running fade has the weight from which it began.
     crowd.set_clock(0).unwrap();
     assert_eq!(weights(&crowd), [0.5, 0.125, 0.75, 0.0]);
     assert_eq!(crowd.get_fade(1, 1).unwrap(), None);
@@ -178,7 +178,7 @@ fn fades_take_over_from_each_other() {
     assert_eq!(crowd.get_fade(0, 1).unwrap(), Some(expected));
 }
 
-/// What a crowd reports of itself, set in another crowd at the same time, plays on alike.
+/// Layers and fades read from a crowd and set in another one at the same time play on alike.
 #[test]
 fn a_saved_crowd_fades_on_as_before() {
     let mut random = Random(53);

@@ -1,5 +1,5 @@
-//! Crowds: what the engine evaluates of each clip alone, at each instance's time, with the same
-//! bits on every device, in any second of any day.
+//! Crowds give the engine's results of each clip alone, at each instance's time, with the same bits on every
+//! device, in any second of any day.
 
 mod application_device;
 mod fades;
@@ -300,8 +300,8 @@ fn every_device_has_the_bits_of_the_cpu() {
     }
 }
 
-/// Instances that are too large for a workgroup's memory, by their joints or by their time bases, of which each joint
-/// has another; and those that are just small enough.
+/// Instances that are too large for a workgroup's memory, by their joints or by their time bases, one for each joint;
+/// and those that are just small enough.
 #[test]
 fn instances_that_are_too_large_for_a_workgroup_have_the_same_bits() {
     let mut random = Random(83);
@@ -433,7 +433,7 @@ fn steps_add_up_without_a_rounding() {
     fast.advance_ticks(1000 * 11_760).unwrap();
     let [a, b] = [&mut slow, &mut fast].map(|crowd| bits(&evaluated(crowd, CrowdValues::Local)));
     assert_eq!(a, b);
-    // What `get` says, set again, changes nothing where speeds are whole.
+    // Setting the layer that `get` returns changes nothing where speeds are whole.
     for slot in 0..120 {
         let layer = slow.get(slot / 2, slot % 2).unwrap();
         if layer.speed.fract() == 0.0 {
@@ -599,7 +599,7 @@ proptest! {
     }
 }
 
-/// Work in flight is polled, waited for and taken once; what changes meanwhile counts for the next.
+/// Work in flight is polled, waited for and taken once; changes made meanwhile take effect in the next submission.
 #[test]
 fn submissions_are_taken_once() {
     let mut random = Random(19);

@@ -1,4 +1,4 @@
-//! What a crowd refuses, by name and without a change.
+//! Calls that a crowd refuses: the error names the cause, and nothing is changed.
 
 use glam::{Affine3A, Quat, Vec3};
 use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdValues};
@@ -73,7 +73,7 @@ fn libraries_refuse_what_does_not_fit() {
         is_wild(&refused) || is_wild(&bessel),
         "{refused:?} {bessel:?}"
     );
-    // What was refused left nothing behind.
+    // A refused call leaves nothing behind.
     let before = library.clip_count();
     let clip = library.push(&one(1.0), method::SLERP, linear).unwrap();
     assert_eq!((clip, library.clip_count()), (before, before + 1));

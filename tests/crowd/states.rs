@@ -1,4 +1,4 @@
-//! States of a library's clips: a crowd's rotations, and what follows from them as differences say.
+//! States of a library's clips: a crowd's rotations, and rates that agree with their differences.
 
 use super::{clip, skeleton};
 use crate::support::{Random, vulkan_devices};
@@ -133,7 +133,7 @@ fn rotations_are_a_crowds_on_every_device_and_at_every_width() {
     }
 }
 
-/// Rates are the derivatives of what is sampled a few ticks before and after.
+/// Rates are near the differences of samples a few ticks before and after.
 #[test]
 fn rates_are_those_of_differences() {
     let mut random = Random(7);

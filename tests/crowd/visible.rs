@@ -79,7 +79,7 @@ fn visible_instances_have_the_rows_of_the_whole_crowd() {
     }
 }
 
-/// What was submitted keeps its size when another list is set before it is taken.
+/// A submission keeps its size when another list is set before its result is read.
 #[test]
 fn a_submission_has_the_list_that_it_was_made_with() {
     let mut random = Random(67);
@@ -106,7 +106,7 @@ fn a_submission_has_the_list_that_it_was_made_with() {
         assert_eq!(bits(&found), bits(&expected), "{name}");
         let found = evaluated(&mut crowd, CrowdValues::Rotations);
         assert_eq!(bits(&found), bits(&whole[11 * 6..12 * 6]), "{name}");
-        // Of nobody there is nothing, at once.
+        // Without visible instances the result is empty, at once.
         crowd.set_visible(&[]).unwrap();
         crowd.submit(CrowdOutput::half(CrowdValues::Local)).unwrap();
         assert!(crowd.poll().unwrap());

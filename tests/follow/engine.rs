@@ -495,7 +495,7 @@ fn the_same_bits_on_every_device() {
             assert!((norm - 1.0).abs() < 6e-7, "{follow:?}: {rotation:?} {norm}");
         }
         let expected = bits(&expected);
-        // What takes long is to prepare the paths, again for each.
+        // Only some engines, because preparing the paths for each takes long.
         for engine in round_robin(&devices, i + i / 3).chain([&widths[i % widths.len()]]) {
             assert!(
                 bits(&engine.follow(&subset, &follow, &frames, layout).unwrap()) == expected,

@@ -88,7 +88,7 @@ impl Compiler {
             let extensions = [khr::pipeline_executable_properties::NAME.as_ptr()];
             let mut reports = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
                 .pipeline_executable_info(true);
-            // What the kernels that read texels declare.
+            // The feature that the kernels that read texels declare.
             let features = vk::PhysicalDeviceFeatures::default().shader_int64(true);
             let create = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
@@ -244,8 +244,8 @@ impl Drop for Compiler {
     }
 }
 
-/// What a driver makes of kernels (all where none is named), by their names, in a process of its own. `program` runs
-/// this program with the driver; `is_bare` undoes the exactness pass.
+/// The listings of kernels as a driver compiles them (all kernels where none is named), with their names, made in a
+/// process of its own. `program` runs this program with the driver; `is_bare` undoes the exactness pass.
 pub(super) fn listings(
     program: &mut Command,
     label: &str,
@@ -324,7 +324,7 @@ pub(super) fn divisions(kernel: &str) -> usize {
         .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
     let words: Vec<u32> = words.collect();
     let (mut offset, mut main, mut function) = (5, 0, 0);
-    // Of each function its divisions, and the functions that it calls.
+    // The number of divisions of each function, and the functions that it calls.
     let mut functions = BTreeMap::<u32, (usize, Vec<u32>)>::new();
     while let Some(&word) = words.get(offset) {
         let body = functions.entry(function).or_default();

@@ -8,7 +8,7 @@ use super::{newer, with_driver};
 use tumble::Device;
 
 /// The tests that are run once more. The golden hashes have every method, store, layout and pass;
-/// what takes longest, tens of millions of rotations, every memory budget and every way to read, is
+/// the longest tests, of tens of millions of rotations, every memory budget and every way to read, are
 /// left to the system's driver.
 const TESTS: [&str; 2] = ["golden::", "vulkan::every_device_passes_every_check"];
 
@@ -20,7 +20,7 @@ fn the_newer_lavapipe_gives_the_same_bits() {
     let Some(manifest) = newer("lvp") else {
         return;
     };
-    // Its own, and empty: what one test compiled serves the next.
+    // A cache of its own, empty at first: kernels that one test compiled serve the next.
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mesa-lavapipe");
     let _ = std::fs::remove_dir_all(&cache);
     std::fs::create_dir_all(&cache).unwrap();

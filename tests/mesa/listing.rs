@@ -1,5 +1,5 @@
-//! What RADV says of a compiled kernel, read: statistics, and instructions, of which each that
-//! computes with floats must be one whose rounding is that of the shader.
+//! Reads RADV's listing of a compiled kernel: statistics and instructions. Every instruction that computes
+//! with floats must round as the shader does.
 
 use std::collections::BTreeMap;
 
@@ -78,8 +78,8 @@ impl Listing {
         count_vector(&self.instructions)
     }
 
-    /// The vector instructions of the longest loop without a loop inside, else of all: what a
-    /// sample takes where a kernel walks over the samples of an item, or evaluates one.
+    /// The vector instructions of the longest loop without a loop inside, or of the whole kernel: those
+    /// for a sample, whether a kernel walks over the samples of an item or evaluates one.
     pub(super) fn vector_instructions_a_sample(&self) -> usize {
         let mut loops = Vec::new();
         for (index, instruction) in self.instructions.iter().enumerate() {
@@ -134,8 +134,8 @@ fn count_vector(instructions: &[String]) -> usize {
 }
 
 /// Whether an instruction gives the bits that the shader's operations give: it is not one on
-/// floats, or it rounds once what the shader rounds once. A list of what is allowed, so that what
-/// nobody thought of is refused.
+/// floats, or it rounds once where the shader rounds once. The allowed instructions are listed, so
+/// that an unknown one is refused.
 fn is_exact(instruction: &str, generation: Generation) -> bool {
     let (name, operands) = instruction.split_once(' ').unwrap_or((instruction, ""));
     let Some(name) = name.strip_prefix("v_").or_else(|| name.strip_prefix("s_")) else {
@@ -161,7 +161,7 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
     };
     match name {
         "add_f32" | "sub_f32" | "subrev_f32" | "mul_f32" => true,
-        // One of its operands, and so does not round: made of a comparison and a selection, which
+        // The result is one of the operands, so it is not rounded: made of a comparison and a selection, which
         // differ from it for NaN and for the sign of zero alone.
         "min_f32" | "max_f32" => true,
         "cvt_f32_i32" | "cvt_f32_u32" | "cvt_f32_ubyte0" | "cvt_f32_ubyte1" | "cvt_f32_ubyte2"

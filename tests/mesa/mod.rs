@@ -16,7 +16,7 @@ fn newer(driver: &str) -> Option<PathBuf> {
     unpacked(&format!("{driver}_icd.json"))
 }
 
-/// A file of what `scripts/mesa.sh` unpacks. CI must have it where there is such a package.
+/// A file that `scripts/mesa.sh` unpacks. CI must have it where there is such a package.
 fn unpacked(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa");
     let file = folder.join(name);

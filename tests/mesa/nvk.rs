@@ -1,7 +1,7 @@
-//! What a compiler makes of every kernel for NVIDIA's processors, none of which need be there: Mesa's NVK on a layer
-//! that stands in for the kernel's driver (`mesa-drm-shim`) makes a device that cannot compute, and compiles for it.
-//! Every instruction on floats must round as the shader says. NVIDIA's driver has a compiler of its own; what both
-//! must obey are the decorations, and how many instructions a kernel needs is near.
+//! Every kernel compiled for NVIDIA's processors, none of which need be there: Mesa's NVK on a layer that stands in
+//! for the kernel's driver (`mesa-drm-shim`) makes a device that cannot compute, and compiles for it.
+//! Every instruction on floats must round as the shader says. NVIDIA's driver has a compiler of its own; both must
+//! obey the decorations, and both need nearly as many instructions for a kernel.
 //!
 //! Debian 12 has no NVK. Debian 13's runs beside this system's libraries with its own loader and C library.
 
@@ -13,7 +13,7 @@ use super::compile::{divisions, listings, representations, statistics};
 use super::table::{self, Cost};
 use super::{unpacked, with_driver};
 
-/// The head of the table of docs/gpu.md: what a store costs on NVIDIA's processors, kernel by kernel.
+/// The head of the table of docs/gpu.md with the cost of a store on NVIDIA's processors, kernel by kernel.
 const TABLE: &str = "| kernel | ga102 |";
 
 /// Processors: the table's name, and the number by which the layer knows it.
@@ -149,8 +149,8 @@ fn blocks(assembly: &str) -> Vec<Block> {
 }
 
 /// Whether an instruction gives the bits that the shader's operations give: it is not one on floats, or it rounds once,
-/// to the nearest, what the shader rounds once. A list of what is allowed. With `.ftz` subnormal numbers count as 0,
-/// which no value depends on.
+/// to the nearest, where the shader rounds once. The allowed instructions are listed. With `.ftz` subnormal numbers
+/// count as 0, which no value depends on.
 fn is_exact(instruction: &str) -> bool {
     let (name, operands) = instruction.split_once(' ').unwrap_or((instruction, ""));
     let mut parts = name.split('.').filter(|&part| part != "ftz");
@@ -164,7 +164,7 @@ fn is_exact(instruction: &str) -> bool {
         "ffma" => rest.is_empty() && operands.split_whitespace().take(2).any(is_power_of_two),
         // To half precision, to the nearest; with `.ftz` subnormal inputs count as 0.
         "f2f" => rest == ["f16", "f32", "re"],
-        // Of whole numbers below 2^24.
+        // Exact for whole numbers below 2^24.
         "i2f" | "i2f32" => rest
             .iter()
             .all(|part| ["f32", "i32", "u32", "re"].contains(part)),

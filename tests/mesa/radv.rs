@@ -1,6 +1,6 @@
 //! AMD's real compiler over every kernel, for six families of processors, none of which need be there:
 //! with `RADV_FORCE_FAMILY` set, Mesa's RADV makes a device that cannot compute, and
-//! compiles for it. What it made is read, and every instruction on floats must round as the shader
+//! compiles for it. Its listing is read, and every instruction on floats must round as the shader
 //! says.
 //!
 //! The system's RADV and a newer one are asked. Catches a driver that fuses in spite of the
@@ -43,7 +43,7 @@ const FAMILIES: [Family; 6] = [
     family("gfx1201", None, Generation::Rdna),
 ];
 
-/// The head of the table of docs/gpu.md: what a rotation costs on AMD's processors, kernel by kernel.
+/// The head of the table of docs/gpu.md with the cost of a rotation on AMD's processors, kernel by kernel.
 const TABLE: &str = "| kernel | polaris10 |";
 
 /// A processor with so many vector registers for an invocation keeps at least a quarter of the
@@ -65,7 +65,7 @@ fn system() -> Option<PathBuf> {
     found
 }
 
-/// What a driver makes of kernels (all where none is named) for a family.
+/// The listings of kernels as a driver compiles them for a family (all kernels where none is named).
 fn compiled(
     manifest: &Path,
     family: &str,
@@ -86,7 +86,7 @@ fn compiled(
         .collect()
 }
 
-/// What is wrong with a kernel.
+/// The faults of a kernel: instructions that do not round as the shader, spilled registers, and too many registers.
 fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String> {
     let mut faults = Vec::new();
     let mut left = [divisions(kernel); 2];

@@ -1,14 +1,14 @@
-//! The tables of `docs/gpu.md`: what kernels cost on processors of AMD's and NVIDIA's, one by one.
-//! `UPDATE_LISTINGS=1 cargo test --test all mesa::` writes what was measured into their cells.
+//! The tables of `docs/gpu.md`: the costs of kernels on processors of AMD's and NVIDIA's, one by one.
+//! `UPDATE_LISTINGS=1 cargo test --test all mesa::` writes the measured numbers into their cells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What a table has of one kernel on one family.
+/// The entry of a table for one kernel on one family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cost {
-    /// Instructions for a sample, or for what the table says.
+    /// Instructions for a sample, or for the unit that the table names.
     pub(super) instructions: u64,
     /// Vector registers of an invocation.
     pub(super) registers: u64,
@@ -34,7 +34,7 @@ pub(super) fn kernels(head: &str) -> Vec<String> {
     lines.map(|line| cells(line)[0].to_owned()).collect()
 }
 
-/// Compares a table with what was measured, by kernel and family; returns what is wrong with it.
+/// Compares a table with the measured numbers, by kernel and family; returns the differences.
 pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
     // Two tables are on one page, and are written by tests that run at once.
     static PAGE: Mutex<()> = Mutex::new(());
@@ -76,8 +76,8 @@ pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Ve
     wrong
 }
 
-/// Why a cell of the table differs from what was measured. Another version of the compiler may differ by a
-/// little; a bound that is far above what is measured bounds nothing.
+/// Why a cell of the table differs from the measured number. Another version of the compiler may differ by a
+/// little; a bound that is far above the measured number is no use.
 fn differs(documented: &str, found: Cost) -> Option<String> {
     let numbers = documented.split_once(", ");
     let numbers = numbers.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));

@@ -30,7 +30,7 @@ fn skeleton() -> Skeleton {
     Skeleton::new(parents.collect(), offsets.collect()).unwrap()
 }
 
-/// What the passes of a test give by the CPU, one after another, with these weights.
+/// The CPU's results of the passes of a test, one after another, with these weights.
 fn expected(layers: &[Rotations], layout: Layout, weights: [f32; 3], mix: f32) -> Vec<Vec<u8>> {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let [first, second, third] = layers else {
@@ -206,7 +206,7 @@ fn long_passes_run_at_once() {
         let (whole, size) = (result.range(0, size as u64 + 256), size as u64);
         let pass = |pass| {
             let request = engine.pass(pass, LONG_TRACKS, samples, Layout::FrameMajor);
-            // SAFETY: the buffers are as they must be, and nobody uses them meanwhile.
+            // SAFETY: the buffers are as they must be, and nothing uses them meanwhile.
             unsafe { request.to_buffer(whole) }.unwrap();
             let found = result.bytes();
             assert!(found[size as usize..].iter().all(|&byte| byte == 0xff));
@@ -239,7 +239,7 @@ fn what_does_not_fit_buffers_is_refused() {
     let mix = |from, to, weight| PosePass::Mix { from, to, weight };
     let refused = |engine: &Engine, pass: PosePass<'_>, layout, result| {
         let request = engine.pass(pass, TRACKS, 4, layout);
-        // SAFETY: what is refused is not used.
+        // SAFETY: a refused buffer is not used.
         unsafe { request.target(result) }.unwrap_err()
     };
     let frame_major = Layout::FrameMajor;

@@ -122,7 +122,7 @@ impl Application {
     pub(crate) fn refused(&self, change: impl FnOnce(&mut VulkanHandles)) -> Error {
         let mut handles = self.handles();
         change(&mut handles);
-        // SAFETY: what is changed is refused before it is used.
+        // SAFETY: the changed handle is refused before it is used.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap_err()
     }
 
@@ -174,7 +174,7 @@ impl Application {
         }
     }
 
-    /// What is in that memory.
+    /// The first `size` bytes of that memory.
     pub(crate) fn bytes(&self, memory: vk::DeviceMemory, size: u64) -> Vec<u8> {
         // SAFETY: nothing else uses the memory now.
         unsafe {
@@ -265,7 +265,7 @@ impl<'a> Commands<'a> {
         Self { application, pool }
     }
 
-    /// A command buffer with what `record` leaves in it.
+    /// A command buffer with the commands of `record`.
     pub(crate) fn recorded(&self, record: impl FnOnce(vk::CommandBuffer)) -> vk::CommandBuffer {
         let device = &self.application.device;
         let info = vk::CommandBufferAllocateInfo::default()
@@ -289,7 +289,7 @@ impl<'a> Commands<'a> {
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
             let fence = vk::Fence::null();
             let _lock = self.application.queue_lock.lock().unwrap();
-            // SAFETY: whoever uses the queue has its lock.
+            // SAFETY: every user of the queue holds its lock.
             unsafe {
                 let device = &self.application.device;
                 device

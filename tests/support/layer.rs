@@ -19,7 +19,7 @@ pub(crate) struct Layer {
     pub(crate) planted: &'static [(&'static str, &'static str)],
 }
 
-/// What a layer says of each planted fault.
+/// The kind of each planted fault, and a part of the layer's message about it.
 const CORE: (&str, &str) = ("core", "VUID-VkBufferCreateInfo-size-00912");
 const SYNCHRONIZATION: (&str, &str) = ("synchronization", "WRITE-AFTER-WRITE");
 const OLD_SYNCHRONIZATION: (&str, &str) = ("synchronization", "WRITE_AFTER_WRITE");
@@ -106,7 +106,7 @@ impl Layer {
         found
     }
 
-    /// What the layer says while a command runs.
+    /// The layer's messages while a command runs.
     pub(crate) fn messages(&self, command: &mut Command) -> Vec<String> {
         command
             .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")

@@ -1,4 +1,4 @@
-//! What several test files need: devices, hostile keys, a small generator.
+//! Code that several test files share: devices, hostile keys, a small generator.
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
 use std::collections::BTreeMap;
@@ -62,8 +62,8 @@ fn kernel_options() -> &'static [(Reads, Mapping)] {
     }
 }
 
-/// Every Vulkan device in all of [`KERNEL_OPTIONS`]. Tests share the engines of the same options: what takes
-/// longest of most of them is that drivers compile kernels.
+/// Every Vulkan device in all of [`KERNEL_OPTIONS`]. Tests share the engines of the same options, because the
+/// driver's compiling of kernels takes longest in most of them.
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     static OPEN: Mutex<BTreeMap<String, Engine>> = Mutex::new(BTreeMap::new());
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -82,7 +82,7 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     engines
 }
 
-/// Of the engines of one or more calls of [`vulkan_engines`] those that are due in this round: each device with
+/// The engines, from one or more calls of [`vulkan_engines`], that are due in this round: each device with
 /// one of [`KERNEL_OPTIONS`], in the next round with the next.
 pub fn round_robin(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
     let is_next =

@@ -1,8 +1,8 @@
 //! How many lines of memory the waves of a card touch, and how many statements they execute. Cards run 32 or 64
 //! invocations together, and move memory in lines: sectors of 32 bytes on NVIDIA's, lines of 64 or 128 on AMD's. A wave
 //! executes a branch if any of its invocations takes it. Here the kernels that cards are given run over the work lists
-//! of workloads as `tumble bench` has them, smaller ones. No device is needed: what counts are addresses and branches,
-//! and those follow from the shaders. What they store has to be the CPU's.
+//! of workloads as `tumble bench` has them, smaller ones. No device is needed: only addresses and branches count,
+//! and those follow from the shaders. Their results must be the CPU's.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
@@ -70,7 +70,7 @@ struct Blocks {
     steps: RefCell<BTreeMap<u64, u64>>,
 }
 
-/// What an invocation did.
+/// The accesses to memory and the operations of an invocation.
 #[derive(Default)]
 pub(super) struct Seen {
     touches: RefCell<Vec<Touch>>,
@@ -177,7 +177,7 @@ impl Watch for Lane {
     }
 }
 
-/// A dispatch: its kernel, and what it reads.
+/// A dispatch: its kernel, and its inputs.
 struct Launch {
     kernel: Kernel,
     groups: [u32; 3],
@@ -215,7 +215,7 @@ fn touched(ranges: &[Range<u64>], line: u64) -> u64 {
     lines.collect::<BTreeSet<_>>().len() as u64
 }
 
-/// What a store of all lanes of a wave takes: at least the bytes as if they lay side by side.
+/// The lines that a store of all lanes of a wave touches, and the fewest possible: those of the bytes side by side.
 fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     let bytes: u64 = ranges.iter().map(|range| range.end - range.start).sum();
     Lines {
@@ -224,9 +224,9 @@ fn store(ranges: &[Range<u64>], line: u64) -> Lines {
     }
 }
 
-/// What a workgroup reads of a buffer: at least each stretch of bytes as if it began where a line
-/// does. Bytes that are less than a line apart are one stretch. A line counts once, since the waves
-/// of a workgroup share a cache.
+/// The lines that a workgroup reads of a buffer, and the fewest possible: those of each stretch of bytes if it
+/// began where a line does. Bytes that are less than a line apart are one stretch. A line counts once, since the
+/// waves of a workgroup share a cache.
 fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     ranges.sort_by_key(|range| range.start);
     let (mut least, mut stretch) = (0, 0..0);
@@ -244,7 +244,7 @@ fn load(ranges: &mut [Range<u64>], line: u64) -> Lines {
     }
 }
 
-/// What the waves of some workgroups did, for each kind of card.
+/// The lines, bytes and operations of the waves of some workgroups, for each kind of card.
 #[derive(Default)]
 pub(super) struct Count {
     /// Stores and loads.
@@ -535,7 +535,7 @@ fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     }
 }
 
-/// The CPU's result has the bits of what a dispatch stores: all of it, or as much as it stores.
+/// Asserts that a dispatch stores the bits of the CPU's result: all of it, or a part.
 fn assert_is_the_cpus(
     launch: &Launch,
     (set, frames): (&TrackSet, &SampleTimes),

@@ -17,7 +17,7 @@ use super::numbers::{Rule, Spot, by, results, spots};
 /// Calls of a function of which spots are listed.
 const LISTED_CALLS: usize = 500;
 
-/// Trials of a kernel, and what they store.
+/// Trials of a kernel, and their results.
 struct Tried {
     kernel: Kernel,
     trials: Vec<(Trial, Vec<u32>)>,
@@ -130,7 +130,7 @@ const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 4] = [
     ),
 ];
 
-/// What reaches a spot: the indices of kernels with those of their trials, and of functions.
+/// The trials and functions that reach a spot: the indices of kernels with those of their trials, and of functions.
 #[derive(Default)]
 struct Reached {
     trials: Vec<(usize, usize)>,

@@ -4,11 +4,11 @@
 //! * `arithmetic.rs`: functions that are written for lanes, and those that are written by hand, on hostile arguments;
 //! * `on_trials.rs`: whole kernels on the inputs of the kernels' check, and the CPU's way to the same;
 //! * `numbers.rs`: numbers as devices may compute with them;
-//! * `mistakes.rs`: a mistake anywhere is found, and what kernels and functions give is what `recorded.txt` says;
+//! * `mistakes.rs`: a mistake anywhere is found, and the results of kernels and functions are those of `recorded.txt`;
 //! * `lines.rs` and `crowd_lines.rs`: the memory that the waves of a card touch and the statements that they execute,
 //!   over whole workloads, whose results must be the CPU's.
 //!
-//! They see what is private to the engine, so they are tests of the library: `src/twin/mod.rs` includes them.
+//! They use private items of the engine, so they are tests of the library: `src/twin/mod.rs` includes them.
 
 mod arithmetic;
 mod crowd_lines;

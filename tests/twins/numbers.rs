@@ -29,7 +29,7 @@ pub(super) enum Rule {
     Mistaken(Spot, f32),
 }
 
-/// What a mistake is likely to be.
+/// The kinds of mistakes that are likely in a shader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// A difference for a sum.
@@ -40,7 +40,7 @@ pub(super) enum Kind {
     Product,
     /// Another constant.
     Constant,
-    /// A neighbour of what is loaded or stored.
+    /// The neighbour of the address that is loaded or stored.
     Address,
 }
 
@@ -51,7 +51,7 @@ const RECENT_SPOTS: usize = 1024;
 
 thread_local! {
     static RULE: Cell<Rule> = const { Cell::new(Rule::AsWritten) };
-    /// The loads and stores of buffers: a sum of what says which invocation made each, and where.
+    /// A checksum of the loads and stores of buffers: which invocation made each, and where.
     static TOUCHED: Cell<u32> = const { Cell::new(0) };
     static LISTED: RefCell<BTreeSet<Spot>> = const { RefCell::new(BTreeSet::new()) };
     /// Spots that were listed last, by some of their bits: most are met thousands of times.
@@ -66,7 +66,7 @@ pub(super) fn by<T>(rule: Rule, action: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Where there can be mistakes in what an action does.
+/// The spots of an action at which there can be mistakes.
 pub(super) fn spots(action: impl FnOnce()) -> BTreeSet<Spot> {
     RECENT.set([None; RECENT_SPOTS]);
     by(Rule::Listing, action);
@@ -190,7 +190,7 @@ impl Float for Number {
     }
 }
 
-/// What a kernel stores by the rule that holds, and behind it what says which invocations touched which words.
+/// The words that a kernel stores by the present rule, then a checksum of which invocation accessed which words.
 pub(super) fn results(trial: &Trial, kernel: Kernel) -> Vec<u32> {
     let memory = trial.memory(kernel);
     TOUCHED.set(0);
@@ -236,7 +236,7 @@ fn results_are_the_same_where_products_are_fused_with_zero() {
     assert_results_are_the_same(Rule::FusedWithZero);
 }
 
-/// What the rules change, and what they leave.
+/// Each rule changes the products that it is about, and no others.
 #[test]
 fn a_rule_changes_what_it_says() {
     let product = |rule, a, b| by(rule, || (Number(a) * Number(b)).bits());

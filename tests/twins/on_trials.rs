@@ -38,7 +38,7 @@ impl Trial {
     }
 }
 
-/// Compares trials of a kernel with what the CPU makes of them.
+/// Compares trials of a kernel with the CPU's results.
 fn assert_is<T: NoUninit>(kernel: Kernel, of_cpu: impl Fn(&Trial) -> Vec<T>) {
     let random = &mut Random::canonical();
     for round in 0..ROUNDS {
@@ -150,7 +150,7 @@ fn every_list_stores_every_encoding_alike() {
 }
 
 impl Trial {
-    /// What a store needs beside a rotation.
+    /// The detail that a store needs in addition to a rotation, from the constants of the dispatch.
     fn detail(&self, list: List) -> u32 {
         match list {
             List::Frames | List::Times | List::Samples => {

@@ -25,7 +25,7 @@ const KEYS: usize = 26;
 const FRAMES: usize = 1200;
 const RATE: f64 = 60.0;
 const ROUNDS: usize = 3;
-/// Calls of which each gives one rotation.
+/// The number of calls, each of which gives one rotation.
 const CALLS: usize = 10_000;
 
 /// Something that fills the output, [track][frame].

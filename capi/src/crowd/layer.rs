@@ -6,7 +6,7 @@ use tumble::crowd::CrowdLayer;
 use crate::arguments::{flag, option};
 use crate::result::Failure;
 
-/// What a layer of an instance plays: a clip, and its time, speed, wrap mode and weight. If all members except
+/// The clip that a layer of an instance plays, and its time, speed, wrap mode and weight. If all members except
 /// `size`, `instance` and `layer` are 0, the layer stands still at the start of the first clip, with weight 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]

@@ -203,7 +203,7 @@ pub(super) fn set_layers(crowd: *mut TumbleCrowd, layers: &[TumbleCrowdLayer]) -
     unsafe { tumble_crowd_set(crowd, layers.as_ptr(), layers.len()) }
 }
 
-/// What everybody plays in some frame, in both forms; not every layer in every frame.
+/// The layers that are set in a frame, as C's structure and as Rust's: all in the first frame, later a third.
 fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdLayer, CrowdLayer)> {
     let mut all = Vec::new();
     for i in 0..instances * layers {
@@ -383,8 +383,8 @@ pub(super) fn rust_crowd(library: &CrowdLibrary, (instances, layers): (usize, us
     engine.crowd(library, instances, layers).unwrap()
 }
 
-/// Threads that set and evaluate one crowd at once are served one after another; one that frees it ends
-/// nobody's call.
+/// Threads that set and evaluate one crowd at once are served one after another; a call goes on when another
+/// thread frees the crowd.
 #[test]
 fn crowds_may_be_used_by_threads() {
     let shape = (64, 2);

@@ -125,7 +125,7 @@ fn rig(folder: &TempDir) -> PathBuf {
     );
     bytes.extend(MOVES.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
     write(folder, "rig.bin", &bytes);
-    // Nodes, what of them is moved, and how.
+    // A node, the property that moves, and the interpolation.
     type Moved = (u32, &'static str, &'static str);
     let clips: [(&str, &[Moved]); 3] = [
         ("kick", &[(1, "rotation", "LINEAR")]),
@@ -179,7 +179,7 @@ fn rig(folder: &TempDir) -> PathBuf {
     write(folder, "rig.gltf", text)
 }
 
-/// The joints are those of all clips; what a clip does not have rests.
+/// The joints are those of all clips; joints that a clip does not have rest.
 #[test]
 fn clips_of_a_file_that_move_different_joints_share_a_library() {
     let folder = tempfile::tempdir().unwrap();

@@ -71,7 +71,7 @@ fn handles_of_crowds_are_checked() {
         invalid,
         "kind `crowd library`",
     );
-    // SAFETY: what is refused before it is used.
+    // SAFETY: the calls refuse the arguments before they use them.
     unsafe {
         let target = dangling_mut::<TumbleCrowdTarget>();
         fails(
@@ -133,7 +133,7 @@ fn libraries_refuse_what_does_not_fit() {
         "ticks a second",
     );
     let mut library = null_mut();
-    // SAFETY: what is refused before it is read.
+    // SAFETY: the calls refuse the arguments before they read memory.
     let made = unsafe { tumble_crowd_library_new(null(), null(), 3, 0, &raw mut library) };
     fails(made, TumbleResult::InvalidPointer, "`parents` is null");
     let parents = PARENTS.as_ptr();

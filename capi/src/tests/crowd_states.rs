@@ -1,4 +1,5 @@
-//! What crowds refuse to be set to, and what they cannot do now; and an application's handles.
+//! Layers, fades and lists that a crowd refuses, calls that it refuses in its present state, and an application's
+//! handles.
 
 use std::ptr::{dangling, null, null_mut};
 
@@ -112,7 +113,7 @@ fn layers_are_all_set_or_none() {
     ] {
         fails(set_layers(crowd, &[good, wrong]), code, says);
     }
-    // SAFETY: what is refused, and nothing.
+    // SAFETY: the calls refuse wrong arguments and do nothing with null.
     unsafe {
         let pointer = TumbleResult::InvalidPointer;
         fails(
@@ -263,7 +264,7 @@ fn results_and_states_are_checked() {
             state,
             "nothing is in flight",
         );
-        // Freed with a result that nobody took.
+        // Freed with a result that was not read.
         done(tumble_crowd_submit(crowd, 0, 1));
     }
     done(tumble_crowd_free(crowd));
@@ -331,7 +332,7 @@ fn handles_of_vulkan_are_looked_at() {
         pipeline_cache: 0,
     };
     let mut engine = null_mut();
-    // SAFETY: a structure and room for the handle; what is null or wrong is refused.
+    // SAFETY: a structure and room for the handle; null and wrong values are refused.
     let mut open = |vulkan: *const TumbleVulkan| unsafe {
         tumble_engine_from_vulkan(vulkan, null(), &raw mut engine)
     };
@@ -396,7 +397,7 @@ fn weights_fades_and_lists_are_checked() {
         to: 0.0,
     };
     let mut is_there = true;
-    // SAFETY: what is refused, structures, and room for the truth value.
+    // SAFETY: arguments that are refused, structures, and room for the truth value.
     unsafe {
         fails(
             tumble_crowd_set_fade(crowd, null()),

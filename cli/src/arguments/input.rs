@@ -220,7 +220,7 @@ impl Inputs {
     }
 }
 
-/// What reads the inputs of a command, on a thread that runs ahead.
+/// Reads the inputs of a command, on a thread that runs ahead.
 pub(crate) trait InputReader: Send + 'static {
     /// Reads an input; its warnings are not printed.
     fn read(&self, path: &Path) -> Result<Loaded, Failure>;
@@ -372,7 +372,7 @@ pub(crate) struct InputSelection<'a> {
     pub(crate) repeats: Repeats,
 }
 
-/// What becomes of inputs that are named several times.
+/// How inputs that are named several times are processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Repeats {
     /// They are processed once, with a warning.
@@ -537,8 +537,8 @@ impl GatheredInputs {
         Ok(gathered)
     }
 
-    /// Of files that were found several times, keeps the path without symbolic links, whatever the order in which they
-    /// were found, and says so.
+    /// Keeps the path without symbolic links of a file that was found several times, in whatever order, and warns about
+    /// the others.
     fn settle(&mut self, repeated: Vec<(usize, FoundInput)>) {
         const LISTED: usize = 3;
         let count = repeated.len();
@@ -587,7 +587,7 @@ impl GatheredInputs {
                 false => 0,
             };
             if found.is_empty() && excluded == 0 {
-                // Opening it reports what is wrong.
+                // Opening it reports the error.
                 return Expansion {
                     found: alone(),
                     excluded,
@@ -617,8 +617,8 @@ impl GatheredInputs {
         }
     }
 
-    /// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
-    /// too, which fails when it is opened.
+    /// Every file of a format that can be read below a directory, by name. A directory that cannot be listed is an
+    /// input too, which fails when it is opened.
     fn below(&mut self, directory: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
         let root: Arc<Path> = directory.into();
         let relative = |path: &Path| path.strip_prefix(directory).unwrap_or(path).to_owned();

@@ -78,7 +78,7 @@ impl InterpolationArguments {
         self.options().with(method)
     }
 
-    /// What is done with times outside the keys.
+    /// How times before the first key and after the last are treated.
     pub(crate) fn outside(self) -> Outside {
         Outside {
             before: self.before,
@@ -269,7 +269,7 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// Of these methods those that draw a clip differently: the method of a file that states none is
+/// The methods among these that draw a clip differently: the method of a file that states none is
 /// bessel-overhauser, which is not drawn twice.
 pub(crate) fn distinct_methods(methods: &[MethodChoice], clip: &Motion) -> Vec<MethodChoice> {
     if !clip.channels.is_empty() {
@@ -308,7 +308,7 @@ impl CurveChoice {
         Self { quantity, ..self }
     }
 
-    /// Of these methods those that draw a clip, each differently.
+    /// The methods among these that draw a clip, each differently.
     ///
     /// # Errors
     /// When an option has no effect on any of them.

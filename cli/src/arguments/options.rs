@@ -1,7 +1,7 @@
 //! The options of a command line: which are explicit, the values of all, and, for the commands that write
 //! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
-//! it determines the bytes of results, and what it applies to. An option that has no effect is refused, with
-//! a remedy, and never ignored.
+//! it determines the bytes of results, and which inputs or results it applies to. An option that has no effect
+//! is refused, with a remedy, and never ignored.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -28,7 +28,7 @@ pub(crate) struct OptionRule {
     pub(crate) applies_to: AppliesTo,
 }
 
-/// What of an option determines the bytes of a result.
+/// The part of an option on which the bytes of a result depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bytes {
     /// Nothing: it says where inputs and results are, what is permitted, which device computes, or what is
@@ -40,9 +40,9 @@ pub(crate) enum Bytes {
     ByContent,
 }
 
-/// What an option applies to.
+/// The inputs or results to which an option applies.
 pub(crate) enum AppliesTo {
-    /// Whatever its command does; what depends on values is refused where these are used.
+    /// Everything that its command does; combinations that depend on values are refused where these are used.
     All,
     /// Inputs of formats that take it.
     Inputs(FormatOption),
@@ -208,7 +208,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("tension"),
     deciding("continuity"),
     deciding("bias"),
-    // What is written of each rotation.
+    // The quantity that is written of each rotation, and its encoding.
     deciding("output"),
     of_results("sequence", sequence),
     of_results("major", major),

@@ -1,4 +1,4 @@
-//! `--quantity` and its options: what is written for each rotation.
+//! `--quantity` and its options: the numbers that are written for each rotation.
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -254,7 +254,7 @@ impl OutputArguments {
         }
     }
 
-    /// Whether the axes of angles change what is written.
+    /// Whether the axes of angles change the result.
     pub(crate) fn is_euler(&self) -> bool {
         let sequence = "ZXY".parse().unwrap_or(EulerSequence::XYZ);
         self.depends_on(EncodingOptions {
@@ -263,7 +263,7 @@ impl OutputArguments {
         })
     }
 
-    /// Whether the order of a matrix's elements changes what is written.
+    /// Whether the order of a matrix's elements changes the result.
     pub(crate) fn is_matrix(&self) -> bool {
         self.depends_on(EncodingOptions {
             order: MatrixOrder::ColumnMajor,
@@ -297,7 +297,7 @@ impl OutputArguments {
         }
     }
 
-    /// What is written of scalars, if they are.
+    /// The quantity that is written of scalars; `None` if the output is another.
     pub(crate) fn scalars(&self) -> Option<ScalarQuantity> {
         match self.output {
             OutputKind::Scalars(quantity) => Some(quantity),

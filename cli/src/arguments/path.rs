@@ -74,7 +74,7 @@ fn frame() -> impl TypedValueParser<Value = PathFrame> {
     one_of(PathFrame::ALL.map(|frame| (frame.name(), frame_summary(frame), frame)))
 }
 
-/// What a frame is, in a few words.
+/// A path frame's meaning in a few words, for help and pages.
 pub(crate) fn frame_summary(frame: PathFrame) -> &'static str {
     match frame {
         PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",

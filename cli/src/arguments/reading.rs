@@ -47,7 +47,7 @@ pub(crate) struct ReadingArguments {
     /// The key times of files without times (KITTI): a file of seconds, one line for each pose
     #[arg(long, value_name = "FILE", conflicts_with_all = ["source_fps", "override_fps"])]
     source_times: Option<PathBuf>,
-    /// What arrays or columns contain, if their names do not say it, such as rotations=keys:wxyz,time=t
+    /// The contents of arrays or columns whose names do not say it, such as rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
     /// The unit of times that are whole numbers

@@ -79,7 +79,7 @@ impl ResultArguments {
         Ok(Some(destination))
     }
 
-    /// The directory of results, for those who evaluate shards of them.
+    /// The directory of results, which the evaluation of shards needs.
     pub(crate) fn folder(&self) -> Result<&Path, Failure> {
         if self.times_out.is_some() {
             return Err(Failure::usage(ONE_INPUT));

@@ -45,7 +45,7 @@ pub(crate) struct DialectArguments {
     /// How velocities follow from the curves
     #[arg(long, value_name = "HOW", requires = "dialect", default_value_t, value_parser = velocities())]
     velocities: VelocitySource,
-    /// What is done with joints outside the limits of --robot
+    /// What to do with joints outside the limits of --robot
     #[arg(long, value_name = "RULE", requires = "dialect", default_value_t, value_parser = limits())]
     limits: LimitRule,
     /// mjlab, beyondmimic: also write the names and orders of joints and bodies, and how the result was
@@ -110,7 +110,7 @@ pub(crate) struct RobotFrames<'a> {
     pub(crate) methods: ChannelMethods,
 }
 
-/// What was written of a robot's motion, with `--json`.
+/// The part of an evaluation's JSON about a robot's motion: the names, orders and rules of its file.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct RobotReport {
     dialect: &'static str,
@@ -245,7 +245,7 @@ impl DialectArguments {
         })
     }
 
-    /// What is said of joints that leave their limits; `None` if none does.
+    /// The text of the message about joints that leave their limits; `None` if none does.
     fn limits_text(&self, bodies: &Bodies) -> Option<String> {
         let joint = |excess: &LimitExcess| {
             let time = bodies.times.get(excess.sample).copied().unwrap_or(0.0);

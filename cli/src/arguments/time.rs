@@ -159,7 +159,7 @@ pub(crate) struct GapArguments {
 }
 
 impl GapArguments {
-    /// What is done with times in gaps, in words.
+    /// The participle for times in gaps in messages: "held" or "left out".
     pub(crate) fn done_in_gaps(&self) -> &'static str {
         match self.in_gaps {
             InGaps::Hold => "held",
@@ -168,7 +168,7 @@ impl GapArguments {
     }
 }
 
-/// What to do with times between two keys that are too far apart.
+/// How times between two keys that are too far apart are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum InGaps {
     /// leave them out
@@ -179,7 +179,7 @@ enum InGaps {
     Hold,
 }
 
-/// `--end-frame`: what a result has at the end of a clip that ends between two frames.
+/// `--end-frame`: the last sample of a result whose clip ends between two frames.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EndFrameArguments {
     /// Where a clip ends between two frames: add a sample at its end (`key`), one frame more with the value of

@@ -88,7 +88,7 @@ impl Wildcard {
     }
 }
 
-/// The class whose `[` is read, and what follows it. A `]` right behind the `[` is one of its characters.
+/// The class whose `[` is read, and the text after it. A `]` right behind the `[` is one of its characters.
 fn class(text: &str) -> Option<(PatternPart, &str)> {
     let (is_other, text) = match text.strip_prefix('!') {
         Some(text) => (true, text),

@@ -1,4 +1,4 @@
-//! SHA-256 of what is read and written, as `sha256sum` prints it.
+//! SHA-256 of inputs and results, as `sha256sum` prints it.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
@@ -197,7 +197,7 @@ pub(crate) fn is_whole(folder: &Path, name: &str, bytes: u64, sha256: &str) -> i
     Ok(file.metadata()?.len() == bytes && of_file(file)? == sha256)
 }
 
-/// Of a whole file.
+/// The SHA-256 of a whole file.
 fn of_file(mut file: File) -> io::Result<String> {
     let mut digest = Digest::default();
     let mut buffer = vec![0; 1 << 16];
@@ -211,7 +211,7 @@ fn of_file(mut file: File) -> io::Result<String> {
     }
 }
 
-/// Of bytes in memory.
+/// The SHA-256 of bytes in memory.
 pub(crate) fn of_bytes<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut digest = Digest::default();
     for piece in pieces {
@@ -224,7 +224,7 @@ pub(crate) fn of_bytes<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> String
 mod tests {
     use super::*;
 
-    /// A glTF with its buffer beside it is two files, of which either one determines what is read.
+    /// A glTF with its buffer beside it is two files, and the clips depend on both.
     #[test]
     fn an_input_is_all_files_that_it_refers_to() {
         let directory = tempfile::tempdir().unwrap();

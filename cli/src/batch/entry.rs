@@ -1,4 +1,4 @@
-//! The lines of a manifest, those of earlier batches, and what records new ones.
+//! The lines of a manifest: those of earlier batches, and the recorder of new ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -154,8 +154,8 @@ impl InputEntry {
             .then_some(entry)
     }
 
-    /// By what entries of one input are known to be of one: its result, or else its name behind a character that
-    /// no result begins with.
+    /// The key that entries of one input share: its result, or else its name behind a character that no result
+    /// begins with.
     pub(crate) fn key(&self) -> String {
         let by_input = || Self::key_by_input(&self.input);
         self.result.clone().unwrap_or_else(by_input)
@@ -211,7 +211,7 @@ impl ManifestEntry {
     }
 }
 
-/// Of every kernel's SPIR-V, one behind the other.
+/// The SHA-256 of all kernels' SPIR-V, one behind the other.
 pub(crate) fn kernels_sha256() -> &'static str {
     static HASH: LazyLock<String> =
         LazyLock::new(|| digest::of_bytes(tumble::vulkan::kernels().map(|(_, code)| code)));

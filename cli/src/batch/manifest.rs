@@ -353,20 +353,20 @@ pub(crate) enum InputPresence {
 }
 
 impl InputPresence {
-    /// Of the input of a result.
+    /// Whether the input of a result is present.
     pub(crate) fn of_entry(entry: &ManifestEntry) -> Self {
         Self::of(&entry.input, Some(entry.whole().0))
     }
 
-    /// Of an input without a result.
+    /// Whether an input without a result is present.
     fn of_input(entry: &InputEntry) -> Self {
         Self::of(&entry.input, entry.result.as_deref())
     }
 
-    /// Of the input with this path, whose result has this name. An input is gone if the directory that the command line
-    /// named is there and has other files: the input's path without the part that the name of its result repeats. Of a
-    /// path below the current directory, such as `walks/a.bvh` in a list of inputs, it is the first folder. Of a name
-    /// alone nothing is known, because every directory may be the one that it was in.
+    /// Whether the input with this path, whose result has this name, is present. It is gone if the directory that the
+    /// command line named is there and has other files: the input's path without the part that the name of its result
+    /// repeats. For a path below the current directory, such as `walks/a.bvh` in a list of inputs, that is the first
+    /// folder. For a name alone it is unknown, because every directory may be the one that it was in.
     fn of(input: &str, result: Option<&str>) -> Self {
         let path = Path::new(input);
         let is_missing = || {

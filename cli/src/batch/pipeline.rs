@@ -85,7 +85,7 @@ pub(crate) struct OpenInput {
 /// A file to write: all clips of an input, or one of them.
 pub(crate) struct ClipWork {
     pub(crate) input: Rc<OpenInput>,
-    /// What messages call the clips.
+    /// The name of the clips in messages.
     pub(crate) name: String,
     pub(crate) target: ResultTarget,
     clips: std::ops::Range<usize>,
@@ -95,7 +95,7 @@ pub(crate) struct ClipWork {
 }
 
 impl ClipWork {
-    /// Adds a warning about the clips, or about what is made of them.
+    /// Adds a warning about the clips, or about their results.
     pub(crate) fn warn(&self, warning: Diagnostic) {
         if self.prints {
             words::note(&warning.to_string());
@@ -131,8 +131,8 @@ impl ClipWork {
         self.input.file.path()
     }
 
-    /// The result of this work: `done` says in its message what was done. `device` is what computed it;
-    /// `None` where nothing was computed.
+    /// The result of this work. `done` is the participle in its message. `device` is the device that computed it;
+    /// `None` if nothing was computed.
     pub(crate) fn result(
         &self,
         written: WrittenFile,
@@ -205,7 +205,7 @@ struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
     progress: Progress,
-    /// A signal ends the batch at its next input, which then says what is done.
+    /// A signal ends the batch at its next input; the batch then says how much is done.
     _until_end: BatchGuard,
     options: ResultOptions,
     inputs: usize,
@@ -218,7 +218,7 @@ struct BatchRecords<'a> {
 }
 
 impl<'a> Pipeline<'a> {
-    /// Of a single result, without a manifest.
+    /// The pipeline of a single result, without a manifest.
     pub(crate) fn of_one(reader: impl InputReader, inputs: PipelineInputs) -> Self {
         let PipelineInputs {
             jobs,
@@ -237,7 +237,7 @@ impl<'a> Pipeline<'a> {
         pipeline
     }
 
-    /// Of results that `records` records.
+    /// The pipeline of results that `records` records.
     pub(crate) fn of_batch(
         reader: impl InputReader,
         inputs: PipelineInputs,
@@ -357,8 +357,8 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Keeps what was made of a file's clips, or its failure; gives whether it is kept. `report` is what JSON says
-    /// of it: the fields of one record, or a list of those of several.
+    /// Keeps the result of a file's clips, or its failure; returns whether it is kept. `report` is its part of the
+    /// JSON: the fields of one record, or a list of those of several.
     pub(crate) fn keep<T: Serialize>(
         &mut self,
         work: &ClipWork,
@@ -723,7 +723,7 @@ impl BatchRecords<'_> {
     }
 }
 
-/// What the reading thread knows.
+/// The state of the thread that reads inputs ahead of the evaluation.
 struct ReadingAhead<R> {
     reader: R,
     previous: PreviousEntries,
@@ -761,7 +761,7 @@ impl<R: InputReader> ReadingAhead<R> {
 
 /// A file to write: which of the input's clips go into it.
 pub(super) struct ClipFile {
-    /// What messages call these clips.
+    /// The name of these clips in messages.
     pub(super) name: String,
     pub(super) clips: Range<usize>,
     pub(super) target: ResultTarget,

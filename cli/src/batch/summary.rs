@@ -37,7 +37,7 @@ pub(crate) struct BatchSummary {
 /// The inputs with warnings of one code.
 struct WarnedInputs {
     inputs: usize,
-    /// Of all these inputs.
+    /// The number of their warnings.
     warnings: usize,
     first: Diagnostic,
 }

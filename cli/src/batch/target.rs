@@ -101,7 +101,7 @@ impl ResultTarget {
         }
     }
 
-    /// The same, with a file for the times of what is written.
+    /// The same, with a file for the times of the result.
     pub(crate) fn with_times(self, destination: Destination) -> Result<Self, Failure> {
         destination.refuse_same(self.path())?;
         destination.check_writable()?;

@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// The JSON that `--json` prints.
 #[derive(Debug, Serialize)]
 struct CheckReport<'a> {
     manifest: String,
@@ -71,7 +71,7 @@ struct FaultyResult<'a> {
     fault: String,
 }
 
-/// What is wrong with one result.
+/// Why a result does not agree with its manifest.
 enum Fault {
     Damaged,
     Unreadable(io::Error),
@@ -234,7 +234,7 @@ fn unfinished(lines: &ManifestLines) -> Vec<String> {
     texts
 }
 
-/// What is yet to do in a directory with shards.
+/// How many shards of a directory are done, and the command that finishes or combines them.
 fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
     let (folder, summary) = (folder.display(), progress.summary());
     match progress.is_done() {

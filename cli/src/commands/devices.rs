@@ -1,4 +1,4 @@
-//! `tumble devices`: what Vulkan offers here, and whether it is exact.
+//! `tumble devices`: the Vulkan devices of this machine, and whether they are exact.
 
 use std::fmt::Write;
 
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is listed; also the form of the JSON.
+/// The list of devices, as printed and as JSON.
 #[derive(Serialize)]
 struct Listing {
     /// Why there is no Vulkan device.

@@ -1,4 +1,4 @@
-//! `tumble explain`: what the codes in messages about inputs mean.
+//! `tumble explain`: the meanings of the codes in messages about inputs.
 
 use std::fmt::Write;
 

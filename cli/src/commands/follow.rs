@@ -25,7 +25,7 @@ use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// What the help says of files.
+/// The help's notes on files.
 const NOTES: &str = "\
 If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape
 (frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a
@@ -39,7 +39,7 @@ Examples:
   tumble follow points.npy --pace 1.5 -m linear --direction ahead:0.5 -o walk.csv
   tumble follow orbit.csv --direction at:0,1,0 --path-frame fixed -o camera.glb";
 
-/// What files of paths are, for the help.
+/// The names and summaries of the formats of paths, for the help.
 fn kinds() -> String {
     let kind =
         |format: &&PathFormat| format!("{} ({})", format.name.to_uppercase(), format.summary);

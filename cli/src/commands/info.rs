@@ -1,4 +1,4 @@
-//! `tumble info`: what is in a keyframe file, or in a file with a robot.
+//! `tumble info`: the contents of a keyframe file, or of a file with a robot.
 
 mod pickle;
 mod robot;
@@ -72,13 +72,13 @@ struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     animation: Option<String>,
     tracks: usize,
-    /// Of each track that has one.
+    /// The names of the tracks; absent if none has one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     names: Vec<String>,
     /// The parent of each track, for files with a skeleton.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parents: Vec<Option<usize>>,
-    /// Of all tracks together.
+    /// The number of keys of all tracks together.
     keys: usize,
     /// Seconds.
     first_time: f64,
@@ -99,7 +99,7 @@ struct Summary {
     /// Whole seconds that all times are to be moved by, as those of clocks that count from 1970 are.
     #[serde(skip_serializing_if = "is_second_zero")]
     time_offset: i64,
-    /// What the positions of each track are to be moved by in f64, where those of any are.
+    /// The vector to add in f64 to the positions of each track; empty if it is 0 for all tracks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     origins: Vec<[f64; 3]>,
     /// The rate on whose frames all key times lie: a number or a ratio.
@@ -118,7 +118,8 @@ struct Summary {
     metres: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     up: Option<[f64; 3]>,
-    /// Of the whole file, with its first animation, and of the curves of each: `FILE:PLACE: warning[CODE]: …`
+    /// The warnings about the animation's curves, and with the first one those about the whole file:
+    /// `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
 }
 
@@ -238,7 +239,7 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Of all tracks; `None` where no track has two keys.
+    /// The steps of all tracks; `None` if no track has two keys.
     pub(crate) fn of(set: &TrackSet) -> Option<Self> {
         let steps = set.tracks().flat_map(|track| track.times.windows(2));
         let each = steps.map(|times| Self {

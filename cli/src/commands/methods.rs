@@ -1,4 +1,4 @@
-//! `tumble methods`: what there is to choose from with `-m`.
+//! `tumble methods`: the methods for `-m`.
 
 use std::fmt::Write;
 

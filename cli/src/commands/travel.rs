@@ -30,7 +30,7 @@ const CURVE_POINTS: usize = 600;
 /// How many facets along a side a net of control points is drawn with.
 const FACETS: usize = 32;
 
-/// What is drawn beside the bodies on paths.
+/// The options of the ground and the objects that are drawn beside the bodies on paths.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Scenery {
     /// The ground and objects on it.
@@ -204,7 +204,7 @@ pub(crate) enum TravelSource {
     Clip(Box<Motion>),
 }
 
-/// What makes one result of a source: a frame for paths, a method for clips.
+/// How one result is made of a source: by a frame for paths, by a method for clips.
 #[expect(
     clippy::large_enum_variant,
     reason = "there are few of them, and they are copied freely"

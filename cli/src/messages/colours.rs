@@ -20,19 +20,19 @@ const PINK: Colour = [0xcc, 0x79, 0xa7];
 const SKY: Colour = [0x56, 0xb4, 0xe9];
 const ORANGE: Colour = [0xe6, 0x9f, 0x00];
 
-/// Of w, x, y and z.
+/// The colours of w, x, y and z.
 pub(crate) const COMPONENTS: [Colour; 4] = [INK, VERMILLION, GREEN, BLUE];
 
-/// Of the axes x, y and z.
+/// The colours of the axes x, y and z.
 pub(crate) const AXES: [Colour; 3] = [VERMILLION, GREEN, BLUE];
 
-/// Of minimal, fixed and Frenet's frames.
+/// The colours of minimal, fixed and Frenet's frames.
 const FRAMES: [Colour; 3] = [GREEN, BLUE, VERMILLION];
 
-/// Of the boxes of a chain, from the first on, and again.
+/// The colours of the boxes of a chain, from the first on, then again from the start.
 pub(crate) const BOXES: [Colour; 6] = [BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION];
 
-/// Of the methods without a colour of that list.
+/// The colours of methods that are not in that list.
 const OTHERS: [Colour; 9] = [
     [0x7f, 0x7f, 0x7f],
     [0xbc, 0x9a, 0x00],
@@ -45,7 +45,7 @@ const OTHERS: [Colour; 9] = [
     [0xa3, 0x00, 0x59],
 ];
 
-/// Of results whose channels each have their own method.
+/// The colour of results whose channels each have their own method.
 pub(crate) const AUTHORED: Colour = [0xe7, 0x29, 0x8a];
 
 /// The colour of a choice of method.
@@ -76,7 +76,7 @@ fn common(name: &str) -> Option<Colour> {
     })
 }
 
-/// The colour of what a frame makes of a path.
+/// The colour of bodies with a path frame.
 pub(crate) fn of_frame(frame: PathFrame) -> Colour {
     FRAMES[frame as usize]
 }

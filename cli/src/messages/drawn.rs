@@ -1,4 +1,4 @@
-//! What the commands that draw say of the files that they wrote, to people and to programs.
+//! The reports of the commands that draw about the files that they wrote: text for people, JSON for programs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub(crate) struct DrawnFile {
     inputs: Vec<String>,
     /// The file, or the directory of a picture for each frame.
     output: String,
-    /// Of a directory, those of the pictures together; `None` of standard output.
+    /// The size of the file, or of all pictures of a directory; `None` for standard output.
     output_bytes: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<usize>,

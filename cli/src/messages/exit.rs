@@ -35,7 +35,7 @@ pub(crate) struct Failure {
     is_of_one: bool,
     /// The code of the first error of an input.
     input_code: Option<Code>,
-    /// The messages of what failed in an input, which were printed before.
+    /// The messages of the errors in an input, which were printed before.
     causes: Vec<String>,
 }
 
@@ -94,7 +94,7 @@ impl Failure {
         }
     }
 
-    /// An input of which nothing could be read: each of its parts was refused.
+    /// The failure of an input all of whose parts were refused.
     pub(crate) fn parts(refused: &[Diagnostic]) -> Self {
         let mut each = refused.iter().map(ToString::to_string);
         let first = each.next().unwrap_or_default();
@@ -195,12 +195,12 @@ impl Failure {
         &self.message
     }
 
-    /// The same with the messages of what failed, for the manifest and for JSON: they were printed.
+    /// The same with the messages of the errors, for the manifest and for JSON: they were printed.
     pub(crate) fn with_causes(self, causes: Vec<String>) -> Self {
         Self { causes, ..self }
     }
 
-    /// The messages of what failed in an input, where its own message is a summary of them.
+    /// The messages of the errors in an input, where its own message is a summary of them.
     pub(crate) fn causes(&self) -> &[String] {
         &self.causes
     }
@@ -249,14 +249,14 @@ fn is_of_one(error: &io::Error) -> bool {
 pub(crate) struct Outcomes {
     total: usize,
     failed: usize,
-    /// Inputs of which some animations are done.
+    /// The number of inputs with results of some animations only.
     failed_in_part: usize,
     /// The failure that ends the command.
     end: Option<Failure>,
 }
 
 impl Outcomes {
-    /// Of a command with that many inputs.
+    /// The outcomes of a command with that many inputs, none of which has one yet.
     pub(crate) fn of(total: usize) -> Self {
         Self {
             total,

@@ -3,7 +3,7 @@
 //!
 //! A thread waits for the signal, and says that it came. While no output file is open and no batch runs, it ends the
 //! program at once. Otherwise it leaves a mark: the writer of a file finds it at its next chunk, and removes its
-//! temporary file on the way out; a batch finds it before its next input, and says what is done. A batch that does not
+//! temporary file on the way out; a batch finds it before its next input, and says how far it is. A batch that does not
 //! find it for [`GRACE`] is ended without that, unless a file is open. A second signal removes the file itself, and
 //! ends the program at once. Signals that this process was started to ignore, as by `nohup`, are ignored.
 

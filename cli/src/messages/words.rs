@@ -116,7 +116,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
     text.unwrap_or("no reason given")
 }
 
-/// Reports a panic as a bug of tumble, with what to send.
+/// Reports a panic as a bug of tumble, and asks the user to send the command line and the input.
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
         let message = reason(info.payload());

@@ -1,4 +1,4 @@
-//! Nothing that is somebody's is lost, and nothing leaves its folder.
+//! No file of the user's is lost, and nothing is written outside the folder of results.
 
 use std::fs;
 use std::io::Write as _;
@@ -46,7 +46,7 @@ fn somebodys_manifest_is_kept() {
             assert_eq!(fs::read_to_string(&path).unwrap(), content);
             assert_eq!(entries(&out).len(), 1, "{:?}", entries(&out));
         }
-        // A batch of which nothing comes is no reason either.
+        // A batch without any result does not replace it either.
         run(folder, &["eval", "bad.dat", "none.dat", "-o", "out"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), content);
     }
@@ -60,7 +60,7 @@ fn somebodys_manifest_is_kept() {
     succeed(folder, &["merge", "out"]);
     succeed(folder, &["check", "out"]);
 
-    // Who says so replaces it.
+    // `--overwrite` replaces it.
     fs::write(&path, "my notes\n").unwrap();
     succeed(folder, &with(&BATCH, &["--overwrite"]));
     succeed(folder, &["check", "out"]);
@@ -249,7 +249,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         let check = run(folder, &["check", "out"]);
         assert_eq!(check.code, 8, "{name}: {}", check.words);
     }
-    // Nor does anybody take such a file for a result that is there.
+    // Such a file does not count as an existing result.
     let result = out.join("a.npy");
     let others: [(&str, &dyn Fn()); 3] = [
         ("link", &|| symlink("../outside", &result).unwrap()),
@@ -576,7 +576,7 @@ fn results_are_no_inputs_of_the_next_run() {
     assert_eq!(entries(&folder.join("walks/shards")).len(), 4);
 }
 
-/// Results of one directory, as somebody who copied it by hard links has them too.
+/// Results that a copy by hard links shares with another directory are replaced in one directory alone.
 #[test]
 fn a_copy_by_links_keeps_its_manifest() {
     let temporary = sample_folder();

@@ -1,5 +1,5 @@
-//! What an attacker writes into files: broken in ways that each format's structure allows, named so that a
-//! terminal would obey, said to be larger than they are.
+//! Files of an attacker: broken in ways that each format's structure allows, with names that contain a terminal's
+//! commands, or with headers that claim more data than there is.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -76,14 +76,14 @@ fn broken(folder: &Path) -> Vec<(&'static str, i32)> {
     all
 }
 
-/// What commands need beside inputs, where they are not those that make a result of each.
+/// The arguments beside inputs of the commands that do not make a result of each input.
 const COMMANDS: [&[&str]; 3] = [
     &["verify", "-m", "slerp", "--device", "cpu"],
     &["plot", "-o", "pictures"],
     &["render", "-o", "film.gif", "--fps", "2", "--size", "32x32"],
 ];
 
-/// The commands that take any inputs, with what they need beside these: by [`COMMANDS`], a format and an output of
+/// The commands that take any inputs, with their other arguments: by [`COMMANDS`], a format and an output of
 /// all that make a result of each input, else nothing.
 fn taking_inputs() -> Vec<Vec<String>> {
     // One takes two inputs; the other writes one page for all of them.

@@ -1,5 +1,5 @@
-//! What an attacker tries: with input, and with files, disks and signals. `ATTACK` says how many times as
-//! long the random parts run as in CI; 50 is a run on demand.
+//! Attacks by input, and by files, disks and signals. `ATTACK` says how many times as long the random parts
+//! run as in CI; 50 is a run on demand.
 
 mod files;
 mod input;

@@ -1,4 +1,4 @@
-//! Kills, signals, full disks and folders that nobody may write into: what is there is whole, and
+//! Kills, signals, full disks and folders that may not be written: all files under their names are whole, and
 //! nothing is left behind.
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use crate::program::{command, is_writing, sample_folder, with_signals};
 use crate::support::Random;
 use crate::tree::tree;
 
-/// What commands write, a file or a folder, where it is not the same for all (see [`writers`]).
+/// Commands with the file or folder that each writes; [`writers`] adds the commands that make a result of each input.
 const WRITERS: &[(&str, &str)] = &[
     ("eval a.dat --fps 20000 -o out/o.npy", "out/o.npy"),
     ("eval a.dat --fps 20000 -o out/o.csv", "out/o.csv"),
@@ -43,8 +43,8 @@ const WRITERS: &[(&str, &str)] = &[
     ),
 ];
 
-/// Every command that writes, with what it writes: those of [`WRITERS`], and of the other commands that make
-/// a result of each input, a file and a folder.
+/// Every command line that writes, with the file or folder that it writes: those of [`WRITERS`], and two for each
+/// other command that makes a result of each input, one with a file and one with a folder.
 fn writers() -> Vec<(String, String)> {
     // They need a Vulkan device and take minutes.
     const NOT_HERE: [&str; 2] = ["prove", "lab"];
@@ -251,7 +251,7 @@ fn a_full_disk_leaves_what_was_there() {
         succeed(folder, &line);
         let before = tree(&folder.join("out"));
         let largest = before.values().map(Vec::len).max().unwrap();
-        // Of the largest file half is written; of some commands a small one is whole before.
+        // Half of the largest file is written; some commands finish a smaller one before.
         let blocks = (largest / 2 / 512).max(1);
         let script = format!(
             "ulimit -f {blocks}; exec '{program}' {} --overwrite 2>words",
@@ -322,7 +322,7 @@ impl Drop for Unmount {
     }
 }
 
-/// Where nobody may write, every command says so, and nothing is changed.
+/// In a folder that may not be written, every command says so and changes nothing.
 #[test]
 fn a_read_only_folder_is_refused_by_every_command() {
     use std::os::unix::fs::PermissionsExt;

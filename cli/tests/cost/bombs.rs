@@ -1,4 +1,4 @@
-//! Small inputs that say they are large: what reading one takes is bounded by its length, counted by the
+//! Small inputs that say they are large: the memory to read one is bounded by its length, counted by the
 //! allocator. Each was once read into gigabytes, or could be.
 
 use std::fmt::Write as _;

@@ -35,7 +35,7 @@ struct Case {
     expected: Expected,
 }
 
-/// What becomes of files of a case.
+/// Whether all files of a case must be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Expected {
     Read,
@@ -84,7 +84,7 @@ fn written(format: &Format, clips: &[Motion]) -> Option<Vec<u8>> {
     done.is_ok().then_some(out)
 }
 
-/// What every format that is written can hold.
+/// A case for each kind of content that a format can write: keys, tracks, names, clips.
 fn written_cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for &format in FORMATS.iter().filter(|format| format.writes_clips()) {
@@ -113,7 +113,7 @@ fn written_cases() -> Vec<Case> {
     cases
 }
 
-/// Of FBX: as many nodes, layers and stacks, each with a curve; a layer's keys are at times of its own.
+/// An FBX file with as many nodes, layers and stacks, each with a curve; a layer's keys are at times of its own.
 fn fbx([nodes, layers, stacks]: [usize; 3], letters: usize) -> Vec<u8> {
     const SECOND: usize = 46_186_158_000;
     let mut objects = String::new();
@@ -171,7 +171,7 @@ fn fbx([nodes, layers, stacks]: [usize; 3], letters: usize) -> Vec<u8> {
     .into_bytes()
 }
 
-/// Of glTF: a node with a long name, which each of the animations moves.
+/// A glTF file with a node of a long name, which each of the animations moves.
 fn gltf(animations: usize, letters: usize) -> Vec<u8> {
     let one = r#"{"samplers":[{"input":0,"output":1}],"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}}]}"#;
     let all = vec![one; animations].join(",");
@@ -184,7 +184,7 @@ fn gltf(animations: usize, letters: usize) -> Vec<u8> {
     crate::bombs::gltf(&crate::bombs::keys(2), &parts)
 }
 
-/// Of MCAP: topics, messages of each, and letters in the name of each topic's schema.
+/// An MCAP file with so many topics, messages of each, and letters in the name of each topic's schema.
 fn mcap(topics: usize, messages: usize, letters: usize) -> Vec<u8> {
     let mut log = LogBuilder::new();
     for topic in 0..topics {
@@ -202,7 +202,7 @@ fn mcap(topics: usize, messages: usize, letters: usize) -> Vec<u8> {
     log.finish()
 }
 
-/// Of MCAP: bodies that hang on each other, in one topic.
+/// An MCAP file with bodies that hang on each other, in one topic.
 fn transforms(bodies: usize) -> Vec<u8> {
     let mut log = LogBuilder::new();
     let channel = log.topic("/tf", "tf2_msgs/msg/TFMessage", "cdr");
@@ -216,7 +216,7 @@ fn transforms(bodies: usize) -> Vec<u8> {
     log.finish()
 }
 
-/// Of CSV: columns of which nothing is known, and as many tracks below each other.
+/// A CSV file with so many unknown columns, and so many tracks below each other.
 fn csv(others: usize, tracks: usize) -> Vec<u8> {
     let mut text = "track,t,qx,qy,qz,qw".to_owned();
     for other in 0..others {
@@ -305,7 +305,7 @@ fn file(folder: &Path, number: usize, case: &Case, size: usize) -> std::path::Pa
 
 const FILES: &str = "TUMBLE_GROWTH_FILES";
 
-/// What valgrind runs: it reads the files one after the other.
+/// Reads the files one after the other; valgrind runs it.
 #[test]
 #[ignore = "reads files that another test has made"]
 fn read_all() {

@@ -1,5 +1,5 @@
-//! What a rotation and a key cost, in instructions: counted, not timed, so that a
-//! loop that is no longer vectorised is found on any machine. The engine is counted as it is shipped:
+//! The instructions for a rotation and for a key: counted, not timed, so that a loop that is no longer
+//! vectorised is found on any machine. The engine is counted as it is shipped:
 //! its profile for tests has no checks for overflow either, which would keep loops scalar.
 
 use std::path::Path;
@@ -107,7 +107,7 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
             assert!(each < bound, "{width}, {method}: {each:.1} a rotation");
             per_keys.push((dense - coarse) as f64);
         }
-        // What all spend on a key, as reading it, is not counted.
+        // The instructions that all methods spend on a key, such as reading it, are not counted.
         let keys = (TRACKS * (260 - 26)) as f64;
         for ((method, cost), bound) in methods.into_iter().zip(&per_keys).skip(1).zip(a_key) {
             let each = (cost - per_keys[0]) / keys;

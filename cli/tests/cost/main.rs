@@ -1,4 +1,4 @@
-//! What evaluating and reading cost, counted, not timed: a program of its own, because the memory that
+//! The cost of evaluating and reading, counted, not timed: a program of its own, because the memory that
 //! is counted is the whole process's.
 
 #![allow(clippy::disallowed_methods)] // as in tests/all.rs
@@ -21,13 +21,13 @@ mod memory;
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// For as long as what is returned is kept, no other test allocates what would be counted.
+/// As long as the guard is kept, no other test allocates memory that would be counted.
 fn one_at_a_time() -> MutexGuard<'static, ()> {
     static ONE: Mutex<()> = Mutex::new(());
     ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What some work gives, and the most memory that it took beside what was there before, bytes.
+/// The result of some work, and the most memory that it took in addition to the memory in use before, bytes.
 fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = ALLOCATOR.current_usage();
     ALLOCATOR.reset_peak_usage();

@@ -1,5 +1,5 @@
-//! What reading costs in memory. Counting instructions beside it takes next to none: that is done by
-//! other processes.
+//! The memory that reading takes. Counting instructions at the same time takes next to none, because other
+//! processes do it.
 
 use std::io::{BufReader, Read};
 
@@ -56,7 +56,8 @@ fn a_sampler_allocates_nothing_after_it_was_made() {
     }
 }
 
-/// What reading cost at most, beside what was there before; for one test at a time.
+/// The result of reading, and the most memory that it took in addition to the memory in use before, bytes; for
+/// one test at a time.
 fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
     let reader = BufReader::with_capacity(1 << 18, input);
     peak_of(|| read_dat("t", reader, &ReadOptions::default()))
@@ -208,7 +209,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
             evaluating >> 10,
             streaming >> 10
         );
-        // Of a part of a set, what its samples need.
+        // A part of a set takes the memory that its samples need.
         let (count, of_part) = peak_of(|| {
             let mut count = 0;
             let request = engine.request(&set, method, &frames).layout(layout);
@@ -227,7 +228,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         match memory {
             None => {
                 assert!(uploading > segments && streaming > 4 * limit);
-                // Segments, keys and spans, and what the threads work with.
+                // Segments, keys and spans, and the working memory of the threads.
                 let allowed = set.key_count() * (176 + 16 + 20) + 4 * MIB;
                 assert!(uploading <= allowed, "{uploading}");
             }
@@ -295,7 +296,7 @@ fn no_request_prepares_all_segments_at_once() {
     }
 }
 
-/// What is refused costs no more than was read of it and 64 MiB, whatever it claims.
+/// Refusing a file costs no more memory than the bytes read of it and 64 MiB, whatever the file claims.
 #[test]
 fn a_refusal_costs_no_more_than_was_read() {
     let _one = one_at_a_time();

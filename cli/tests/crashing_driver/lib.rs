@@ -13,7 +13,7 @@ fn end() -> ! {
     }
 }
 
-/// What every loader calls first.
+/// The first function that every loader calls.
 // SAFETY: no other function of this library has the name.
 #[unsafe(no_mangle)]
 pub extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(_version: *mut u32) -> i32 {

@@ -3,13 +3,13 @@
 //! both. `FAULT_CARD` says which card: `rebar` (the host sees all of the device's memory), `window` (it
 //! sees 256 MiB), or `full` (it sees all, and none is left there).
 //!
-//! What is submitted to the copying queue is held back until somebody asks whether it has ended, and
-//! runs after whatever was submitted to the other queue meanwhile: work that relies on another order
-//! than its semaphores say gives other bits. Lines of the log:
+//! Work for the copying queue is held back until the program asks whether it has ended, and runs after
+//! all work that was submitted to the other queue meanwhile: work that relies on another order than its
+//! semaphores say gives other bits. Lines of the log:
 //!
 //! * `card copies`: something was submitted to the copying queue;
 //! * `card beside`: kernels were submitted while copies were held back;
-//! * `card disorder`: a copy waits for nothing, or for what was never submitted;
+//! * `card disorder`: a copy waits for nothing, or for a semaphore that no submission signals;
 //! * `card memory TYPE`: an allocation.
 
 use std::ffi::CStr;
@@ -27,7 +27,7 @@ const OUT_OF_DEVICE_MEMORY: i32 = -2;
 const TYPES: u32 = 4;
 const BOTH: u32 = 2;
 
-/// What the handle of the copying queue points to.
+/// The target of the copying queue's handle, which only has to be an address.
 static COPIES: u64 = 0;
 
 fn copy_queue() -> Word {
@@ -38,7 +38,7 @@ fn copy_queue() -> Word {
 struct Queues {
     /// The one queue behind both.
     real: Word,
-    /// What was submitted to the copying queue.
+    /// The work that was submitted to the copying queue and has not run.
     held: Vec<Copy>,
     /// The points that submissions to the other queue will reach.
     coming: Vec<(vk::Semaphore, u64)>,
@@ -67,7 +67,7 @@ unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
     }
 }
 
-/// The semaphores of a submission with their values: what it waits for, and what it reaches.
+/// The semaphores of a submission with their values: those it waits for, and those it signals.
 unsafe fn points(info: &vk::SubmitInfo<'_>) -> [Vec<(vk::Semaphore, u64)>; 2] {
     let mut next = info.p_next.cast::<vk::BaseInStructure<'_>>();
     // SAFETY: a chain of structures, and the arrays of this one.

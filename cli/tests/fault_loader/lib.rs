@@ -150,7 +150,7 @@ macro_rules! name {
 }
 
 /// Calls that can fail: fails them, or passes them on and logs what they made. `wait` is
-/// passed on in any case: what the device does must have ended before anything goes.
+/// passed on in any case: the device's work must have ended before objects are destroyed.
 macro_rules! fallible {
     ($($call:ident($($argument:ident),*) $kind:ident;)*) => {
         $(
@@ -406,7 +406,7 @@ unsafe extern "system" fn vkEnumeratePhysicalDevices(
     }
 }
 
-/// Each of the properties is six words, the first of which says what a queue can do.
+/// Each of the properties is six words; the first has the flags of the queue.
 unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties(
     device: Word,
     count: *mut u32,
@@ -460,7 +460,7 @@ fn replacement(name: &CStr) -> Option<Pointer> {
     Some(special.cast())
 }
 
-/// What `ash` looks for in the library.
+/// The function that `ash` looks for in the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vkGetInstanceProcAddr(
     instance: Word,

@@ -39,7 +39,7 @@ const ATOM: u64 = 256;
 /// The second of two types of memory: cached and not coherent. The first is coherent and not cached.
 const INCOHERENT: u32 = 1;
 
-/// What an allocation of that type is: its bytes on the device and for the host.
+/// An allocation of that type: its size, and its memory as the device and the host see it.
 struct Mapped {
     size: usize,
     /// Addresses, once it is mapped.
@@ -146,7 +146,7 @@ unsafe extern "system" fn vkMapMemory(
         && result == SUCCESS
     {
         assert_eq!((offset, mapped.views), (0, None), "mapped as a whole, once");
-        // SAFETY: the size is not 0, and all of what is allocated is written.
+        // SAFETY: the size is not 0, and all of the allocation is written.
         unsafe {
             let host = std::alloc::alloc(layout(mapped.size));
             host.write_bytes(0xa5, mapped.size);

@@ -1,4 +1,4 @@
-//! The loader that fails on purpose, and what it logs.
+//! The loader that fails on purpose, and its log.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -68,7 +68,7 @@ impl Loader {
         command
     }
 
-    /// A run with these faults, and what it logged.
+    /// A run with these faults, and its log.
     pub(super) fn run(
         &self,
         folder: &Path,
@@ -93,7 +93,7 @@ impl Loader {
     }
 }
 
-/// What the loader saw.
+/// The events that the loader recorded.
 #[derive(Debug)]
 pub(super) struct Log {
     /// Calls of the process that made most of them (the other one probed the drivers).
@@ -102,7 +102,7 @@ pub(super) struct Log {
     pub(super) left: BTreeMap<String, i64>,
     /// Allocations that were refused for want of memory.
     pub(super) short: usize,
-    /// What a card saw (`FAULT_CARD`).
+    /// How often each event of a card occurred (`FAULT_CARD`).
     pub(super) card: BTreeMap<String, usize>,
 }
 

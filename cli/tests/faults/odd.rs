@@ -92,8 +92,8 @@ fn four_buffers() {
     }
 }
 
-/// Catches results that are read before the host asked for what the device wrote, and inputs that the device does
-/// not see: the host's memory is another there, and holds rubbish.
+/// Catches results that are read before the host invalidated the mapped memory, and inputs that it did not flush:
+/// the host's memory is separate there, and holds rubbish.
 #[test]
 fn memory_that_is_cached_and_not_coherent_is_made_visible() {
     let Some(loader) = Loader::new() else { return };
@@ -148,7 +148,7 @@ fn child(test: &str) -> Command {
     command
 }
 
-/// The files of a cache directory whose names begin so, with what they hold and when they were written.
+/// The files of a cache directory whose names begin so, with their contents and when they were written.
 fn kept(folder: &Path, start: &str) -> BTreeMap<String, (Vec<u8>, SystemTime)> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     let named = entries.map(|entry| (entry.file_name().into_string().unwrap(), entry.path()));
@@ -208,7 +208,7 @@ fn automatic() {
     eprintln!("chosen: {}", Engine::auto().unwrap().device_name());
 }
 
-/// What the driver compiled is kept when a process ends, and written again only where it is more.
+/// The driver's compiled kernels are kept when a process ends, and written again only when there are more of them.
 #[test]
 fn what_the_driver_compiled_is_kept() {
     let Some(loader) = Loader::new() else { return };

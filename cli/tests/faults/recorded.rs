@@ -1,4 +1,4 @@
-//! What recording into an application's commands asks of Vulkan: no object and no memory, wherever it goes.
+//! Recording into an application's commands asks Vulkan for no object and no memory, whatever is recorded.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use std::collections::BTreeMap;

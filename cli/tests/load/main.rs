@@ -269,7 +269,7 @@ fn limits_of_256_mib_give_the_same_bits() {
         &options,
     );
 
-    // The program, in so much address space: what it reads and what it writes.
+    // The program within a limit of address space: reading, then writing.
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.dat"), dat(4, 2000, 1)).unwrap();
     let eval = |limit: &str, out: &str| {
@@ -293,7 +293,7 @@ fn limits_of_256_mib_give_the_same_bits() {
         );
     };
     eval("", "free.npy");
-    // An allocator's arenas are address space that nobody uses.
+    // One arena, because an allocator's arenas take address space that is not used.
     eval("ulimit -v 262144; MALLOC_ARENA_MAX=1", "limited.npy");
     let same = Command::new("cmp")
         .current_dir(folder.path())

@@ -44,7 +44,7 @@ def cross(v):
 
 
 def accelerations(vector, h, start, end):
-    """Of an interval whose rotation vector is a cubic, at its two ends; from the velocities there."""
+    """The coefficients of an interval whose rotation vector is a cubic, from the velocities at its two ends."""
     angle = np.linalg.norm(vector)
     v = cross(vector)
     k1, k2 = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3

@@ -57,7 +57,7 @@ def check(what, error, bound):
 
 
 def keys_of(path, times, keys):
-    """As f32, normalised: what the program computes with."""
+    """The keys as f32, normalised, with which the program computes."""
     keys = keys.astype(np.float32).astype(float)
     return keys / np.linalg.norm(keys, axis=-1, keepdims=True)
 

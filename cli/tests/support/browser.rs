@@ -19,7 +19,7 @@ pub(crate) struct Page {
     calls: u64,
     /// Addresses of everything that the page asked for.
     pub(crate) requests: Vec<String>,
-    /// Exceptions, and what the console calls errors.
+    /// Exceptions, and errors in the console.
     pub(crate) errors: Vec<String>,
     _profile: tempfile::TempDir,
 }

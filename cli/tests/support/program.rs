@@ -21,7 +21,7 @@ pub(crate) fn pendulum() -> (Vec<f64>, Vec<Quat>) {
 }
 
 /// A folder with `a.dat`, `b.dat` and `folder/a.dat` (good), `bad.dat` (not), and
-/// `old.npy`, which nobody may touch unasked.
+/// `old.npy`, which no command may change unasked.
 pub(crate) fn sample_folder() -> tempfile::TempDir {
     let (times, keys) = pendulum();
     let mut text = String::from("# 2 3\n");
@@ -68,8 +68,8 @@ pub(crate) fn command(folder: &Path, line: &[&str]) -> Command {
     command
 }
 
-/// A program that is ended by every signal: whoever started the tests may have had some ignored, as a shell
-/// does for what runs in the background.
+/// A program that is ended by every signal: the tests may have been started with some signals ignored, as a
+/// shell starts programs in the background.
 #[cfg(unix)]
 pub(crate) fn with_signals(program: &str) -> Command {
     if cfg!(target_os = "linux") {

@@ -1,4 +1,4 @@
-//! The edges of the page: many boxes, odd names, what is refused, and the browser that opens it.
+//! Limits of the page: many boxes, odd names, refused inputs, and the browser that opens it.
 
 use std::fs;
 

@@ -277,7 +277,7 @@ impl<'a> Messages<'a> {
             used = used.saturating_add(length as u64);
             if compression.is_some() && !bytes.is_empty() {
                 let prefix = bytes.first_chunk::<PREFIX>().ok_or_else(wrong)?;
-                // -1 is said of what is not packed.
+                // A length of -1 marks a buffer that is not packed.
                 let unpacked = u64::try_from(i64::from_le_bytes(*prefix)).unwrap_or(0);
                 claimed = claimed.saturating_add(unpacked);
             }

@@ -263,7 +263,7 @@ impl<R: BufRead> Parser<'_, R> {
         let (mut names, mut named) = (Vec::new(), 0usize);
         while let Some(word) = self.word_before(&AFTER_CHANNELS) {
             named += 1;
-            // Of more than six one is there twice.
+            // Seven are enough for the message: one of them occurs twice, because there are only six names.
             if names.len() < 7 {
                 names.push(word);
             }

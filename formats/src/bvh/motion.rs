@@ -85,7 +85,7 @@ impl FrameKeys {
 
     fn push(&mut self, hierarchy: &Hierarchy, row: &[f64]) {
         if self.count == 0 {
-            // Positions that need an origin are at least half of what is large in every frame.
+            // Positions that need an origin have at least half of the large magnitude in every frame.
             let is_large = |channel: &&(usize, usize)| row[channel.1].abs() >= 0.5 * SMALL;
             let mut all = hierarchy.joints.iter().flat_map(|joint| &joint.positions);
             let width = self.positions.width();

@@ -70,7 +70,7 @@ pub static FORMAT: Format = Format {
         FormatOption::TimeUnit,
         FormatOption::BridgeGaps,
         FormatOption::Order,
-        // Of robots' files without names of columns.
+        // For robots' files without names of columns.
         FormatOption::SourceOrder,
     ],
 };

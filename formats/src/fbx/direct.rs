@@ -351,7 +351,7 @@ mod tests {
     use crate::fbx::times::Takes;
     use crate::limits::Limits;
 
-    /// Of all nodes that curves move, most are evaluated here, and at every time as `ufbx` does.
+    /// Most nodes that curves move are evaluated here, and give `ufbx`'s values at every time.
     #[test]
     fn curves_give_what_ufbx_does() {
         let package = Path::new(env!("CARGO_MANIFEST_DIR"));

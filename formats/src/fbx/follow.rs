@@ -256,14 +256,14 @@ impl ChannelFollower<'_> {
 
     fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
-        // Of half a turn an arc may go either way.
+        // The arc of half a turn may go either way.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Ok(false);
         }
         let at = |u: f64| match self.kind {
             ChannelKind::Vector => p.lerp(q, u),
             ChannelKind::Rotation => {
-                // Of unit quaternions that are no half turn apart; libm's sine is the same on every system.
+                // The unit quaternions are less than half a turn apart; libm's sine is the same on every system.
                 let half = libm::atan2((q - p).length(), (q + p).length());
                 let weight = |u: f64| match half < 1e-9 {
                     true => u,
@@ -300,7 +300,7 @@ impl ChannelFollower<'_> {
             };
             open.push(*piece);
             while let Some(mut piece) = open.pop() {
-                // A cut lies on the other side of 0 from what was there before.
+                // A cut lies on the other side of 0 from the curve before.
                 let last = keys.len() - 1;
                 piece = self.after(piece, keys[last].1);
                 let cubic = Cubic::through(piece.ends, piece.thirds);

@@ -38,7 +38,7 @@ impl Format {
                 .iter()
                 .try_for_each(|clip| check_parents(clip, options))?;
         }
-        // Tables have rows in any order; what holds nothing but clips is read only with times that increase.
+        // Tables have rows in any order; formats that hold only clips are read only with times that increase.
         if self.write.is_none() {
             clips
                 .iter()

@@ -187,7 +187,7 @@ impl MovedChannel {
             of(if is_cubic { which } else { 0 })
         };
         let keys = || 0..times.len();
-        // Of the first key nothing arrives, and nothing leaves the last.
+        // The first key has no incoming tangent, and the last no outgoing one.
         let tangent = |key: usize, which: usize| {
             let is_used = if which == 0 {
                 key > 0

@@ -35,7 +35,7 @@ pub(super) fn buffers<'a>(
         let buffer: Buffer<'_> = json.typed(raw, &pointer)?;
         let found = match &buffer.uri {
             Some(_) => stays_outside(reader, reader.buffer(index, &pointer)),
-            // Nothing is behind it: it stands for what meshopt decodes.
+            // A buffer without bytes: it stands for the data that meshopt decodes.
             None => None,
         };
         let Some(found) = found else {

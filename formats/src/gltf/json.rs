@@ -65,7 +65,7 @@ struct TopLevelArray<'a> {
 
 /// The text of a file, with its arrays split into entries.
 pub(super) struct Json<'a> {
-    /// What messages call the file.
+    /// The name of the file in messages.
     pub(super) name: &'a str,
     pub(super) text: &'a str,
     members: JsonMembers<'a>,

@@ -1,6 +1,6 @@
 //! Leaves out what a written file no longer uses: the keys that samples have replaced, with their accessors, buffer
 //! views and bytes. Only data of animations is left out. Everything else keeps its bytes; indices and offsets of
-//! what stays change where something before it is left out.
+//! the remaining data change where something before it is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -53,7 +53,7 @@ struct References<'a> {
     pinned: Option<usize>,
 }
 
-/// A text, and what is left out of the BIN chunk that belongs to it.
+/// A text, and the bytes that are left out of its BIN chunk.
 type PrunedText = (String, Cut);
 
 /// The text of a file with other keys, without what `before`, the file as it was, used for its animations and the new
@@ -373,7 +373,7 @@ fn extension<'a>(
         .transpose()
 }
 
-/// What a value of a file is part of.
+/// The part of the file in which a value stands.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Surroundings {
     /// glTF itself, or an extension that is known.
@@ -385,7 +385,7 @@ enum Surroundings {
 }
 
 impl Surroundings {
-    /// What the member `name` of an object in these surroundings is part of.
+    /// The surroundings of the member `name` of an object in these.
     fn of_member(self, name: &str) -> Self {
         match self {
             Self::Known if name == "extensions" => Self::Extensions,
@@ -756,7 +756,7 @@ impl Cut {
 mod tests {
     use super::*;
 
-    /// Whole words of what is freed, without what something else uses.
+    /// Whole words of the freed ranges are cut, without the parts that other data use.
     #[test]
     fn what_is_used_is_never_cut() {
         let layout = |freed: &[Range<u64>], used: &[Range<u64>]| Layout {

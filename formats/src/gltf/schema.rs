@@ -130,7 +130,7 @@ pub(super) struct Animation<'a> {
     pub(super) extras: Option<&'a RawValue>,
 }
 
-/// What Tumble writes beside an animation and reads again.
+/// The extras that Tumble writes into an animation and reads again.
 #[derive(Deserialize)]
 pub(super) struct AnimationExtras {
     /// Why the positions of its joints are unknown.

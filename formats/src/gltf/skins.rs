@@ -171,7 +171,7 @@ impl CarriedMeshBuilder<'_, '_> {
                 let weights = self.reader.numbers(weights, &accessor, 4, &from)?;
                 (joints, weights)
             }
-            // Of a skin's mesh without them, the first joint carries all.
+            // Without weights, the first joint carries the whole mesh.
             _ => {
                 let all = |first: f64| [first, 0.0, 0.0, 0.0].repeat(count);
                 (vec![0; count * 4], all(1.0))

@@ -46,7 +46,7 @@ pub fn contacts(
         .collect()
 }
 
-/// Replaces each contact of a body by what most of the `window` frames around it are (an odd number); at the ends, of
+/// Replaces each contact of a body by the majority of the `window` frames around it (an odd number); at the ends, of
 /// those that there are. A tie keeps it.
 #[must_use]
 pub fn majority(contacts: &[bool], window: usize) -> Vec<bool> {

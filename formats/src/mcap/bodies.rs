@@ -1,4 +1,4 @@
-//! Makes the tracks of a clip from the poses of a log: which clock their times are of, what has no time, and names.
+//! Makes the tracks of a clip from the poses of a log: the clock of their times, poses without a time, and names.
 //!
 //! Static transforms have no time: their stamps say when a node was started, often before the recording,
 //! or are 0. They are constant, and a value that is published later is a step at the time when it was logged.

@@ -426,7 +426,7 @@ impl<'a> Log<'a> {
                 cdr.header()?;
                 let count = cdr.count()?;
                 let body = self.body_of_topic(topic, BodyKind::Path)?;
-                // A path is sent anew as a whole; what it replaces is given back first.
+                // A path is sent anew as a whole; the memory of the one before is given back first.
                 let path = &mut self.bodies[body];
                 (path.poses, path.borrowed) = (Vec::new(), None);
                 let borrowed: Borrowed<'a> = self.budget.borrow(count, POSE)?;

@@ -240,7 +240,7 @@ impl<'a> Records<'a> {
                             format!("a message of channel {id}, which is not there"),
                         ));
                     }
-                    // The loop goes on from here no more: what is given is looked up again.
+                    // The loop ends here, so the bytes are looked up again.
                     let bytes = if in_chunk {
                         &self.chunk[..]
                     } else {

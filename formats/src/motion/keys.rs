@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::quaternion::{dot, nearest_unit, rounded};
 use crate::warnings::Warnings;
 
-/// What is done with two different keys at the same time.
+/// How two different keys at the same time are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Duplicates {
     /// The input is refused.

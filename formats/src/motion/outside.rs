@@ -1,4 +1,4 @@
-//! What is done with times before the first and after the last key of a clip.
+//! The treatment of times before the first key and after the last key of a clip.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use tumble::{FrameRate, SampleTimes, SampleTimesError, UnknownNameError, WrapMod
 
 use crate::motion::Motion;
 
-/// What is done with times before the first or after the last key.
+/// The treatment of times at one end: before the first key, or after the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OutsideValue {
     /// They have values.
@@ -77,7 +77,7 @@ impl FromStr for OutsideValue {
     }
 }
 
-/// What is done with times outside the keys of a clip.
+/// The treatment of times outside the keys of a clip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Outside {
     /// Before the first key.

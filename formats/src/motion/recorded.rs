@@ -1,4 +1,4 @@
-//! What a file of a robot's motion says of the robot, besides the keys of its root and its joints.
+//! The robot as a file of its motion describes it, in addition to the keys of its root and its joints.
 
 use glam::DVec3;
 

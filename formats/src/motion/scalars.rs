@@ -8,7 +8,7 @@ use tumble::{Error, ScalarKeys, TrackError};
 use crate::motion::sample::Samples;
 use crate::motion::{ChannelInterpolation, Motion};
 
-/// What a scalar of a clip is; its name and its keys are in the clip's set.
+/// The kind and the limits of a scalar of a clip; its name and its keys are in the clip's set.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Scalar {
     /// The quantity.
@@ -61,7 +61,7 @@ impl Scalar {
 }
 
 impl Motion {
-    /// What a scalar of the set is.
+    /// The kind and the limits of a scalar of the set; the default if none are known.
     #[must_use]
     pub fn scalar(&self, index: usize) -> Scalar {
         self.scalars.get(index).copied().unwrap_or_default()

@@ -82,7 +82,7 @@ impl ClipSkeleton {
     }
 
     /// The joints of arrays without names: they are those of `first`, the first clip of the library, in the same order.
-    /// `names` are what the skeleton and the clip are called in messages.
+    /// `names` are the names of the skeleton and the clip in messages.
     ///
     /// # Errors
     /// When the clip has another number of tracks, or a joint has another parent in it.
@@ -135,8 +135,8 @@ impl ClipSkeleton {
         (self.joints, self.rest) = (joints.with_parents(parents), rest);
     }
 
-    /// Adds the joints of a clip that are new; they follow the others. `names` are what the skeleton and the clip are
-    /// called in messages.
+    /// Adds the joints of a clip that are new; they follow the others. `names` are the names of the skeleton and the
+    /// clip in messages.
     ///
     /// # Errors
     /// When two joints have the same name, or a joint has another parent. The skeleton is then unchanged.
@@ -173,8 +173,8 @@ impl ClipSkeleton {
         &self.rest
     }
 
-    /// Pairs of joints and the tracks of a clip that has the same joints. `names` are what the skeleton and the clip are
-    /// called in messages.
+    /// Pairs of joints and the tracks of a clip that has the same joints. `names` are the names of the skeleton and the
+    /// clip in messages.
     ///
     /// # Errors
     /// The first difference.
@@ -190,8 +190,8 @@ impl ClipSkeleton {
         Ok(matched)
     }
 
-    /// Pairs of joints and the tracks of a clip that has some of the joints. `names` are what the skeleton and the clip
-    /// are called in messages.
+    /// Pairs of joints and the tracks of a clip that has some of the joints. `names` are the names of the skeleton and
+    /// the clip in messages.
     ///
     /// # Errors
     /// When the clip has a joint that the skeleton does not have, or a joint has another parent.
@@ -208,8 +208,8 @@ impl ClipSkeleton {
     }
 
     /// The tracks of a clip in the order of the joints. Joints without a track are at rest; a channel without keys is at
-    /// rest where the clip has it, or where the skeleton has it if `offsets` says so. `name` is what the clip is called
-    /// in messages.
+    /// rest where the clip has it, or where the skeleton has it if `offsets` says so. `name` is the name of the clip in
+    /// messages.
     ///
     /// # Errors
     /// When the clip's rotations or positions are not relative to the parents.

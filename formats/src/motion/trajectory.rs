@@ -211,7 +211,7 @@ impl Alignment {
             apart.fold(0.0, f64::max) / (1.0 + mean.length())
         };
         let is_still = extent(reference, to) < STILL || extent(estimate, from) < STILL;
-        // Of the largest covariance that paths of these extents have.
+        // Relative to the largest covariance that paths of these extents can have.
         let is_zero = |covariance: f64| {
             let squares = pairs().map(|(a, b)| [level(a), level(b)].map(DVec3::length_squared));
             let [a, b] = squares.fold([0.0, 0.0], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
@@ -380,7 +380,7 @@ fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
             }
         }
     }
-    // Of equal ones the first, which is no turn.
+    // If several are the largest, the first, which is no turn.
     let mut largest = 0;
     for index in 1..4 {
         if a[index][index] > a[largest][largest] {

@@ -177,7 +177,7 @@ impl TrimmedKeys {
     fn of(times: &[f64], start: f64, end: f64) -> Self {
         let first = times.partition_point(|&time| time < start);
         let behind = times.partition_point(|&time| time <= end).max(first);
-        // A single key says the same at all times, and so it stays where it is.
+        // A single key is a constant, so its time does not matter.
         if times.len() == 1 {
             return Self {
                 kept: 0..1,

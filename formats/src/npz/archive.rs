@@ -185,7 +185,7 @@ impl Archive {
         Ok(())
     }
 
-    /// The bytes of the file, and what is left of its budget.
+    /// The bytes of the file, and the rest of its budget.
     pub(crate) fn into_parts(self) -> (Vec<u8>, Budget) {
         (self.bytes, self.budget)
     }

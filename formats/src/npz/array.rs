@@ -70,7 +70,7 @@ impl Array<'_> {
         frames: usize,
         finish: impl Fn(Vec<M::Key>) -> U + Sync,
     ) -> Vec<U> {
-        // What the numbers are is asked for each block, so that the threads' code is compiled once, not
+        // The type of the numbers is matched for each block, so that the threads' code is compiled once, not
         // for each type of number.
         let block = |&start: &usize| {
             let asked = (at, start..(start + TOGETHER).min(tracks.end), frames);

@@ -157,7 +157,8 @@ pub(crate) fn read(
 /// At how many keys the bodies of a robot are read, for the check of their order.
 const CHECKED_KEYS: usize = 8;
 
-/// What the file says of the robot; `frames` are those of the keys.
+/// The robot as the file describes it, with its bodies at some of the keys; `frames` are those of the keys. `None` if
+/// the plan has no robot.
 fn recorded_robot(
     archive: &Archive,
     plan: &ArchivePlan,

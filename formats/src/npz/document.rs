@@ -200,7 +200,7 @@ impl NpzDocument {
 
     /// The axis of frames of an array, if it has one.
     fn frame_axis(&self, member: usize) -> Option<usize> {
-        // Of one frame, every list of one entry would be such.
+        // With one frame, every list of one entry would look like an array of frames.
         if self.plan.constants.contains(&member) || self.plan.frames < 2 {
             return None;
         }

@@ -71,7 +71,7 @@ pub(crate) struct ArchivePlan {
     pub(crate) is_tumble_layout: bool,
 }
 
-/// What a file says of a robot, besides the keys of its root and its joints.
+/// The arrays about a robot, besides the keys of its root and its joints.
 #[derive(Debug, Clone)]
 pub(crate) struct RobotArrays {
     pub(crate) dialect: &'static str,
@@ -85,7 +85,7 @@ pub(crate) struct RobotArrays {
 }
 
 impl RobotArrays {
-    /// Of a dialect without bodies.
+    /// The arrays of a dialect without bodies.
     pub(crate) fn of(dialect: &'static str, names_joints: bool) -> Self {
         Self {
             dialect,

@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    /// What the columns hold: numbers, or the codes of words.
+    /// The values of each column: numbers, or the codes of words.
     fn numbers(table: &Table) -> Vec<Vec<f64>> {
         let column = |column: &Column| match &column.values {
             ColumnValues::Numbers(numbers) => (0..table.rows).map(|row| numbers.at(row)).collect(),

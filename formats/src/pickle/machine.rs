@@ -1,8 +1,8 @@
 //! The machine that carries out the opcodes of a pickle, as data: no class is looked up and no function is called.
 //!
 //! Values are nodes of one list and refer to each other by index. So objects may share values and change after they
-//! are referred to, as in Python, and neither reading nor freeing them is recursive. What the names of a few classes
-//! mean stands in `globals`; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
+//! are referred to, as in Python, and neither reading nor freeing them is recursive. `globals` has the meanings of the
+//! names of a few classes; the arrays of `NumPy`, joblib and `PyTorch` are made in the modules beside this one.
 
 pub(super) mod arrays;
 pub(super) mod joblib;
@@ -37,7 +37,7 @@ const LONGEST_NUMBER: usize = 64;
 /// The largest number of arguments of a call, and of fields of a state that are looked at.
 const MAX_FIELDS: usize = 64;
 
-/// How many references are followed from an object to what it stands for.
+/// How many references are followed from an object to the value that it stands for.
 const MAX_REFERENCES: usize = 64;
 
 /// The index of a node.
@@ -391,7 +391,7 @@ impl<'a> Machine<'a> {
         match &mut self.nodes[target.index()] {
             Node::List(list) | Node::Set(list) => list.extend_from_slice(items),
             Node::Dict(dict) => dict.extend(pairs),
-            // Of a class that means nothing here; a warning names it.
+            // The state of a class that is not known here; a warning names the class.
             Node::Inert(_) => {}
             _ => return Err(self.damaged("items are added to a value that has none")),
         }

@@ -4,7 +4,7 @@ use super::*;
 
 const PAGE: &str = include_str!("../../../docs/formats.md");
 
-/// The rows of the table: how a number is written, what it is kept as, and its rate.
+/// The rows of the table: a number as written, the number that is kept, and its rate.
 fn rows() -> Vec<[&'static str; 3]> {
     let table = PAGE
         .split("| written | kept as | rate |\n|---|---|---|\n")

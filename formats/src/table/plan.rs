@@ -521,7 +521,8 @@ fn time_source(
     Err(names.refuse(Code::NoTimes, message))
 }
 
-/// What to do about a heading that has no names in columns of its format, which no `--map` can change.
+/// The hint about a heading that has no names in columns of its format, where no `--map` helps; `None` for other
+/// headings.
 fn heading_hint(columns: &[String]) -> Option<&'static str> {
     let [first, ..] = columns else {
         return None;

@@ -64,7 +64,7 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
     if parents.len() != count || offsets.len() != count || motion.set.track_count() != count {
         return;
     }
-    // Of equal names, the first track has it.
+    // If tracks have equal names, the first one is meant.
     let names = (0..count).rev();
     let names = names.map(|track| (motion.set.track_name(track), track));
     let names: HashMap<String, usize> = names.collect();

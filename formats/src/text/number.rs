@@ -108,7 +108,7 @@ fn decimal(token: &str) -> Option<DecimalParts> {
             b'0'..=b'9' => {
                 digits += 1;
                 zero &= byte == b'0';
-                // Wraps behind 19 digits, whose number nobody asks for.
+                // Wraps after 19 digits; longer numbers do not use it.
                 mantissa = mantissa
                     .wrapping_mul(10)
                     .wrapping_add(u64::from(byte - b'0'));

@@ -1,4 +1,4 @@
-//! What is in a new file.
+//! The content of a new file: nodes, skins, animations and their samplers.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -41,7 +41,7 @@ fn a_clip_comes_back_as_nodes_a_skin_and_an_animation() {
     {
         let rest = clip.motion.skeleton[node].rest;
         let node = &nodes[node];
-        // What glTF has by default is left out.
+        // Members with glTF's default values are left out.
         let list = |name: &str, default: &[f32]| -> Vec<f32> {
             let numbers = |of: &Value| serde_json::from_value(of.clone()).unwrap();
             node.get(name).map_or(default.to_vec(), numbers)
@@ -160,7 +160,7 @@ fn clips_share_nodes_where_their_skeletons_are_equal() {
     ];
     assert_eq!(names, expected);
     assert_eq!(json["scenes"][0]["nodes"], json!([1, 3, 4, 5, 7]));
-    // What has no skeleton has no skin.
+    // Clips without a skeleton have no skin.
     assert_eq!(json["skins"][0]["joints"], json!([1, 0, 2]));
     assert_eq!(json["skins"][1]["joints"], json!([7, 6, 8]));
     assert_eq!(json["skins"].as_array().unwrap().len(), 2);

@@ -46,7 +46,7 @@ fn rest(translation: [f32; 3], rotation: Quat, scale: f32) -> Transform {
     }
 }
 
-/// Tracks without keys of note: what is written are the samples.
+/// Tracks whose keys do not matter: only the samples are written.
 fn set(names: &[&str]) -> TrackSet {
     let mut set = TrackSet::new();
     for name in names {
@@ -132,7 +132,7 @@ fn written(clips: &[SampledClip<'_>], format: &str) -> Vec<u8> {
     bytes
 }
 
-/// The JSON and the binary data of a GLB, each of whose lengths is what it says.
+/// The JSON and the binary data of a GLB, with its stated lengths checked.
 fn glb(bytes: &[u8]) -> (Value, Vec<u8>) {
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     assert_eq!(&bytes[..8], b"glTF\x02\0\0\0");

@@ -1,4 +1,4 @@
-//! What no new file can hold.
+//! Clips that no new file can hold are refused.
 
 use std::io;
 

@@ -66,7 +66,7 @@ fn a_stamp_of_zero_is_a_time_where_others_have_stamps() {
         (clip.time_offset, clip.rate),
         (0, FrameRate::new(10, 1).ok())
     );
-    // Stamps of the log's clock, of which one is missing; and no stamps at all.
+    // Stamps of the log's clock, one of which is missing; and no stamps at all.
     let mut log = LogBuilder::new();
     let (some, none) = (
         log.topic("/some", POSE, "cdr"),

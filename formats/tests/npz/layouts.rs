@@ -39,7 +39,7 @@ fn expected() -> (Vec<usize>, Vec<usize>, Vec<f64>) {
     (whole("joints"), whole("frames"), part("rotations"))
 }
 
-/// Half the angle between a key and what is expected of it.
+/// Half the angle between a key and the expected one.
 fn apart(key: Quat, expected: &[f64]) -> f64 {
     let expected = DQuat::from_slice(expected);
     let key = key.as_dquat();
@@ -250,7 +250,7 @@ fn rates_and_units_come_from_options_where_the_file_has_none() {
     }
 }
 
-/// What a file would unpack to is known before anything is unpacked.
+/// The unpacked size of a file is known before anything is unpacked.
 #[test]
 fn archives_that_unpack_to_too_much_are_refused_before_that() {
     let options = ReadOptions {

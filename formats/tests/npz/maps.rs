@@ -71,7 +71,7 @@ fn results_are_read_back_when_it_is_said_which_axis_comes_first() {
     );
 }
 
-/// What the program writes as NPY.
+/// The NPY files that the program writes.
 #[test]
 fn our_own_results_are_read_back_bit_for_bit() {
     use tumble::Encoding;

@@ -1,5 +1,5 @@
-//! Beside numbers that are not ours: what `NumPy` and `SciPy` make of the samples and of the files
-//! that we write (`npz/peers.py`). `scripts/test.sh` makes the environment.
+//! Our numbers beside those that `NumPy` and `SciPy` compute from the samples and read from the
+//! files that we write (`npz/peers.py`). `scripts/test.sh` makes the environment.
 
 use std::path::Path;
 use std::process::Command;

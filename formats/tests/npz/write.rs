@@ -78,7 +78,7 @@ fn our_layout_reads_back_as_written() {
         (&found.name, found.rate, found.is_world),
         (&clip.name, None, false)
     );
-    // Written once more from what was read, as it is: the same file, but for the notes.
+    // Written once more from the clip as read: the same file, but for the notes.
     let again = SampledClip {
         clip: found,
         ..sampled.clone()

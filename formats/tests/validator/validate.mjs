@@ -19,7 +19,7 @@ for (const file of files) {
     });
     messages = report.issues.messages;
   } catch (reason) {
-    // What is neither GLB nor JSON has no report.
+    // A file that is neither GLB nor JSON has no report.
     messages = [{ severity: 0, code: "UNREADABLE", message: String(reason) }];
   }
   const texts = (severity) =>

@@ -1,4 +1,4 @@
-"""Clips as rows of Arrow tables: what Spark, Daft, Ray Data and DuckDB hand to a function."""
+"""Clips as rows of Arrow tables, which Spark, Daft, Ray Data and DuckDB pass to a function."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MAX_LIST_VALUES = 2**31 - 1
 
 
 def batch(engine: Any, rows: Any, *, order: Any = "xyzw", **options: Any) -> Any:
-    """What `Engine.batch` documents."""
+    """Evaluates a batch of rows, as `Engine.batch` documents."""
     try:
         arrow: Any = importlib.import_module("pyarrow")
     except ImportError as error:

@@ -31,10 +31,10 @@ _NAMES: tuple[_Name, ...] = (
     "angular_velocities",
 )
 _WIDTHS = {name: 4 if name.endswith("rotations") else 3 for name in _NAMES}
-# Where the arrays of a file start: a multiple of what any processor wants, and of a cache line.
+# Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
 _ALIGNED = 64
 _VERSION = 1
-# What every file has, beside what the extension module looks for.
+# Members that every file has, besides those that the extension module looks for.
 _STORED = ("version", "method", "names", "lengths", "rates")
 
 
@@ -44,7 +44,7 @@ class _WithWeakReferences:
 
 @dataclass(slots=True, eq=False)
 class MotionState(_WithWeakReferences):
-    """What `MotionLibrary.sample` found; an array that was left out is None.
+    """The result of `MotionLibrary.sample`; an array that was left out is None.
 
     float32, x y z w, seconds and radians:
 
@@ -384,7 +384,7 @@ class MotionLibrary:
     def open(
         cls, path: _Path, *, mmap: bool = True, engine: Engine | None = None
     ) -> MotionLibrary:
-        """Opens what `save` wrote. With `mmap` the file is mapped: what is not sampled is not read, and
+        """Opens a file of `save`. With `mmap` the file is mapped: motions that are not sampled are not read, and
         several processes share its memory.
 
         >>> import tumble
@@ -560,7 +560,7 @@ def _read(path: str) -> dict[str, Any]:
 
 
 def _mapped(path: str) -> dict[str, Any]:
-    """The arrays of a file that `_write` wrote, mapped where they are large. What NumPy has written again is read:
+    """The arrays of a file that `_write` wrote, mapped where they are large. A file that NumPy has written is read:
     its arrays may be compressed, and start anywhere."""
     found: dict[str, Any] = {}
     with zipfile.ZipFile(path) as archive, open(path, "rb") as file:

@@ -1,4 +1,4 @@
-"""What notebooks show: plots of clips, and the page of `tumble view`."""
+"""Output for notebooks: plots of clips, and the page of `tumble view`."""
 
 from __future__ import annotations
 

@@ -208,8 +208,8 @@ impl Clip {
         hasher.finish()
     }
 
-    /// Its arrays, of which pickles of protocol 5 hand on the memory. What is kept of its file beside
-    /// the clip stays behind: a copy is saved as a clip without a file.
+    /// Its arrays, of which pickles of protocol 5 hand on the memory. The other contents of its file are not
+    /// copied: a copy is saved as a clip without a file.
     fn __reduce_ex__<'py>(
         slf: &Bound<'py, Self>,
         _protocol: &Bound<'py, PyAny>,

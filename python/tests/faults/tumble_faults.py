@@ -1,4 +1,4 @@
-"""What goes wrong on machines, for the tests: Ray calls these as a worker starts."""
+"""Faults of machines, for the tests: Ray calls these as a worker starts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tumble.distributed import _worker
 
 
 def prepare() -> None:
-    """What every worker of the tests' connection begins with."""
+    """Installs the faults; every worker of the tests' connection begins with it."""
     kill_on_the_clip_that_says_so()
     another_wheel()
 

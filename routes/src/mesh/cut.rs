@@ -33,7 +33,7 @@ pub(super) fn cut(corners: &[DVec3]) -> Result<Triangulation, Uncut> {
     // Newell's normal.
     let normal: DVec3 = (0..count).map(|i| at(i).cross(at(i + 1))).sum();
     let size = (0..count).map(|i| at(i).length()).fold(0.0, f64::max);
-    // Of corners too far apart for f64 the normal is no number.
+    // If corners are too far apart for f64, the normal is NaN.
     if normal.length() <= STRAIGHT * size * size || normal.is_nan() {
         return Err(if is_on_a_line(corners) {
             Uncut::Flat

@@ -143,7 +143,7 @@ mod tests {
         host.bytes(0..bytes).to_vec()
     }
 
-    /// Of tracks with keys of each kind: equal ones, close ones, half turns (exact, and within rounding), other
+    /// Tracks with keys of each kind: equal ones, close ones, half turns (exact, and within rounding), other
     /// signs, components below 2^-64 and between, and lengths that are not quite 1; at uneven times. One track has
     /// one key.
     fn keys_of_all_kinds(tracks: usize, keys: usize) -> TrackSet {
@@ -234,8 +234,8 @@ mod tests {
         assert!(compared == 0 || compared > 100_000 && negated > 10_000);
     }
 
-    /// What is uploaded of 4096 tracks of 26 keys, as the documents count it; and a host's list of arcs is never
-    /// computed beside it.
+    /// The bytes uploaded for 4096 tracks of 26 keys, as the documents count them; and the host's list of arcs is never
+    /// computed in addition.
     #[test]
     fn fewer_bytes_are_uploaded() {
         let keys = 4096 * 26;

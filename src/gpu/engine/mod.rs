@@ -83,7 +83,7 @@ pub(crate) struct VulkanEngine {
     /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,
     free: FreeBuffers,
-    /// The CPU, for what the host computes.
+    /// The CPU, for the host's part of the work.
     pub(super) host: CpuEngine,
     pub(crate) timings: Mutex<Timings>,
 }
@@ -202,8 +202,8 @@ impl VulkanEngine {
         if let Some(pipeline) = kept() {
             return Ok(pipeline);
         }
-        // Made outside the lock, because drivers take up to seconds for it; of several callers
-        // who make this one, the first one's is kept.
+        // Made outside the lock, because drivers take up to seconds for it. If several callers
+        // make this one, the first is kept.
         let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
         self.trust(kernel, &made)?;
         let mut all = lock(&self.pipelines);
@@ -395,7 +395,7 @@ impl VulkanEngine {
         spare: &mut Vec<Buffer>,
     ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
-        // Of spare ones the host writes those that kernels have read in place.
+        // The host can write a spare buffer in place if it is mapped and large enough.
         let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size >= size;
         let (mut upload, is_staged) = match spare.iter().position(fits) {
             Some(index) => (spare.swap_remove(index), false),
@@ -430,7 +430,7 @@ impl VulkanEngine {
         let bytes = (whole.len() * encoding.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
         let in_place = self.device.placing.in_place;
-        // Memory that a card copies into is dear to make: only for what is asked for again.
+        // Memory that a card copies into takes long to allocate: only for requests that are repeated.
         let kept = self.kept(job, &whole)?;
         let pays = in_place || kept.is_some();
         let residence = match in_place {

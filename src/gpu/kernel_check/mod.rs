@@ -1,5 +1,5 @@
 //! The check of kernels: before the first result of a kernel is used, its output on the device is compared, bit for
-//! bit, with what its entry point in Rust ([`entries`](crate::twin::entries)) makes of the same inputs.
+//! bit, with the result of its entry point in Rust ([`entries`](crate::twin::entries)) for the same inputs.
 
 mod crowd;
 mod from_keys;

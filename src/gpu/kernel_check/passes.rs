@@ -230,7 +230,7 @@ mod tests {
         let file = format!("{}\n{line}\n{}", foreign.join("\n"), &line[..20]);
         assert!(cache.write(FILE, &[file.as_bytes(), &[0xff, 0xfe]].concat()));
         assert_eq!(read(&cache), BTreeSet::from([sound]));
-        // More than anybody has devices: what this process knows stays.
+        // More lines than there are devices anywhere: the entries of this process stay.
         let many: String = (0..MAX_LINES as u64)
             .map(|code| KernelPass::of(DEVICE, code).0 + "\n")
             .collect();

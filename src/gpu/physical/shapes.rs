@@ -8,9 +8,9 @@ const BY_VENDOR: [(u32, RunLanes); 1] = [(NVIDIA, RunLanes([4, 4, 8, 8, 8]))];
 
 const NVIDIA: u32 = 0x10de;
 
-/// The numbers for a vendor's cards; NVIDIA's for those that nobody has measured. What a run takes before its first
-/// sample, and the lanes without a sample in its first and its last iteration, weigh less the fewer lanes it has; eight
-/// store a whole line of memory.
+/// The numbers for a vendor's cards; NVIDIA's for vendors that were not measured. The time that a run takes before its
+/// first sample, and the lanes without a sample in its first and its last iteration, weigh less the fewer lanes it has;
+/// eight store a whole line of memory.
 pub(crate) fn run_lanes(vendor: u32) -> RunLanes {
     let mut rows = BY_VENDOR.iter();
     rows.find(|(known, _)| *known == vendor)

@@ -33,7 +33,7 @@ impl VulkanError {
     }
 }
 
-/// What a user can do about a failed call.
+/// The advice for a user about a failed call; empty if there is none.
 pub(super) fn hint(result: vk::Result) -> &'static str {
     match result {
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {

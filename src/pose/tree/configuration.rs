@@ -21,13 +21,13 @@ pub struct Configuration {
 /// How fast the values of a [`Configuration`] change, per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConfigurationRates {
-    /// Of the base, in the world's axes.
+    /// The velocity of the base, in the world's axes.
     pub base: BodyVelocity,
-    /// Of each free joint: in the world's axes, or in those of the body's place in its parent.
+    /// The velocity of each free joint, in the world's axes, or in those of the body's place in its parent.
     pub free: Vec<BodyVelocity>,
-    /// Of each ball: the angular velocity in the body's axes, rad/s.
+    /// The angular velocity of each ball, in the body's axes, rad/s.
     pub balls: Vec<DVec3>,
-    /// Of each hinge (rad/s) and slide (m/s).
+    /// The velocity of each hinge (rad/s) and slide (m/s).
     pub scalars: Vec<f64>,
 }
 

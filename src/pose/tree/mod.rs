@@ -161,7 +161,7 @@ pub enum TreeError {
     /// A constant is not finite, or a rotation or an axis does not have the length 1.
     #[error("the {quantity} of `{name}` is {value}")]
     Constant {
-        /// The quantity, and what it has to be.
+        /// The quantity, and the condition that it must meet.
         quantity: &'static str,
         /// The body or the joint.
         name: String,

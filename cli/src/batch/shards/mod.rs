@@ -4,7 +4,7 @@
 //! `manifest.d` in the directory of results records the plan (`plan.json`) and which shards are done:
 //! each writes its lines of the manifest to its own file, completely, after its results have
 //! their names. Every process that evaluates a shard writes the same bytes, so that two that do so at once do no
-//! harm, and nobody locks anything.
+//! harm, and no lock is needed.
 
 pub(crate) mod merge;
 pub(crate) mod plan;

@@ -92,7 +92,7 @@ pub(crate) fn hash_of(names: &[ResultName]) -> String {
     digest.finish()
 }
 
-/// How a library is divided, and what its results are.
+/// How a library is divided, and the format and names of its results.
 pub(crate) struct ShardOptions {
     /// The format of the results, if the command line names one.
     pub(crate) format: Option<&'static Format>,

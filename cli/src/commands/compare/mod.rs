@@ -164,7 +164,7 @@ pub(crate) fn partner(all: [&[Option<&str>]; 2], index: usize) -> Option<usize> 
 /// The heading of the options for trajectories in help.
 const TRAJECTORIES: &str = "Trajectories";
 
-/// What was found, as JSON has it.
+/// The differences that were found, as JSON has them.
 #[derive(Serialize)]
 #[serde(rename_all = "lowercase")]
 enum ComparisonReport {

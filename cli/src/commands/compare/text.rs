@@ -1,4 +1,4 @@
-//! What `tumble compare` says.
+//! The text that `tumble compare` prints of differences.
 
 use tumble_formats::compare::{
     AlignmentSummary, ArrayDifference, ChannelDifference, ClipDifference, PathDifference,

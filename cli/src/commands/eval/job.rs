@@ -1,4 +1,4 @@
-//! What `tumble eval` does to one input: its clips are evaluated and written into one file, as motion files
+//! The work of `tumble eval` on one input: its clips are evaluated and written into one file, as motion files
 //! with their skeletons, as rotations that are streamed as they come, or as whole poses.
 
 use std::borrow::Cow;
@@ -44,13 +44,13 @@ pub(crate) struct EvaluationReport {
     format: &'static str,
     tracks: usize,
     frames: usize,
-    /// Of the first and the last frame, seconds; null where there are none.
+    /// The times of the first and the last frame, seconds; null if there are none.
     first_time: Option<f64>,
     last_time: Option<f64>,
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_gaps: Option<usize>,
-    /// What was written for each rotation.
+    /// The output that was written for each rotation, as `--quantity` names it.
     #[serde(rename = "what")]
     output_kind: &'static str,
     /// The order of a quaternion's components as written; null where none are written, or where the
@@ -58,7 +58,7 @@ pub(crate) struct EvaluationReport {
     order: Option<&'static str>,
     method: String,
     device: String,
-    /// Of a robot's motion in the layout of another program.
+    /// The report of a robot's motion in the layout of another program; absent for other results.
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<RobotReport>,
 }
@@ -309,7 +309,7 @@ impl EvaluationJob<'_> {
         self.evaluated_as(&counted, (tracks, frames, span), method, written, order)
     }
 
-    /// As [`Self::evaluated`], with other words for what was evaluated.
+    /// As [`Self::evaluated`], with another noun for the samples in the message.
     fn evaluated_as(
         &self,
         counted: &str,
@@ -743,7 +743,7 @@ impl EvaluationJob<'_> {
         self.note_frames(std::slice::from_ref(&samples), target);
         let frames = &samples.frames;
         let timeline = samples.written_times(clip, name)?;
-        // The rotations, and twice what becomes of them.
+        // The rotations, and twice the size of their results.
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
         self.explain(name, clip, frames, Layout::FrameMajor, Delivery::InMemory)?;

@@ -16,7 +16,7 @@ const BUMPS: usize = 14;
 const ROCKS: usize = 16;
 const APART: f64 = 0.9;
 const FREE: f64 = 1.8;
-/// Of the random places tried for rocks.
+/// The number of random places that are tried for rocks.
 const TRIES: usize = 2000;
 
 /// Round bumps: the middle, the radius, and the height.
@@ -34,7 +34,7 @@ fn within(random: &mut Rng, low: f64, high: f64) -> f64 {
 }
 
 impl Landscape {
-    /// Of a seed: the height is 0 at the rim of the square.
+    /// The landscape of a seed: the height is 0 at the rim of the square.
     pub(super) fn new(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed);
         let mut bumps = vec![(DVec2::splat(SIZE / 2.0), SIZE / 2.0, HEIGHT)];

@@ -1,4 +1,4 @@
-//! What `tumble info` says of a pickle: its values by their names, whether or not they are a motion.
+//! `tumble info` of a pickle: its values by their names, whether or not they are a motion.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -20,7 +20,7 @@ pub(super) struct PickleSummary {
 
 #[derive(Serialize)]
 struct ValueSummary {
-    /// Of the entry `b` of a dict that is the entry `a`: `a.b`.
+    /// The path of the value: `a.b` for the entry `b` of a dict that is the entry `a`.
     name: String,
     /// Its shape and its type as in NumPy, or its class.
     kind: String,

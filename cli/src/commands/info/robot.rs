@@ -1,4 +1,4 @@
-//! What `tumble info` says of a robot: its bodies in both orders, and its joints.
+//! `tumble info` of a robot: its bodies in both orders, and its joints.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `tumble lab`: compares and measures what the engine might do otherwise on a card, and says what follows.
+//! `tumble lab`: compares and measures variants of the kernels on a card, and says which to use.
 
 mod text;
 

@@ -1,4 +1,4 @@
-//! What a picture shows, before anything is drawn.
+//! The content of a picture (panels, axes, curves, marks), before anything is drawn.
 
 use std::ops::Range;
 
@@ -43,7 +43,7 @@ pub(crate) enum Mark {
     Upright,
 }
 
-/// One pair of axes and what is drawn between them.
+/// One pair of axes, with the curves and marks between them.
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
     pub(crate) title: String,
@@ -105,7 +105,7 @@ pub(crate) fn range_of(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     if low == 0.0 && high == 0.0 {
         return -1.0..1.0;
     }
-    // Of something constant, its surroundings.
+    // A constant gets a range around it.
     let room = ((high - low) * 0.05).max(high.abs().max(1e-3) * 1e-3);
     low - room..high + room
 }

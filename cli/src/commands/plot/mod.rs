@@ -1,4 +1,4 @@
-//! `tumble plot`: pictures of what interpolation makes of keys, and of bodies on paths.
+//! `tumble plot`: pictures of interpolated keys, and of bodies on paths.
 
 pub(crate) mod draw;
 pub(crate) mod figure;
@@ -304,7 +304,7 @@ impl Arguments {
         CurveChoice::of_clip(&self.methods(), self.interpolation, name, clip)
     }
 
-    /// Refuses options that have no effect on what is drawn of these inputs.
+    /// Refuses options that have no effect on the pictures of these inputs.
     fn check_effects(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         let line = &self.command_line;
         let path_files = inputs.iter().filter(|path| is_path_file(path)).count();

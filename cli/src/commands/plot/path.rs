@@ -1,4 +1,4 @@
-//! What is drawn of bodies on paths: how fast they go, how fast they turn, and how far they have rolled.
+//! Plots of bodies on paths: how fast they go, how fast they turn, and how far they have rolled.
 
 use glam::Vec3;
 use tumble::SampleTimes;
@@ -18,14 +18,14 @@ const STEPS: usize = 1000;
 /// More keys than this stand too close for upright lines.
 const UPRIGHTS: usize = 200;
 
-/// What a panel shows of a body, between two samples.
+/// The quantity of a body that a panel shows, computed from two neighbouring samples.
 #[derive(Clone, Copy)]
 enum PathQuantity {
-    /// Units a second.
+    /// The speed, units a second.
     Speed,
-    /// Of its direction, rad/s.
+    /// The angular speed of its direction, rad/s.
     Turning,
-    /// About its direction since the start, degrees.
+    /// The angle about its direction since the start, degrees.
     Roll,
 }
 

@@ -1,4 +1,4 @@
-//! One input, sampled: what curves are made of.
+//! One input, sampled: the numbers of curves.
 
 pub(crate) mod curves;
 

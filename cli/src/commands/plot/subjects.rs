@@ -13,7 +13,7 @@ use crate::messages::words;
 /// A picture with more panels than this cannot be read.
 pub(super) const PANELS: usize = 64;
 
-/// What is drawn of a set over time.
+/// The quantity of a set that is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum PlotQuantity {
     /// w x y z over time
@@ -70,7 +70,7 @@ impl ComponentSelector {
     }
 }
 
-/// What is drawn of one set, and how it is shared out where there are several pictures.
+/// The tracks and the quantity that are drawn of one set, and how they are divided among several pictures.
 pub(super) struct Subjects {
     pub(super) boxes: Vec<usize>,
     pub(super) dimensions: Vec<usize>,

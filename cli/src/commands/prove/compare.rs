@@ -1,5 +1,5 @@
-//! `tumble prove --compare`: two proofs, of two devices or two builds. What both compared has to have the same
-//! bits; figures stand side by side.
+//! `tumble prove --compare`: two proofs, of two devices or two builds. Comparisons that both made must have the
+//! same bits; figures stand side by side.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::commands::prove::report::{FORMAT, FORMAT_VERSION, read_report};
 use crate::messages::exit::{DIFFERENCE, Failure};
 use crate::messages::listing;
 
-/// What was found; also the form of the JSON.
+/// The result of comparing two proofs, as printed and as JSON.
 #[derive(Debug, Serialize)]
 pub(crate) struct ProofComparison {
     /// Whether both prove their device.

@@ -12,7 +12,7 @@ use crate::arguments::device::refused;
 use crate::commands::prove::report::{CompileTime, CompileTimes};
 use crate::messages::exit::Failure;
 
-/// What turns the caches of Mesa's, NVIDIA's and AMD's drivers off, and the engine's.
+/// The environment variables that turn off the caches of Mesa's, NVIDIA's and AMD's drivers, and the engine's.
 const NO_CACHES: [(&str, &str); 5] = [
     ("MESA_SHADER_CACHE_DISABLE", "true"),
     ("MESA_GLSL_CACHE_DISABLE", "true"),

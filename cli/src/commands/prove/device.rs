@@ -1,4 +1,4 @@
-//! What a proof was made on: the program, the host, and how the device is connected.
+//! The environment of a proof: the program, the host, and how the device is connected.
 
 use std::fs;
 use std::path::Path;
@@ -53,7 +53,7 @@ fn processor() -> String {
     value("/proc/cpuinfo", "model name", ':').unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }
 
-/// What Linux says of the link to a PCI device.
+/// The speed and the width of the link to a PCI device, as Linux has them in `/sys`; `None` if it has neither.
 pub(crate) fn bus(address: &str) -> Option<Bus> {
     bus_in(Path::new("/sys/bus/pci/devices"), address)
 }

@@ -31,7 +31,7 @@ pub(crate) enum Verdict {
     Proved,
     /// Bits differ.
     BitsDiffer,
-    /// No bit differs of what was compared, but something was not.
+    /// No bit differs in the comparisons that were made, but some were not made.
     NotProved,
 }
 
@@ -175,7 +175,7 @@ pub(crate) struct GoldenSetting {
 pub(crate) struct RandomSection {
     pub(crate) seed: u64,
     pub(crate) rounds: u64,
-    /// Rounds in which both refused what was asked for.
+    /// Rounds in which both refused the request.
     pub(crate) rounds_refused: u64,
     pub(crate) crowds: u64,
     /// Rotations, velocities, accelerations and joints.
@@ -184,7 +184,7 @@ pub(crate) struct RandomSection {
     pub(crate) values_differing: u64,
     /// The rounds that differ: the first ones.
     pub(crate) differing: Vec<String>,
-    /// What the CPU made of the first 1, 2, 4, 8 … rounds, as a hash: the same on every machine.
+    /// The hashes of the CPU's results of the first 1, 2, 4, 8 … rounds: the same on every machine.
     pub(crate) digests: Vec<RoundsDigest>,
     /// The hash of all rounds so far.
     #[serde(skip)]
@@ -236,7 +236,7 @@ pub(crate) struct RoundsDigest {
     pub(crate) hash: String,
 }
 
-/// What was done under the validation layer.
+/// The part of the proof that ran under the validation layer.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct ValidationSection {
     pub(crate) has_run: bool,

@@ -1,5 +1,5 @@
-//! What is run, in which order, and for how long. What a proof needs runs first; the remaining time is
-//! shared among the configurations of the device and random rounds.
+//! The steps of a proof, their order, and how long each may take. Steps that a proof needs run first; the
+//! remaining time is shared among the configurations of the device and random rounds.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -58,7 +58,7 @@ struct DeviceSetting {
     options: EngineOptions,
 }
 
-/// How kernels read and what an invocation takes; how results and uploads are moved; a memory budget.
+/// How kernels read, and the samples of an invocation; how results and uploads are moved; a memory budget.
 type SettingParts = (
     (Reads, Mapping, &'static str),
     (Transfer, Uploads, ReadBack, PrepareArcs, &'static str),

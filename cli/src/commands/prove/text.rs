@@ -1,4 +1,4 @@
-//! The page for people: what was proved and what was not.
+//! The text of a proof for people: which claims were proved and which were not.
 
 use std::fmt::Write;
 

@@ -21,7 +21,7 @@ use crate::messages::colours::Colour;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Of a box that is 1 long.
+/// The breadth of a box that is 1 long.
 const BREADTH: f32 = 0.28;
 /// How many samples determine the extent of a motion.
 const REACHES: usize = 200;
@@ -148,7 +148,7 @@ impl Subject {
         }
         let length = actors.first().map_or(1.0, |actor| match &actor.shape {
             Shape::Bones(bones) => bones.length,
-            // A part of what is seen, as the bones in it are.
+            // A part of the visible extent, as for bones.
             Shape::Boxes(_) | Shape::Skin(_) => {
                 let low = actor.reach.iter().copied().fold(Vec3::MAX, Vec3::min);
                 let high = actor.reach.iter().copied().fold(Vec3::MIN, Vec3::max);

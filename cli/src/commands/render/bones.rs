@@ -17,7 +17,7 @@ const BROADEST: f32 = 0.15;
 const CUBE: f32 = 0.2;
 /// The middle length where no bone has any, of the extent of the motion.
 const LONE_LENGTH: f32 = 0.15;
-/// Of the meshes of a file.
+/// The colour of the meshes of a file.
 const SKIN: Colour = [0xc9, 0xb8, 0xa4];
 
 /// The bones of a clip.
@@ -158,7 +158,7 @@ fn face(corners: [Vec3; 3], colour: Colour) -> Face {
 #[derive(Debug, Clone)]
 pub(crate) struct Skin {
     mesh: Arc<CarriedMesh>,
-    /// Of the joints in the world, relative to the origin of the picture, `[frame][joint]`.
+    /// The transforms of the joints in the world, relative to the origin of the picture, `[frame][joint]`.
     matrices: Vec<DAffine3>,
     joints: usize,
 }

@@ -41,7 +41,7 @@ use tumble_formats::sample::MethodChoice;
 /// Chains side by side in one picture.
 const MAX_METHODS: usize = 4;
 
-/// What browsers show a frame of a GIF for at least, seconds; less some rounding.
+/// The shortest time for which browsers show a frame of a GIF, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 
 /// Draw boxes, skeletons or bodies on paths as images or an animation, without a display
@@ -225,7 +225,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
     }
-    // The rotations, and twice what becomes of them, for each method.
+    // The rotations, and twice the size of their results, for each method.
     room::in_memory(&name, set, &frames, 5 * choices.len().max(1))?;
     let mut device = arguments.device.open()?;
     let style = Style {
@@ -307,7 +307,7 @@ impl Arguments {
         })
     }
 
-    /// Refuses options that have no effect on what is drawn.
+    /// Refuses options that have no effect on the picture.
     fn check_effects(&self, source: &TravelSource, kind: RenderOutput) -> Result<(), Failure> {
         let line = &self.command_line;
         match source {

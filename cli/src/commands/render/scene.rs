@@ -57,7 +57,7 @@ impl Theme {
     };
 }
 
-/// Bodies, with what is drawn beside them on every frame.
+/// Bodies, with the curves that are drawn beside them on every frame.
 pub(crate) struct Actor {
     pub(crate) name: String,
     pub(crate) tracks: usize,
@@ -66,7 +66,7 @@ pub(crate) struct Actor {
     /// `[frame][track]`.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) shape: Shape,
-    /// What casts a shadow on the floor: the curves that bodies go along.
+    /// The curves that bodies go along, which cast shadows on the floor.
     pub(crate) trails: Vec<Face>,
     /// Where the camera looks, and nothing may be left out.
     pub(crate) reach: Vec<Vec3>,
@@ -111,7 +111,7 @@ pub(crate) struct Surroundings {
     pub(crate) shadows: bool,
 }
 
-/// What a picture looks like, whatever it shows.
+/// The options of a picture that do not depend on its scene.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Style {
     pub(crate) size: (u32, u32),
@@ -206,7 +206,7 @@ impl Scene {
             .collect();
         let centre = (low + high) / 2.0;
         let aspect = style.size.0 as f32 / style.size.1 as f32;
-        // Names are below the actors, which move up by half of what they take.
+        // Names are below the actors, which move up by half of the names' height.
         let below = match actors.iter().any(|actor| !actor.name.is_empty()) {
             true => overlay::Labels::share(style.size.1),
             false => 0.0,

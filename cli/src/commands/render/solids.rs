@@ -1,4 +1,4 @@
-//! What is drawn, as triangles: boxes, curves, axes, ground.
+//! The triangles of boxes, curves, axes and the ground.
 
 use glam::{DVec3, Quat, Vec3};
 use tumble_routes::mesh::Mesh;
@@ -188,11 +188,11 @@ pub(crate) fn trails(travel: &Travel, axes: usize, length: f32, ink: Colour) -> 
 /// Curves of more bodies than this hide each other.
 const MAX_TRAILS: usize = 256;
 
-/// Of the first mesh, which is the ground, and of what stands on it.
+/// The colours of the first mesh, which is the ground, and of the meshes that stand on it.
 const GROUND: Colour = [0xa9, 0xc2, 0x8f];
 const OTHERS: Colour = [0x9c, 0x96, 0x90];
 
-/// The triangles of meshes relative to an origin: the ground, and what stands on it.
+/// The triangles of meshes relative to an origin: the ground, and the objects on it.
 pub(crate) fn meshes(meshes: &[Mesh], origin: DVec3) -> Vec<Face> {
     let mut faces = Vec::new();
     for (index, mesh) in meshes.iter().enumerate() {

@@ -13,7 +13,7 @@ use crate::commands::route::surface::{Surface, kinds};
 use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
 
-/// What the help says of files.
+/// The help's notes on files.
 const NOTES: &str = "\
 A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
 of the surface there, for `tumble follow`. A list of pairs has six numbers a line, separated by

@@ -18,7 +18,7 @@ pub(super) struct RoutePoint {
     /// Seconds, where time counts.
     pub(super) time: Option<f64>,
     pub(super) position: DVec3,
-    /// Of the surface; none where that has one side, or its normals cancel out.
+    /// The normal of the surface; `None` where the surface has one side, or its normals cancel out.
     pub(super) normal: Option<DVec3>,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct RouteOutcome {
 pub(super) struct RouteResults {
     label: String,
     destinations: Vec<Destination>,
-    /// Of the picture.
+    /// The file of the picture, if one is drawn.
     plot: Option<Destination>,
 }
 
@@ -102,7 +102,7 @@ impl RouteResults {
         self.plot.as_ref()
     }
 
-    /// Writes what was found, each file whole or not at all.
+    /// Writes the routes, each file whole or not at all.
     pub(super) fn write(&self, outcomes: &[RouteOutcome]) -> Result<(), Failure> {
         for (outcome, destination) in outcomes.iter().zip(&self.destinations) {
             if let Ok((_, rows)) = &outcome.found {

@@ -62,7 +62,7 @@ impl Surface {
     }
 }
 
-/// What a surface may be, with the endings of its files: for help and messages.
+/// The kinds of surfaces with the endings of their files, for help and messages.
 pub(crate) fn kinds() -> String {
     let [meshes, nets] = [SurfaceKind::Mesh, SurfaceKind::Net].map(SurfaceFormat::endings_of);
     format!("a mesh ({meshes}) or a net of Bézier control points ({nets})")

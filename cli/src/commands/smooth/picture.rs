@@ -18,7 +18,7 @@ const WIDTHS: [f64; 2] = [1.0, 2.2];
 /// A curve is drawn with at most four points for each of this many columns.
 const COLUMNS: usize = 2000;
 
-/// What the picture is of.
+/// The data of the picture: the rotations of one clip before and after smoothing.
 pub(super) struct SmoothingSubject<'a> {
     pub(super) title: String,
     /// The kernel and how often.

@@ -1,4 +1,4 @@
-//! Which clips of several inputs are shown at once, at the same moment, and what of them can be compared.
+//! Which clips of several inputs are shown at once, at the same moment, and which of their joints are compared.
 
 use tumble_formats::compare::{ClipPair, CommonTimes, CompareError, MatchedTracks};
 
@@ -73,7 +73,7 @@ impl FoundGhosts {
                     let are_placed = both.into_iter().all(ShownClip::has_positions);
                     let (ghost, notes) = ghost_of(second + same, pair, &common, are_placed);
                     self.ghosts.push((first + index, ghost));
-                    // Of the others the page says it when one of them is chosen.
+                    // The page shows the notes on the other clips when one of them is chosen.
                     if first == 0 {
                         self.notes.extend(notes);
                     }

@@ -1,4 +1,4 @@
-//! The page: what `web/` was built into, and the results in it.
+//! The page that was built from `web/`, and the results in it.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ const PLACEHOLDER: &str = "/* DATA */";
 /// The module of the npm package, packed by gzip: `scripts/npm.sh --page` puts it here.
 const ENGINE: &[u8] = include_bytes!("tumble.wasm.gz");
 
-/// What the page's scripts read.
+/// The data of the page, which its scripts read as JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Page<'a> {
@@ -133,7 +133,7 @@ const MAX_KEY_BYTES: usize = 32_000_000;
 /// How bodies on paths are drawn.
 #[derive(Serialize)]
 struct StoredBodies {
-    /// Of a body, along z before `rotation`.
+    /// The length of a body, along z before `rotation`.
     length: f32,
     /// `x y z w`.
     #[serde(rename = "turn")]
@@ -160,11 +160,11 @@ pub(crate) struct StoredSet {
     length: f64,
     /// The parent of each joint, -1 for roots; empty where tracks are the boxes of a chain.
     parents: Vec<i64>,
-    /// Of the joints.
+    /// The names of the joints.
     names: Vec<String>,
     /// Whether rotations are relative to the world instead of the parent.
     is_world: bool,
-    /// Of bodies on paths, where tracks are these.
+    /// How tracks are drawn that are bodies on paths; `None` for other tracks.
     bodies: Option<StoredBodies>,
     /// Whether results are named after frames, not after methods.
     has_frames: bool,
@@ -180,9 +180,9 @@ pub(crate) struct StoredSet {
     keys: String,
     /// The first of them is shown first.
     results: Vec<StoredResult>,
-    /// What the page's engine evaluates.
+    /// The clip that the page's engine evaluates; `None` where the page only shows the stored results.
     clip: Option<StoredClip>,
-    /// Whether joints have scales: what follows them is drawn by the engine's matrices alone then.
+    /// Whether joints have scales: meshes that follow them are then drawn by the engine's matrices alone.
     has_scales: bool,
     /// The index of the skin that its joints move, among the page's.
     pub(crate) skin: Option<usize>,
@@ -256,7 +256,7 @@ impl StoredSet {
 }
 
 impl<'a> Page<'a> {
-    /// Of clips by these methods.
+    /// The page of clips by these methods.
     pub(crate) fn new(
         methods: &[ResultChoice],
         sets: Vec<StoredSet>,

@@ -6,7 +6,7 @@ use tumble::Encoding;
 
 use crate::commands::view::pack::differences;
 
-/// What one method makes of it.
+/// The samples of one method.
 #[derive(Serialize)]
 pub(crate) struct StoredResult {
     method: &'static str,

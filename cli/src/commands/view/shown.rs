@@ -27,7 +27,7 @@ const ROTATION: f64 = 10.0;
 /// Bytes of one position.
 const POSITION: f64 = 6.0;
 
-/// What makes a result: a method, for clips, or a frame, for paths.
+/// How a result is made: by a method, for clips, or by a frame, for paths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ResultChoice {
     By(MethodChoice),
@@ -96,7 +96,7 @@ pub(crate) struct Ghost {
     pub(super) pairs: Vec<[usize; 2]>,
     /// Whether their rotations are compared in the world, instead of relative to the parents.
     pub(super) in_world: bool,
-    /// What is not compared, or otherwise than is expected, and why.
+    /// Which joints are not compared, or not as a reader expects, and why.
     pub(super) note: String,
 }
 
@@ -266,7 +266,7 @@ impl ShownClip {
             .map_err(|error| Failure::evaluating(&self.name, &error.into()))
     }
 
-    /// What one method, or one frame, makes of it.
+    /// The samples of the clip by one method, or of the path in one frame.
     pub(crate) fn result(
         &self,
         choice: ResultChoice,

@@ -1,4 +1,4 @@
-//! Skeletons on the page, in a real browser: where joints are drawn, and what the menus say.
+//! Skeletons on the page, in a real browser: where joints are drawn, and the texts of the menus.
 
 use std::path::Path;
 

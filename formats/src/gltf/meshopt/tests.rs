@@ -20,7 +20,7 @@ const STREAMS: [&[u8]; 2] = [
 const COUNT: usize = 300;
 const STRIDE: usize = 16;
 
-/// As short as meshoptimizer's own of version 0, and decoded to what they were.
+/// Streams are as short as meshoptimizer's own of version 0, and decode to the original numbers.
 #[test]
 fn streams_are_written() {
     let all = elements();

@@ -51,7 +51,7 @@ impl NewNodes {
             let joint = clip.skeleton.get(track).map(|joint| joint.rest);
             joint.unwrap_or_default()
         };
-        // Of joints in the world, which become relative to their parents, roots alone have one.
+        // Joints in the world become relative to their parents, so that only roots keep an origin.
         let origin = |track: usize| match parents[track] {
             Some(_) if clip.is_world => DVec3::ZERO,
             _ => clip.origin(track),

@@ -192,7 +192,7 @@ fn filtered(level: u32) -> Quantization {
 /// The tolerance of each joint's curve.
 struct Tolerances {
     angles: Vec<f64>,
-    /// Of translations.
+    /// The tolerances of translations.
     distances: Vec<f64>,
 }
 
@@ -230,7 +230,7 @@ impl<'a> Reduction<'a> {
         let samples =
             ChannelMethods::AUTHORED.sample(engine, clip, &SampleTimes::at(times.clone()))?;
         let joints = clip.set.track_count();
-        // Where poses in the world cannot be computed, each track is what it is relative to its parent.
+        // Where poses in the world cannot be computed, each track is reduced relative to its parent.
         let hangs = clip.no_world.is_none() && !clip.is_world;
         let parents: Vec<Option<usize>> = (0..joints)
             .map(|joint| clip.skeleton.get(joint)?.parent.filter(|_| hangs))
@@ -316,7 +316,7 @@ impl<'a> Reduction<'a> {
     fn tighten(&self, found: &MeasuredErrors, tolerances: &mut Tolerances) -> bool {
         let mut factors = vec![1.0f64; self.parents.len()];
         for (joint, &[angle, distance]) in found.joints.iter().enumerate() {
-            // To what would have been enough, and a little less; never to next to nothing at once.
+            // To the bound that would have been enough, and a little less; by no more than a factor at once.
             let part = |bound: f64, error: f64| (0.95 * bound / error).clamp(0.3, 0.95);
             if angle > self.options.angle {
                 factors[joint] = factors[joint].min(part(self.options.angle, angle));

@@ -52,7 +52,7 @@ VALUES = {
     "--into": "files",
 }
 FLAGS = ("--resume", "--overwrite", "--json")
-# What is said in another way here, or not at all.
+# Options that have another form here, or none.
 REFUSED = ("-o", "--output", "--out", "--files-from", "--shard", "--pipes")
 FILES = ("--times", "--offsets")
 
@@ -185,7 +185,7 @@ def _tell(report: Report) -> None:
 
 
 class _Watch:
-    """A line that moves for people who watch, and one every ten seconds for a log."""
+    """One line that is rewritten in a terminal, or a line every ten seconds in a log."""
 
     def __init__(self) -> None:
         self._is_terminal = sys.stderr.isatty()

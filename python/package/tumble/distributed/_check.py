@@ -17,11 +17,11 @@ _AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Checked:
-    """What checking came to."""
+    """The result of checking."""
 
     results: int
     faults: list[str]
-    """What differs, and how."""
+    """The results that differ, and how, a line each."""
     unfinished: list[str]
     """Inputs that failed or do not have all their results yet, a line each."""
     shards: tuple[int, int] | None

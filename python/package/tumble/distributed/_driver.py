@@ -78,7 +78,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Report:
-    """What evaluating a library came to."""
+    """The outcome of evaluating a library."""
 
     inputs: int
     results: int
@@ -334,7 +334,7 @@ class _Driver:
         return bool(self._running or self._todo) or self._next <= len(self._plan)
 
     def _task(self) -> Task | None:
-        """The next: what was given back first, then the shards in their order."""
+        """The next task: first those given back, then the shards in their order."""
         if self._todo:
             return self._todo.popleft()
         if self._next > len(self._plan):
@@ -434,8 +434,8 @@ class _Driver:
         self._progress.shards_done += 1
 
     def _crashed(self, task: Task, why: str) -> None:
-        """Whatever a worker was doing when it ended is tried again by Ray, a few times. What ends
-        every worker is halved, down to the inputs that do; each of these gets the CPU to try."""
+        """Ray tries the task of a worker that ended again, a few times. A task that ends every worker is
+        halved, down to the inputs that cause it; each of these is tried on the CPU."""
         if not task.is_trial:
             self._retried += 1
             apart = self._apart.setdefault(task.shard, _Apart(self._inputs(task.shard)))

@@ -1,4 +1,4 @@
-"""What is said between the driver and its workers."""
+"""The messages between the driver and its workers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import tumble
 from tumble import _tumble
 
-# What a shard came to, or an input's refusal, as JSON has it.
+# The outcome of a shard, or the refusal of an input, as JSON has it.
 Entry = dict[str, Any]
 
 USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT, DIFFERENCE = 2, 3, 4, 6, 7, 8
@@ -36,7 +36,7 @@ class DistributedError(tumble.Error, RuntimeError):
 
 @dataclass(frozen=True)
 class Job:
-    """What is the same for all shards of a library."""
+    """The part of a task that is the same for all shards of a library."""
 
     line: tuple[str, ...]
     """Options of `tumble eval`, without inputs, output and device."""
@@ -90,7 +90,7 @@ def bytes_of(size: int | str) -> int:
 
 
 def wheel() -> tuple[str, str]:
-    """What this process computes with."""
+    """The hash of the kernels and the version with which this process computes."""
     return _tumble.kernels_sha256(), tumble.__version__
 
 

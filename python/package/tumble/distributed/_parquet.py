@@ -1,4 +1,4 @@
-"""Results as rows of Parquet: a file a shard, for those to whom a million small files are a burden."""
+"""Results as rows of Parquet: a file a shard, where a million small files would be a burden."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a worker does with a task. A worker is a process of Ray's; it keeps one engine open."""
+"""The work of a worker on a task. A worker is a process of Ray's; it keeps one engine open."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tumble.distributed._stores import Store, objects, put_text, read_text, stor
 
 
 def run(job: Job, task: Task) -> Entry:
-    """Evaluates a shard; what comes back is counts and failures."""
+    """Evaluates a shard; returns counts and failures."""
     started = time.monotonic()
     installed = wheel()
     reply: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
@@ -50,8 +50,8 @@ def run(job: Job, task: Task) -> Entry:
     return {**reply, **outcome, "seconds": time.monotonic() - started}
 
 
-# What a worker process keeps: its engine, by what it was opened for; the last manifest that it read;
-# which card has which UUID.
+# The state that a worker process keeps: its engine, by the options and the device that it was opened with; the
+# last manifest that it read; the UUID of each card.
 _WORKERS: dict[tuple[tuple[str, ...], str], _tumble.Worker] = {}
 _MANIFESTS: dict[tuple[str, int | None], dict[str, list[str]]] = {}
 _UUIDS: dict[str, str] = {}
@@ -106,7 +106,7 @@ def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
         for path, below in inputs:
             target = os.path.join(folder, path)
             os.makedirs(os.path.dirname(target), exist_ok=True)
-            # What is not there, or not ours to read, the evaluation says of its input.
+            # A file that is missing or may not be read is an error of the evaluation, which names the input.
             with contextlib.suppress(FileNotFoundError, PermissionError):
                 source.fetch(below, target)
                 _fetch_referred(source, below, target)
@@ -225,7 +225,7 @@ def _hash(path: str) -> str | None:
 
 
 def _hash_of_all(inputs: list[tuple[str, str]]) -> str:
-    """Of the hashes of a shard's inputs, in their order."""
+    """The hash of the hashes of a shard's inputs, in their order."""
     hashes = "".join(f"{_tumble.input_sha256(path)}\n" for path, _ in inputs)
     return hashlib.sha256(hashes.encode()).hexdigest()
 
@@ -237,9 +237,9 @@ def _done(
     inputs: list[tuple[str, str]],
     out: Store,
 ) -> Entry | None:
-    """What a shard came to that was done before, from the same inputs and in the same way: its file
-    says so, or the manifest that it was merged into. The bytes of its results are not read again:
-    whole is what has its length."""
+    """The outcome of a shard that was done before, from the same inputs with the same options, by its
+    record or by the manifest that it was merged into; else None. The bytes of its results are not read
+    again: a result of the recorded length counts as whole."""
     file_name = _tumble.Record.name_of(task.shard)
     text = read_text(out, file_name)
     if text is None:
@@ -280,14 +280,14 @@ def _done(
 def _keys(
     worker: _tumble.Worker, job: Job, task: Task, inputs: list[tuple[str, str]]
 ) -> list[str]:
-    """What the results of inputs are known by, without the ending, which is the format's."""
+    """The names of the results of inputs, without the ending, which is the format's."""
     if job.into == "parquet":
         return [_parquet.name_of(task.shard)]
     return [worker.key_of(below) for _, below in inputs]
 
 
 def _manifest(location: str, size: int | None) -> dict[str, list[str]]:
-    """The lines of a merged manifest of that size, by what they are of."""
+    """The lines of a merged manifest of that size, by the keys of their inputs."""
     if (location, size) in _MANIFESTS:
         return _MANIFESTS[location, size]
     text = (read_text(store(location), "manifest.jsonl") or "") if size is not None else ""

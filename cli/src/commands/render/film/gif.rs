@@ -7,7 +7,7 @@ use gif::{DisposalMethod, Encoder, Frame, Repeat};
 
 use crate::commands::render::film::{Patch, Picture, delays};
 
-/// Of the palette: what has not changed.
+/// The index of the palette for pixels that have not changed.
 const UNCHANGED: u8 = 255;
 /// Bits of a channel that decide about a colour of the palette.
 const BITS: u32 = 6;
