@@ -307,6 +307,35 @@ typedef uint32_t TumbleQuantity;
 #endif // __cplusplus
 
 /*
+ The quantity evaluated of scalars.
+ */
+enum TumbleScalarQuantity
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   The number itself.
+   */
+  TUMBLE_SCALAR_QUANTITY_VALUE = 0,
+  /*
+   Its derivative, per second: that of the curve, not a difference of samples.
+   */
+  TUMBLE_SCALAR_QUANTITY_VELOCITY = 1,
+  /*
+   Its second derivative, per second squared.
+   */
+  TUMBLE_SCALAR_QUANTITY_ACCELERATION = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumbleScalarQuantity TumbleScalarQuantity;
+#else
+typedef uint32_t TumbleScalarQuantity;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  How sample times are specified.
  */
 enum TumbleSampling
@@ -1402,6 +1431,58 @@ TumbleResult tumble_sampler_pose_of(const struct TumbleSampler *sampler,
  Frees a sampler. Does nothing if `sampler` is null.
  */
 TumbleResult tumble_sampler_free(struct TumbleSampler *sampler);
+
+/*
+ Appends a scalar of `key_count` keys, at least one, to a set. A set may have scalars without tracks.
+
+ `name` is its name in UTF-8. `times` are the key times in seconds, strictly
+ increasing, and `keys` a number for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers
+ for each time, the incoming tangent and the outgoing one, in units per second. Arrays and name are copied.
+
+ # Errors
+ `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a number
+ is not finite or exceeds 1e30 in magnitude. After any error the set is unchanged.
+
+ # Safety
+ `name` must be a text that ends with a zero byte; `times` and `keys` must have `key_count` numbers; `tangents` must
+ be null or have 2 × `key_count`.
+ */
+TumbleResult tumble_set_push_scalar(struct TumbleSet *set,
+                                    const char *name,
+                                    const double *times,
+                                    const float *keys,
+                                    const float *tangents,
+                                    size_t key_count);
+
+/*
+ Returns the number of scalars; 0 if the handle is invalid.
+ */
+size_t tumble_set_scalar_count(const struct TumbleSet *set);
+
+/*
+ Evaluates the scalars of a set, or how fast they change, into the caller's memory, and waits for the result.
+
+ `interpolation` may be null for the defaults. Scalars are interpolated as translations are by its method
+ (docs/methods.md): by "slerp" along lines, by "bessel-overhauser" with continuous velocities. Its ends and wraps
+ apply; its quantity does not. `quantity` is a `TumbleScalarQuantity`, `layout` a `TumbleLayout`. `output` receives a
+ float for each sample of each scalar. `output_count` is the number of floats, exactly scalars × samples
+ (`tumble_set_scalar_count`, `tumble_set_sample_count`).
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
+ is written.
+
+ # Safety
+ As `tumble_evaluate`.
+ */
+TumbleResult tumble_scalars_evaluate(const struct TumbleEngine *engine,
+                                     const struct TumbleSet *set,
+                                     const struct TumbleInterpolation *interpolation,
+                                     const struct TumbleSamples *samples,
+                                     uint32_t quantity,
+                                     uint32_t layout,
+                                     float *output,
+                                     size_t output_count);
 
 /*
  Returns the number of encodings.
