@@ -36,7 +36,7 @@ Examples:
   tumble follow paths/*.csv -o poses/                        a file for each path
   tumble follow paths -o poses --resume                      skips results that are done
   tumble follow lap.csv --path-ends loop --path-speed constant -o lap.glb
-  tumble follow points.npy --pace 1.5 -m linear --direction ahead:0.5 -o walk.csv
+  tumble follow points.npy --pace 1.5 --path-method linear --direction ahead:0.5 -o walk.csv
   tumble follow orbit.csv --direction at:0,1,0 --path-frame fixed -o camera.glb";
 
 /// The names and summaries of the formats of paths, for the help.
