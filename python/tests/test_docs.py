@@ -88,6 +88,16 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
         exec(compile(block, document, "exec"), names)
 
 
+def test_the_reference_is_that_of_the_package():
+    """docs/python-reference.md; `UPDATE_EXPECTED=1` writes it."""
+    script = [sys.executable, ROOT / "scripts" / "python_reference.py"]
+    written = subprocess.run(script, capture_output=True, check=True).stdout.decode()
+    page = ROOT / "docs" / "python-reference.md"
+    if "UPDATE_EXPECTED" in os.environ:
+        page.write_text(written, encoding="utf-8")
+    assert written == page.read_text(encoding="utf-8"), "UPDATE_EXPECTED=1 writes docs/python-reference.md"
+
+
 ROBOT = """<mujoco><worldbody><body name="pelvis"><freejoint name="root"/>
 <body name="shin"><joint name="knee"/></body></body></worldbody></mujoco>"""
 
