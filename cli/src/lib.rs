@@ -95,8 +95,8 @@ mod tests {
         Arguments::command().debug_assert();
     }
 
-    /// What an option means in every command: its help before a colon, a semicolon or a bracket, after which a command
-    /// may add something.
+    /// The meaning of an option in every command: its help before a colon, a semicolon or a bracket, after which a
+    /// command may add something.
     fn meaning(option: &Arg) -> String {
         let help = option.get_help().unwrap_or_default().to_string();
         let end = help.find([':', ';', '[']).unwrap_or(help.len());

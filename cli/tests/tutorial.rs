@@ -24,7 +24,7 @@ fn without_durations(text: &str) -> String {
     lines.collect()
 }
 
-/// What the commands of a page use of a clone.
+/// Copies the files of a clone that the pages use.
 fn copy_data(folder: &Path) {
     for name in ["data", "examples"] {
         fs::create_dir(folder.join(name)).unwrap();
