@@ -27,8 +27,8 @@ use crate::messages::words;
 
 /// The help's notes on files.
 const NOTES: &str = "\
-If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape
-(frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a
+If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape \
+(frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a \
 motion file. Positions far from 0, such as those of maps, are float64. CPU and Vulkan give the same bits.
 
 Examples:
