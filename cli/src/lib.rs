@@ -41,7 +41,7 @@ Examples:
   tumble view chain.dat --open                 show it in the browser
   tumble plot chain.dat -o chain.svg           plot every component
   tumble devices                               list the Vulkan devices
-  tumble prove                                 test everything that is promised of a device
+  tumble prove                                 check that a device gives the CPU's results
   tumble bench                                 measure the speed of this machine
 
 Exit codes:
@@ -95,8 +95,8 @@ mod tests {
         Arguments::command().debug_assert();
     }
 
-    /// The meaning of an option: its help up to a colon, a semicolon or a bracket, behind which the part of one
-    /// command alone stands.
+    /// The meaning of an option in every command: its help before a colon, a semicolon or a bracket, after which a
+    /// command may add something.
     fn meaning(option: &Arg) -> String {
         let help = option.get_help().unwrap_or_default().to_string();
         let end = help.find([':', ';', '[']).unwrap_or(help.len());

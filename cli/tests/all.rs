@@ -38,6 +38,7 @@ mod shards;
 mod stubs;
 mod trajectories;
 mod travel;
+mod tutorial;
 mod validation;
 mod view;
 mod view_controls;

@@ -126,8 +126,8 @@ pub(crate) fn in_python(message: &str) -> String {
             r#"time_unit="ms", "us" or "ns""#,
         ),
         (
-            "--duplicates first or last keeps one, both a jump",
-            r#"duplicates="first" or "last" keeps one, "both" a jump"#,
+            "--duplicates first or last keeps one key, both keeps a jump",
+            r#"duplicates="first" or "last" keeps one key, "both" keeps a jump"#,
         ),
         (
             "--duplicates first or last",

@@ -59,7 +59,7 @@ def test_everything_public_is_documented_with_an_example():
             assert ">>>" in value.__doc__ or name.split(".")[-1] in small, name
 
 
-@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md", "docs/features.md"])
+@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md", "docs/features.md", "docs/start.md"])
 def test_examples_in_documents(document, monkeypatch, tmp_path):
     """Their blocks of Python run one after another, in a folder with a file of each kind."""
     text = (ROOT / document).read_text(encoding="utf-8")
@@ -70,6 +70,9 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
     poses = 0.1 * rng.normal(size=(40, 3 * 22))
     np.savez("walk.npz", poses=poses, trans=np.zeros((40, 3)), mocap_framerate=np.float64(120))
     pathlib.Path("robot.xml").write_text(ROBOT)
+    for file in ("data/walk.bvh", "examples/arm.xml"):
+        pathlib.Path(file).parent.mkdir()
+        shutil.copy(ROOT / file, file)
     still = np.tile([1.0, 0, 0, 0], (31, 1))
     np.savez("keys.npz", joint_pos=rng.normal(size=(31, 1)), root_pos=np.zeros((31, 3)), root_quat=still)
     if SHARED.is_dir():
@@ -83,6 +86,16 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, document, "exec"), names)
+
+
+def test_the_reference_is_that_of_the_package():
+    """docs/python-reference.md; `UPDATE_EXPECTED=1` writes it."""
+    script = [sys.executable, ROOT / "scripts" / "python_reference.py"]
+    written = subprocess.run(script, capture_output=True, check=True).stdout.decode()
+    page = ROOT / "docs" / "python-reference.md"
+    if "UPDATE_EXPECTED" in os.environ:
+        page.write_text(written, encoding="utf-8")
+    assert written == page.read_text(encoding="utf-8"), "UPDATE_EXPECTED=1 writes docs/python-reference.md"
 
 
 ROBOT = """<mujoco><worldbody><body name="pelvis"><freejoint name="root"/>

@@ -12,7 +12,7 @@ use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 /// corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
-    summary: "historical, for comparison only; three times too fast at its keys",
+    summary: "historical, for comparison only; its speed at a key is three times that of a smooth curve",
     formula: "a_i = Bisect(Double(q_{i-1}, q_i), q_{i+1}), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach I",
     cost: Cost::new(1500.0, 4.1),

@@ -9,7 +9,7 @@ use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 /// curve is one and a half times too fast; [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
-    summary: "historical, for comparison only; 1.5 times too fast at its keys",
+    summary: "historical, for comparison only; its speed at a key is 1.5 times that of a smooth curve",
     formula: "a_i = Bisect(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1})), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach II",
     cost: Cost::new(700.0, 3.1),

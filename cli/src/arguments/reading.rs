@@ -61,8 +61,8 @@ pub(crate) struct ReadingArguments {
     /// track is interpolated from the keys beside them
     #[arg(long)]
     bridge_gaps: bool,
-    /// FBX: read only the keys at the file's key times, instead of as many as it takes to follow its
-    /// curves [default: where `eval -m` names a method]
+    /// FBX: read only the file's keys, instead of adding keys that follow its curves [default: only if
+    /// `eval -m` names a method]
     #[arg(long)]
     keyframes: bool,
     /// The robot that moves, MJCF or URDF: its joints' names and limits, and the order of bodies, are
@@ -128,7 +128,7 @@ enum DuplicatesArgument {
     First,
     /// the last of them
     Last,
-    /// both, for a jump: the first is moved a step of f32 before its time
+    /// both, as a jump: the first key is moved to one step of f32 before its time
     Both,
 }
 

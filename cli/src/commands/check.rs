@@ -25,13 +25,13 @@ use crate::threads::on_threads;
 /// Check results against the manifest of their directory, bit for bit
 #[derive(Debug, Args)]
 #[command(after_help = "\
-`tumble eval` writes a manifest into every directory of results: for each result a line of
-JSON with the SHA-256 of the result, of its input (with the files that it refers to) and of
-the files that options name, the options, the kernels, the program's version and the device;
-and a line for each input that failed or has no result yet. The exit code is 0 only if the
-batch is complete: all inputs have their results, no result has changed, and neither has an
-input, or a file that an option names, that is found by its path in the manifest. If shards
-are missing in the directory, it checks the results of the complete shards, and prints how
+`tumble eval` writes a manifest into every directory of results: for each result a line of \
+JSON with the SHA-256 of the result, of its input (with the files that it refers to) and of \
+the files that options name, the options, the kernels, the program's version and the device; \
+and a line for each input that failed or has no result yet. The exit code is 0 only if the \
+batch is complete: all inputs have their results, no result has changed, and neither has an \
+input, or a file that an option names, that is found by its path in the manifest. If shards \
+are missing in the directory, it checks the results of the complete shards, and prints how \
 many there are.
 
 Examples:

@@ -28,10 +28,10 @@ use crate::messages::words;
 /// Convert motion files to another format, without resampling
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Nothing is resampled: keys keep their values and their times. If channels have keys at different times
-and the output format cannot store that, use `tumble eval --fps`. --start and --end cut the motion and
-add a key at the cut, on the curve of the channel. Steps, lines and arcs do not change by this. A smooth
-curve changes near the cut, because it also depends on keys outside. If the output has the format of the
+Nothing is resampled: keys keep their values and their times. If channels have keys at different times \
+and the output format cannot store that, use `tumble eval --fps`. --start and --end cut the motion and \
+add a key at the cut, on the curve of the channel. Steps, lines and arcs do not change by this. A smooth \
+curve changes near the cut, because it also depends on keys outside. If the output has the format of the \
 input, everything else in the file is kept; --tracks and --animation make a new file of the selection.
 
 Examples:

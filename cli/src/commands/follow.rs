@@ -27,8 +27,8 @@ use crate::messages::words;
 
 /// The help's notes on files.
 const NOTES: &str = "\
-If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape
-(frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a
+If a path has no times, --seconds gives its duration or --pace its speed. The result is float32 of shape \
+(frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a \
 motion file. Positions far from 0, such as those of maps, are float64. CPU and Vulkan give the same bits.
 
 Examples:
@@ -36,7 +36,7 @@ Examples:
   tumble follow paths/*.csv -o poses/                        a file for each path
   tumble follow paths -o poses --resume                      skips results that are done
   tumble follow lap.csv --path-ends loop --path-speed constant -o lap.glb
-  tumble follow points.npy --pace 1.5 -m linear --direction ahead:0.5 -o walk.csv
+  tumble follow points.npy --pace 1.5 --path-method linear --direction ahead:0.5 -o walk.csv
   tumble follow orbit.csv --direction at:0,1,0 --path-frame fixed -o camera.glb";
 
 /// The names and summaries of the formats of paths, for the help.

@@ -15,9 +15,9 @@ use crate::messages::words;
 /// Merge the shards of a directory into one manifest
 #[derive(Debug, Args)]
 #[command(after_help = "\
-`tumble eval LIBRARY -o OUT --shard I/N` writes OUT/manifest.d. When all shards are done, merging
-writes OUT/manifest.jsonl and removes manifest.d. The file is the same as that of a single
-`tumble eval LIBRARY -o OUT`, byte for byte if all processes used the same device. The exit code is 3
+`tumble eval LIBRARY -o OUT --shard I/N` writes OUT/manifest.d. When all shards are done, merging \
+writes OUT/manifest.jsonl and removes manifest.d. The file is the same as that of a single \
+`tumble eval LIBRARY -o OUT`, byte for byte if all processes used the same device. The exit code is 3 \
 if inputs failed. If shards are missing, nothing is changed and the exit code is 8.
 
 Examples:

@@ -26,11 +26,11 @@ use crate::messages::{listing, names, words};
 /// Compare a device with the CPU, bit for bit, and both with textbook formulas in f64
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by
-a textbook implementation in f64. The bits of the first two must be equal, and the error against the
-third must be within a bound. Velocities, accelerations and every encoding are compared in the same
-way. The exit code is 8 if a comparison fails. By default the device is the first Vulkan device. If
-there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this
+Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by \
+a textbook implementation in f64. The bits of the first two must be equal, and the error against the \
+third must be within a bound. Velocities, accelerations and every encoding are compared in the same \
+way. The exit code is 8 if a comparison fails. By default the device is the first Vulkan device. If \
+there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this \
 comparison is enough, and the exit code is 0.
 
 Examples:

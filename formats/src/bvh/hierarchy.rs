@@ -269,10 +269,7 @@ impl<R: BufRead> Parser<'_, R> {
             }
         }
         if count.text.parse() != Ok(named) {
-            let message = format!(
-                "`{}` channels with {named} names after it; it must be the number of names",
-                count.text
-            );
+            let message = format!("CHANNELS says `{}`, but {named} names follow", count.text);
             return Err(self.refuse(&count, Code::BvhChannelCount, message));
         }
         let Some(block) = self.open.last_mut() else {

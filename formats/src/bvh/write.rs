@@ -146,7 +146,8 @@ fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
     }
     let Some(rate) = sampled.rate else {
         return Ok(Err(
-            "the samples are not frames of one rate; sample at a rate".to_owned(),
+            "BVH stores frames at a constant rate, which these samples do not have; give one with --fps"
+                .to_owned(),
         ));
     };
     let off = |(frame, &time): (usize, &f64)| {

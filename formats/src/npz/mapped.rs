@@ -225,8 +225,8 @@ fn layout_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code,
         (false, true) => Ok(Layout::FrameMajor),
         (true, true) => {
             let message = format!(
-                "shape {text} may be (tracks, frames, …) or (frames, tracks, …); --map tells by \
-                 `rotations=ARRAY:track` or `:frame`, which comes first"
+                "shape {text} may be (tracks, frames, …) or (frames, tracks, …); say which axis \
+                 comes first: `--map rotations=ARRAY:track` or `…:frame`"
             );
             Err((Code::Ambiguous, message))
         }

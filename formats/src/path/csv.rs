@@ -67,7 +67,7 @@ fn read_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
     let has = |range: std::ops::Range<usize>| columns[range].iter().flatten().count();
     if has(1..4) < 3 || !matches!(has(4..7), 0 | 3) || known != names.len() {
         let message = format!(
-            "the header is `{}`; a path has t,x,y,z,ux,uy,uz, of which t and ux,uy,uz may be missing",
+            "the header is `{}`; a path has the columns t,x,y,z,ux,uy,uz; t, and ux,uy,uz together, may be missing",
             names.join(",")
         );
         return Err(refuse(1, Code::Path, message));

@@ -514,7 +514,7 @@ fn time_source(
             "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; {}",
             names.list(),
             hint.unwrap_or(
-                "--map time=NAME, or --source-fps FPS if the rows are the frames of a rate"
+                "name the time column with --map time=NAME, or give --source-fps FPS if each row is a frame"
             )
         ),
     };

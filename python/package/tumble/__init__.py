@@ -11,7 +11,7 @@ array([[0.    , 0.    , 0.    , 1.    ],
        [0.    , 0.    , 0.7071, 0.7071]], dtype=float32)
 
 `load` and `save` read and write motion files, `Clip` holds tracks of keys, `Engine` is a device
-that is kept open. Quaternions are x y z w unless `order="wxyz"` is said; times are seconds; angular
+that is kept open. Quaternions are x y z w unless you pass `order="wxyz"`; times are seconds; angular
 velocities are rad/s.
 """
 

@@ -128,7 +128,7 @@ impl Engine {
     /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
     /// as_rotation=False, dtype="float32", device_array=False, …)`
     ///
-    /// Which samples: `fps`, a rate ("30000/1001" is exact, 29.97 is not it), with `start` and
+    /// Which samples: `fps`, a rate (use "30000/1001", not 29.97), with `start` and
     /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
     /// order: one list for all tracks, (tracks, frames), or a list with an array for each track. A
     /// single time gives a result without the axis of frames; lists of different lengths give a
@@ -140,7 +140,7 @@ impl Engine {
     /// 2.5e-4 of each component; "int16", to be divided by 32767, within 1.6e-5.
     ///
     /// `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
-    /// take without a copy. Where that cannot be, it is a `DeviceError`.
+    /// take without a copy. Raises `DeviceError` if this is not possible.
     ///
     /// Other options: `method` ("authored": the method that the file gives each channel, bessel-overhauser
     /// where it gives none; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`

@@ -31,16 +31,16 @@ use crate::messages::{listing, names, words};
 /// Compare two motions or two results: the largest and the mean difference, and where it is
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway
-between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only
-if neither file has names; joints with other parents are compared with --world alone. A table lists
-the joints that are furthest apart. Frames are those of the first input, from 0 at its first key;
-frame 7.5 is halfway between two. Two NPY files are compared number by number, and by angles if they contain
-rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these
-options it is also 8 if a track is missing in one of the motions.
-With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. Both are
-compared as by the program evo, after the alignment by --align, at the times of the input with fewer
-poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest
+Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway \
+between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only \
+if neither file has names; joints with other parents are compared with --world alone. A table lists \
+the joints that are furthest apart. Frames are those of the first input, from 0 at its first key; \
+frame 7.5 is halfway between two. Two NPY files are compared number by number, and by angles if they contain \
+rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these \
+options it is also 8 if a track is missing in one of the motions. \
+With --ape, --rpe or --align, the second input is an estimate of the trajectory of the first. Both are \
+compared as by the program evo, after the alignment by --align, at the times of the input with fewer \
+poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest \
 pose within 0.01 s instead, as evo does. --tolerance and --distance are then limits of the absolute errors.
 
 Examples:

@@ -32,9 +32,9 @@ use tumble_formats::sample::MethodChoice;
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-In NPY the result is float32 of shape (tracks, frames, 4), with components x y z w. --quantity, --layout
-and --order change this. In CSV it has a row for each frame and a header that names the columns; the
-default order is w x y z. An option that has no effect on a result is refused. CPU and Vulkan give the
+In NPY the result is float32 of shape (tracks, frames, 4), with components x y z w. --quantity, --layout \
+and --order change this. In CSV it has a row for each frame and a header that names the columns; the \
+default order is w x y z. An option that has no effect on a result is refused. CPU and Vulkan give the \
 same bits.
 
 Examples:

@@ -19,9 +19,9 @@ use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 /// Compare every variant of the kernels for cards with the CPU, measure them, and say which follow by rules
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Variants differ in the invocations that evaluate a run together, in the size of workgroups, in how results
-pass the caches, and in how numbers become halves. Each is compared with the same function on the CPU, and
-left out if a bit differs. Then what no kernel exceeds is measured, and rows of 32 dispatches of the
+Variants differ in the invocations that evaluate a run together, in the size of workgroups, in how results \
+pass the caches, and in how numbers become halves. Each is compared with the same function on the CPU, and \
+left out if a bit differs. Then what no kernel exceeds is measured, and rows of 32 dispatches of the \
 variants. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
 
 Exit codes:

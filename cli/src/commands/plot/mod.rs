@@ -45,8 +45,8 @@ use tumble_formats::sample::MethodChoice;
 /// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Keys are drawn as dots, or as vertical lines where a curve has no value at a key. Tracks that never
-turn are left out unless they are chosen (--tracks). For files of paths, the speed,
+Keys are drawn as dots, or as vertical lines where a curve has no value at a key. Tracks that never \
+turn are left out unless they are chosen (--tracks). For files of paths, the speed, \
 the angular speed of the direction and the roll are drawn for each --path-frame.
 
 Examples:

@@ -21,10 +21,10 @@ use crate::messages::listing;
 /// Test that a device gives the same bits as the CPU, for every kernel and for recorded and random inputs, and measure its speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every kernel is compared with the same function on the CPU. Recorded results of every method, output
-and crowd are computed in every configuration in which the engine may use the device. Random tracks
-and crowds are compared with the CPU until the time limit. The same is done on a Vulkan device that is
-created as a renderer would. Every bit is compared. Times are measured by the device's clock.
+Every kernel is compared with the same function on the CPU. Recorded results of every method, output \
+and crowd are computed in every configuration in which the engine may use the device. Random tracks \
+and crowds are compared with the CPU until the time limit. The same is done on a Vulkan device that is \
+created as a renderer would. Every bit is compared. Times are measured by the device's clock. \
 `docs/proofs.md` lists devices that were tested, and explains the JSON.
 
 Exit codes:

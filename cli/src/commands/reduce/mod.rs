@@ -33,10 +33,10 @@ use crate::messages::{names, words};
 /// Remove keys from motion; the curves of the remaining keys stay within a tolerance of all samples
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The keys of the input are the samples (or the frames of --fps). At each of them every joint stays
-within the angle of --tolerance and the distance of --distance. If the input has a skeleton, both are
-measured in world space, else for each track. The program evaluates the remaining keys to check this. glTF stores
-separate key times for each channel; other formats store all joints at the same times, which takes
+The keys of the input are the samples (or the frames of --fps). At each of them every joint stays \
+within the angle of --tolerance and the distance of --distance. If the input has a skeleton, both are \
+measured in world space, else for each track. The program evaluates the remaining keys to check this. glTF stores \
+separate key times for each channel; other formats store all joints at the same times, which takes \
 more keys. A GLB or glTF that is written as one keeps everything else in the file.
 
 Examples:

@@ -47,9 +47,9 @@ const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
 /// Draw boxes, skeletons or bodies on paths as images or an animation, without a display
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Skeletons are drawn as bones, at their offsets and translations, or as the mesh of a glTF file that they
-move. Tracks without positions are the boxes of a chain. If the input is a file of paths, or
-a motion file in which all joints are roots that move (as written by `tumble follow`), the path is drawn,
+Skeletons are drawn as bones, at their offsets and translations, or as the mesh of a glTF file that they \
+move. Tracks without positions are the boxes of a chain. If the input is a file of paths, or \
+a motion file in which all joints are roots that move (as written by `tumble follow`), the path is drawn, \
 with its frames as small axes (x red, y green, z blue) and a box on it.
 
 Examples:

@@ -15,9 +15,9 @@ use crate::messages::exit::Failure;
 
 /// The help's notes on files.
 const NOTES: &str = "\
-A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
-of the surface there, for `tumble follow`. A list of pairs has six numbers a line, separated by
-commas or blanks. Walkers are CSV with the columns name, radius, speed, start, x, y, z, to_x,
+A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals \
+of the surface there, for `tumble follow`. A list of pairs has six numbers a line, separated by \
+commas or blanks. Walkers are CSV with the columns name, radius, speed, start, x, y, z, to_x, \
 to_y, to_z; a row whose column track names a CSV of t,x,y,z moves on that instead.
 
 Examples:

@@ -45,14 +45,14 @@ const SMALL_PAGE_BYTES: f64 = 24e6;
 /// Write an HTML file that shows boxes, skeletons or bodies on paths in 3D
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file needs no network and no other files. It contains the rotations and positions at the frames
-and at the keys. Other methods, rates and times are evaluated in the page, by the same engine with
-the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and all animations of a
-file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their
-paths, with frames as small axes.
-Several inputs are shown at once, at the same moment: the first one solid, the others as translucent
-ghosts, each in a colour of its own. A list names them, hides each, and says which joint is furthest
-from that of the solid one; a menu chooses which is solid. Joints, and animations of files with
+The file needs no network and no other files. It contains the rotations and positions at the frames \
+and at the keys. Other methods, rates and times are evaluated in the page, by the same engine with \
+the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and all animations of a \
+file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their \
+paths, with frames as small axes. \
+Several inputs are shown at once, at the same moment: the first one solid, the others as translucent \
+ghosts, each in a colour of its own. A list names them, hides each, and says which joint is furthest \
+from that of the solid one; a menu chooses which is solid. Joints, and animations of files with \
 several, are matched by equal names.
 
 Examples:
