@@ -371,6 +371,51 @@ fn an_unfinished_batch_is_not_called_complete() {
     assert_eq!(tree(&folder.join("out")), whole);
 }
 
+/// Another rule of names leaves results under their old names, which are told, and not counted twice.
+#[test]
+fn results_under_other_names_are_told_and_pruned() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
+    for name in ["a.dat", "b.dat", "bad.dat"] {
+        fs::copy(folder.join(name), folder.join("in").join(name)).unwrap();
+    }
+    let batch = ["eval", "in", "-o", "out"];
+    assert_eq!(run(folder, &batch).code, 3);
+    let full = [&batch[..], &["--resume", "--names", "full"]].concat();
+    let renamed = run(folder, &full);
+    let words = "2 results have another name now (--prune removes the old ones)";
+    assert!(renamed.words.contains(words), "{}", renamed.words);
+    let check = run(folder, &["check", "out"]);
+    assert!(check.words.contains("1 input failed"), "{}", check.words);
+    run(folder, &[&full[..], &["--prune"]].concat());
+    assert_eq!(
+        names(&folder.join("out")),
+        ["a.dat.npy", "b.dat.npy", "manifest.jsonl"]
+    );
+    // Results of another format stay: they are no old names.
+    run(folder, &[&batch[..], &["--to", "csv"]].concat());
+    run(
+        folder,
+        &[&batch[..], &["--to", "csv", "--resume", "--prune"]].concat(),
+    );
+    assert_eq!(names(&folder.join("out")).len(), 5);
+}
+
+/// A directory that was empty, and has files now, has not failed any more.
+#[test]
+fn a_directory_that_failed_is_forgotten_when_it_can_be_read() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("late")).unwrap();
+    let batch = ["eval", "late", "a.dat", "-o", "out", "--resume"];
+    assert_eq!(run(folder, &batch).code, 3);
+    assert_eq!(run(folder, &["check", "out"]).code, 8);
+    fs::copy(folder.join("b.dat"), folder.join("late/b.dat")).unwrap();
+    succeed(folder, &batch);
+    succeed(folder, &["check", "out"]);
+}
+
 #[test]
 fn results_without_inputs_are_told_and_pruned() {
     let temporary = sample_folder();

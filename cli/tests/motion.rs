@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::{Run, run, sample_folder, succeed};
+use crate::tree::tree;
 
 /// Two animations of a node that turns about x, `Walk` and `Run`, and one that moves nothing.
 fn two_animations() -> String {
@@ -115,6 +116,43 @@ fn clips_and_inputs_of_one_name_do_not_overwrite_each_other() {
         &["eval", "fox.gltf", "--animation", "Run", "-o", "own.npy"],
     );
     assert_eq!(fs::read(found).unwrap(), fs::read(expected).unwrap());
+    // In another order, and resumed: the result of the other input stays.
+    let line = "eval fox.Run.dat fox.gltf -o kept";
+    let line: Vec<&str> = line.split(' ').collect();
+    assert_eq!(run(folder, &line).code, 3);
+    let whole = tree(&folder.join("kept"));
+    let again = run(folder, &[&line[..], &["--resume"]].concat());
+    assert_eq!(again.code, 3, "{}", again.words);
+    let words = "kept/fox.Run.npy is the result of fox.Run.dat; give --names full";
+    assert!(again.words.contains(words), "{}", again.words);
+    let kept = tree(&folder.join("kept"));
+    assert_eq!(kept["fox.Run.npy"], whole["fox.Run.npy"]);
+    assert_eq!(run(folder, &["check", "kept"]).code, 8);
+}
+
+/// A file that had several animations and has one leaves results behind, which `--prune` removes.
+#[test]
+fn results_of_animations_that_are_gone_are_pruned() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
+    fs::write(folder.join("in/fox.gltf"), two_animations()).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("in/b.dat")).unwrap();
+    line(folder, "eval in -o out");
+    let mut model: serde_json::Value = serde_json::from_str(&two_animations()).unwrap();
+    model["animations"].as_array_mut().unwrap().truncate(1);
+    fs::write(folder.join("in/fox.gltf"), model.to_string()).unwrap();
+    let again = line(folder, "eval in -o out --resume");
+    assert!(
+        again.words.contains("2 results have no input any more"),
+        "{}",
+        again.words
+    );
+    refused(folder, "check out");
+    line(folder, "eval in -o out --resume --prune");
+    line(folder, "check out");
+    let left = ["b.npy", "fox.npy", "manifest.jsonl"].map(str::to_owned);
+    assert_eq!(names(&folder.join("out")), BTreeSet::from(left));
 }
 
 /// A converted clip, sampled at the rate of its keys, is unchanged.

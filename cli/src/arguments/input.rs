@@ -256,7 +256,8 @@ pub(crate) fn check_complete(name: &str, loaded: &Loaded) -> Result<(), Failure>
     }
     let all = refused + loaded.clips.len() as u64;
     let message = format!("{name}: {refused} of {all} animations failed");
-    Err(Failure::new(exit::SOME_INPUTS, message))
+    let causes = loaded.refused.iter().map(ToString::to_string).collect();
+    Err(Failure::new(exit::SOME_INPUTS, message).with_causes(causes))
 }
 
 fn no_clips(path: &Path) -> Failure {

@@ -275,6 +275,7 @@ impl ResultArguments {
                 BatchOptions {
                     options,
                     resume: self.resume,
+                    overwrite: self.overwrite,
                     verbose: self.verbose,
                 },
                 Box::new(manifest),

@@ -45,8 +45,12 @@ pub(crate) struct Manifest {
     inputs: InputEntries,
     /// The results of this batch's inputs, each of all clips.
     planned: BTreeSet<String>,
+    /// The results of this batch's inputs, by the inputs' paths.
+    planned_of: BTreeMap<String, String>,
     /// Those of `planned` whose files have all been made.
     ended: BTreeSet<String>,
+    /// Those of `planned` that were complete already.
+    complete: BTreeSet<String>,
     /// Whether results without an input are removed.
     prune: bool,
     /// Whether there is a file of its name: a manifest, or a file to replace.
@@ -125,7 +129,9 @@ impl Manifest {
             added: BTreeMap::new(),
             inputs: lines.inputs,
             planned: BTreeSet::new(),
+            planned_of: BTreeMap::new(),
             ended: BTreeSet::new(),
+            complete: BTreeSet::new(),
             prune,
             exists,
             journal: None,
@@ -208,14 +214,15 @@ impl Manifest {
             true => self.remove(&orphans)?,
             false => BTreeSet::new(),
         };
-        if let Some(first) = orphans.first().filter(|_| !self.prune) {
-            let results = words::count(orphans.len(), "result");
-            let have = if orphans.len() == 1 { "has" } else { "have" };
-            let first = self.folder.join(first);
-            words::note(&format!(
-                "{results} {have} no input any more (--prune removes what has none), the first is {}",
-                first.display()
-            ));
+        if !self.prune {
+            let of_other_name = |output: &&String| {
+                let entry = self.results()[&***output];
+                self.is_renamed(&entry.input, entry.whole().0)
+            };
+            let (renamed, gone): (Vec<&String>, Vec<&String>) =
+                orphans.iter().partition(of_other_name);
+            self.note_orphans(&gone, "no input any more (--prune removes what has none)");
+            self.note_orphans(&renamed, "another name now (--prune removes the old ones)");
         }
         if self.prune {
             self.note_unknown();
@@ -226,18 +233,47 @@ impl Manifest {
         self.forget_shards()
     }
 
-    /// The results that have no input any more: the input is gone, or has other clips than before.
+    /// Says what results have that are not of this batch.
+    fn note_orphans(&self, outputs: &[&String], possession: &str) {
+        if let Some(first) = outputs.first() {
+            let results = words::count(outputs.len(), "result");
+            let have = if outputs.len() == 1 { "has" } else { "have" };
+            let first = self.folder.join(first);
+            words::note(&format!(
+                "{results} {have} {possession}, the first is {}",
+                first.display()
+            ));
+        }
+    }
+
+    /// The results that have no input any more: the input is gone, has other clips than before, or its result has
+    /// another name now.
     fn orphans(&self) -> BTreeSet<String> {
         let is_orphan = |entry: &ManifestEntry| {
             let whole = entry.whole().0;
+            if self.complete.contains(whole) {
+                // Of a file that had several clips, and has one now.
+                return entry.output != whole && self.previous.contains_key(whole);
+            }
             match self.planned.contains(whole) {
                 true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
-                false => InputPresence::of_entry(entry) == InputPresence::Removed,
+                false => {
+                    self.is_renamed(&entry.input, whole)
+                        || InputPresence::of_entry(entry) == InputPresence::Removed
+                }
             }
         };
         let results = self.results().into_values();
         let orphans = results.filter(|entry| is_orphan(entry));
         orphans.map(|entry| entry.output.clone()).collect()
+    }
+
+    /// Whether this batch gives the result of an input another name than this one, of the same format.
+    fn is_renamed(&self, input: &str, result: &str) -> bool {
+        let ending = |name: &str| Path::new(name).extension().map(ToOwned::to_owned);
+        self.planned_of
+            .get(input)
+            .is_some_and(|planned| planned != result && ending(planned) == ending(result))
     }
 
     /// Says which results `--prune` keeps because it cannot know whether their inputs are gone.
@@ -284,7 +320,11 @@ impl Manifest {
                         .is_some_and(|parent| self.opened.remove_folder(parent).is_ok())
                     {
                     }
-                    words::note(&format!("{shown}: removed; its input is gone"));
+                    let why = match self.is_renamed(&entry.input, entry.whole().0) {
+                        true => "its input's result has another name now",
+                        false => "its input is gone",
+                    };
+                    words::note(&format!("{shown}: removed; {why}"));
                 }
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 _ => {
@@ -398,13 +438,16 @@ impl InputPresence {
                 .last()
         };
         let root = root.filter(|root| is_named(root)).or_else(first);
-        let has_files =
-            |root: &Path| std::fs::read_dir(root).is_ok_and(|mut files| files.next().is_some());
         match root.is_some_and(has_files) {
             true => Self::Removed,
             false => Self::Unknown,
         }
     }
+}
+
+/// Whether a path is a directory that can be read and is not empty.
+fn has_files(path: &Path) -> bool {
+    std::fs::read_dir(path).is_ok_and(|mut files| files.next().is_some())
 }
 
 impl ResultRecorder for Manifest {
@@ -420,18 +463,31 @@ impl ResultRecorder for Manifest {
         // An input that is gone has not failed any more.
         let mut forgotten = Vec::new();
         let prune = self.prune;
-        self.inputs
-            .retain(|_, entry| match InputPresence::of_input(entry) {
-                _ if entry.state == InputState::Skipped => false,
-                InputPresence::Present => true,
-                InputPresence::Removed => false,
-                InputPresence::Unknown => {
-                    if prune {
-                        forgotten.push(entry.input.clone());
-                    }
-                    !prune
+        for (input, result) in &start.inputs {
+            let input = input.display().to_string();
+            self.planned_of.insert(input, (*result).to_owned());
+        }
+        let mut inputs = std::mem::take(&mut self.inputs);
+        inputs.retain(|_, entry| match InputPresence::of_input(entry) {
+            _ if entry.state == InputState::Skipped => false,
+            // A directory that could not be read, or was empty, and can be read now.
+            _ if has_files(Path::new(&entry.input)) => false,
+            // Its result has another name now.
+            _ if (entry.result.as_deref())
+                .is_some_and(|result| self.is_renamed(&entry.input, result)) =>
+            {
+                false
+            }
+            InputPresence::Present => true,
+            InputPresence::Removed => false,
+            InputPresence::Unknown => {
+                if prune {
+                    forgotten.push(entry.input.clone());
                 }
-            });
+                !prune
+            }
+        });
+        self.inputs = inputs;
         if let Some(first) = forgotten.first() {
             let inputs = words::count(forgotten.len(), "input");
             let are = if forgotten.len() == 1 { "is" } else { "are" };
@@ -473,6 +529,7 @@ impl ResultRecorder for Manifest {
     }
 
     fn skip(&mut self, output: &str) {
+        self.complete.insert(output.to_owned());
         self.inputs.remove(output);
     }
 

@@ -234,7 +234,7 @@ fn in_folder(
     for (found, name) in files.iter().zip(names) {
         let target = name.and_then(|name| {
             if let Some(owner) = manifest.owner(&name).filter(|_| !options.overwrite) {
-                replaced.check(found, &folder.join(&name), &owner)?;
+                replaced.check(&found.path, &folder.join(&name), &owner)?;
             }
             let destination = result_folder.destination(&name, overwrites(&name))?;
             Ok(ResultTarget::new(destination.hashed(), format, name))

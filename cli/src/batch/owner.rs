@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use crate::arguments::input::FoundInput;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::ManifestEntry;
 use crate::messages::exit::Failure;
@@ -27,18 +26,18 @@ impl From<&ManifestEntry> for Owner {
 impl Owner {
     /// Whether this is an input: by its path, or, where there is no file of that path any more, by its bytes, as of a
     /// file that was moved. Another file with the same bytes is another input: its result may have other options.
-    fn is(&self, found: &FoundInput) -> bool {
+    fn is(&self, path: &Path) -> bool {
         let real = |path: &Path| path.canonicalize().ok();
         let input = Path::new(&self.input);
-        if self.input == found.path.display().to_string()
-            || real(input).is_some_and(|input| Some(input) == real(&found.path))
+        if self.input == path.display().to_string()
+            || real(input).is_some_and(|input| Some(input) == real(path))
         {
             return true;
         }
         if input.exists() {
             return false;
         }
-        let file = InputFile::new(&found.path);
+        let file = InputFile::new(path);
         self.sha256.is_some() && file.sha256() == self.sha256.as_deref()
     }
 }
@@ -55,14 +54,14 @@ impl ReplacedOwners {
     /// Refuses an input if `target`, where its result would be, is the result of another one, `owner`, that exists.
     pub(crate) fn check(
         &mut self,
-        found: &FoundInput,
+        path: &Path,
         target: &Path,
         owner: &Owner,
     ) -> Result<(), Failure> {
-        if owner.is(found) {
+        if owner.is(path) {
             return Ok(());
         }
-        let input = names::input(&found.path);
+        let input = names::input(path);
         let (target, other) = (target.display(), Path::new(&owner.input));
         if !other.exists() {
             self.count += 1;
@@ -70,7 +69,7 @@ impl ReplacedOwners {
                 .get_or_insert_with(|| [target.to_string(), input, owner.input.clone()]);
             return Ok(());
         }
-        let remedy = match other.file_name() == found.path.file_name() {
+        let remedy = match other.file_name() == path.file_name() {
             true => "give their directory, whose tree is kept, or --base",
             false => "give --names full, which names results after the whole names of inputs",
         };

@@ -14,7 +14,7 @@
 //! those of a single input are printed as they come.
 
 use std::cell::RefCell;
-use std::collections::{HashSet, VecDeque};
+use std::collections::{BTreeMap, HashSet, VecDeque};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -35,6 +35,7 @@ use crate::batch::entry::{
     kernels_sha256,
 };
 use crate::batch::output_plan::UnplannedInput;
+use crate::batch::owner::{Owner, ReplacedOwners};
 use crate::batch::summary::BatchSummary;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
@@ -63,6 +64,8 @@ pub(crate) struct BatchOptions {
     pub(crate) options: ResultOptions,
     /// Results that are done are skipped.
     pub(crate) resume: bool,
+    /// Results of other inputs are replaced.
+    pub(crate) overwrite: bool,
     /// Every result and every warning is printed.
     pub(crate) verbose: bool,
 }
@@ -208,7 +211,11 @@ struct BatchRecords<'a> {
     /// A signal ends the batch at its next input; the batch then says how much is done.
     _until_end: BatchGuard,
     options: ResultOptions,
+    previous: PreviousEntries,
+    overwrite: bool,
     inputs: usize,
+    /// The inputs that the batch has not come to, with the names of their results.
+    left: BTreeMap<PathBuf, String>,
     made: HashSet<String>,
     /// The inputs with all their results, and those with some of them.
     done: usize,
@@ -253,14 +260,20 @@ impl<'a> Pipeline<'a> {
         let BatchOptions {
             options,
             resume,
+            overwrite,
             verbose,
         } = options;
         let job_count = jobs.len();
         let inputs = refused.len() + job_count;
         let mut outcomes = Outcomes::of(inputs);
+        let json = prints_json.then(|| skipped.iter().map(to_json).collect());
+        let left = jobs.iter();
+        let left = left.map(|(path, target)| (path.clone(), target.name().to_owned()));
+        let left = left.collect();
+        let previous = records.previous();
         let reading = ReadingAhead {
             reader,
-            previous: records.previous(),
+            previous: previous.clone(),
             options: options.text.clone(),
             resume,
         };
@@ -279,7 +292,10 @@ impl<'a> Pipeline<'a> {
             progress: Progress::new("inputs", inputs as u64),
             _until_end: BatchGuard::begin(),
             options,
+            previous,
+            overwrite,
             inputs,
+            left,
             made: HashSet::new(),
             done: 0,
             done_in_part: 0,
@@ -311,7 +327,7 @@ impl<'a> Pipeline<'a> {
             current: None,
             batch: Some(batch),
             outcomes,
-            json: prints_json.then(Vec::new),
+            json,
         };
         pipeline.refuse_all(refused);
         pipeline
@@ -409,7 +425,11 @@ impl<'a> Pipeline<'a> {
 
     /// As [`Pipeline::finish`]; gives the records instead of printing them as JSON.
     pub(crate) fn finish_with_json(mut self) -> (Result<(), Failure>, Option<Vec<Value>>) {
-        let json = self.json.take();
+        let mut json = self.json.take();
+        if let (Some(json), Some(batch)) = (&mut json, &self.batch) {
+            let left = batch.left.iter();
+            json.extend(left.map(|(path, result)| to_json(&InputEntry::pending(path, result))));
+        }
         let outcome = self.end();
         (outcome, json)
     }
@@ -429,6 +449,9 @@ impl<'a> Pipeline<'a> {
         (path, target): PipelineJob,
         input: Option<(InputFile, Result<Loaded, Failure>)>,
     ) {
+        if let Some(batch) = &mut self.batch {
+            batch.left.remove(&path);
+        }
         let Some((file, loaded)) = input else {
             if let Some(batch) = &mut self.batch {
                 batch.skipped += 1;
@@ -518,7 +541,14 @@ impl<'a> Pipeline<'a> {
                     let message = format!("{name}: {failed} of {all} animations failed");
                     let causes = current.failed.iter().chain([&last]);
                     let causes = causes.map(|cause| cause.message().to_owned());
-                    Err(Failure::new(SOME_INPUTS, message).with_causes(causes.collect()))
+                    let refused = current
+                        .input
+                        .loaded
+                        .refused
+                        .iter()
+                        .map(Diagnostic::to_string);
+                    let causes = causes.chain(refused).collect();
+                    Err(Failure::new(SOME_INPUTS, message).with_causes(causes))
                 }
             }
         };
@@ -536,10 +566,14 @@ impl<'a> Pipeline<'a> {
     fn add(&mut self, path: &Path, result: Option<&str>, outcome: Result<(), Failure>) {
         let entry = outcome.as_ref().err().map(|failure| {
             let result = result.filter(|result| !result.is_empty());
-            InputEntry::failed(path, result, failure)
+            match failure.message().is_empty() {
+                // A signal: the input has not failed.
+                true => InputEntry::pending(path, result.unwrap_or_default()),
+                false => InputEntry::failed(path, result, failure),
+            }
         });
         if let (Some(entry), Some(json)) = (&entry, &mut self.json) {
-            json.push(serde_json::to_value(entry).expect("strings and numbers"));
+            json.push(to_json(entry));
         }
         let Some(batch) = &mut self.batch else {
             self.outcomes.add(outcome);
@@ -566,6 +600,11 @@ impl<'a> Pipeline<'a> {
             self.outcomes.end(failure);
         }
     }
+}
+
+/// An input without a result in JSON.
+fn to_json(entry: &InputEntry) -> Value {
+    serde_json::to_value(entry).expect("strings and numbers")
 }
 
 /// The records of a result in JSON.
@@ -646,6 +685,13 @@ impl BatchRecords<'_> {
         warnings: Vec<RecordedWarning>,
     ) -> Result<(), Failure> {
         let name = work.target.name();
+        // A clip may be called as the result that an earlier batch made of another input.
+        if let Some(entry) = self.previous.entries.get(name)
+            && !self.overwrite
+        {
+            let owner = Owner::from(entry);
+            ReplacedOwners::default().check(work.path(), work.target.path(), &owner)?;
+        }
         // Clips of one input may be called as another input is: walk.glb's `Run` and walk.Run.bvh.
         if !self.made.insert(name.to_owned()) {
             let input = names::input(work.path());

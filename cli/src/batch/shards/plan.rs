@@ -193,7 +193,7 @@ impl ShardPlan {
             let found: HashMap<&str, &FoundInput> = found.collect();
             let mut replaced = ReplacedOwners::default();
             for (result, owner) in record::other_owners(folder, &found) {
-                replaced.check(found[&*result], &folder.join(&result), &owner)?;
+                replaced.check(&found[&*result].path, &folder.join(&result), &owner)?;
             }
             replaced.note();
         }

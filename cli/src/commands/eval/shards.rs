@@ -160,6 +160,7 @@ impl Evaluator {
         let refused = shard.header.failed.len();
         let (inputs, quiet) = (jobs.len(), shard.quiet);
         let options = BatchOptions {
+            overwrite: arguments.results.overwrites(),
             options: self.request.options.clone(),
             resume: arguments.results.is_resumed(),
             verbose: arguments.results.is_verbose(),
