@@ -141,7 +141,8 @@ fn the_table_of_options_is_that_of_the_program() {
                 let takes_value = option.get_action().takes_values();
                 let value = option.get_value_names().filter(|_| takes_value);
                 let value = value.map_or(String::new(), |names| format!(" {}", names.join(" ")));
-                let defaults = option.get_default_values().iter().filter(|_| takes_value);
+                let is_shown = takes_value && !option.is_hide_default_value_set();
+                let defaults = option.get_default_values().iter().filter(|_| is_shown);
                 let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
                 let default = match defaults.is_empty() {
                     true => String::new(),
@@ -149,7 +150,7 @@ fn the_table_of_options_is_that_of_the_program() {
                 };
                 let help = option.get_help().unwrap_or_default();
                 OptionRow {
-                    names: format!("{short}`--{long}{value}`{aliases}"),
+                    names: plain(format!("{short}`--{long}{value}`{aliases}")),
                     meaning: plain(format!("{help}{default}")),
                     commands: Vec::new(),
                 }

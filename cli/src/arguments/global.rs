@@ -16,7 +16,7 @@ pub(crate) struct GlobalArguments {
     #[arg(short, long, global = true)]
     quiet: bool,
     /// How many threads compute [default: `RAYON_NUM_THREADS`, else one for each core]
-    #[arg(short = 'j', long, value_name = "COUNT", global = true)]
+    #[arg(short = 'j', long, value_name = "COUNT", global = true, value_parser = thread_count)]
     threads: Option<NonZeroUsize>,
     /// When messages have colours
     #[arg(long, value_name = "WHEN", value_enum, default_value_t, global = true)]
@@ -24,6 +24,11 @@ pub(crate) struct GlobalArguments {
     /// How progress is shown
     #[arg(long, value_name = "HOW", value_enum, default_value_t, global = true)]
     progress: ProgressStyleChoice,
+}
+
+fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
+    let count = text.parse();
+    count.map_err(|_| "expected a whole number of threads, 1 or more".to_owned())
 }
 
 /// The names of these options, which have no rule ([`OPTIONS`](crate::arguments::options::OPTIONS)).

@@ -313,12 +313,14 @@ impl Outcomes {
                 format!("all {failed} inputs failed"),
             )),
             _ => {
-                let partly = match self.failed_in_part {
-                    0 => String::new(),
-                    partly => format!(" (and {partly} in part)"),
+                let failures = match (failed, self.failed_in_part) {
+                    (_, 0) => format!("{failed} of {total} inputs failed"),
+                    (0, partly) => format!("{partly} of {total} inputs failed in part"),
+                    (_, partly) => {
+                        format!("{failed} of {total} inputs failed (and {partly} in part)")
+                    }
                 };
-                let message =
-                    format!("{failed} of {total} inputs failed{partly}; the others are done");
+                let message = format!("{failures}; the others are done");
                 Err(Failure::new(SOME_INPUTS, message))
             }
         }

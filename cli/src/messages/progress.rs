@@ -20,7 +20,7 @@ pub(crate) enum ProgressStyleChoice {
     /// a bar on a terminal, nothing elsewhere
     #[default]
     Auto,
-    /// a line of JSON each second on standard error: label, done, total, failed, bytes, seconds, `seconds_left`
+    /// a line of JSON each second on standard error: progress (its label), done, total, failed, bytes, seconds, `seconds_left`
     Json,
     /// nothing
     Never,
@@ -127,7 +127,8 @@ impl Progress {
         let seconds_left = (self.done > 0).then(|| seconds / self.done as f64 * left);
         let line = json!({
             "progress": self.label,
-            "done": self.done,
+            // A file has a few bytes more than its numbers.
+            "done": self.done.min(self.total),
             "total": self.total,
             "failed": self.failed,
             "bytes": self.bytes,
