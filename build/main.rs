@@ -9,7 +9,13 @@ fn main() {
     println!("cargo::rerun-if-changed=shaders");
     // Vectors wider than the baseline's: see src/simd/dispatch.rs.
     println!("cargo::rustc-check-cfg=cfg(wide_vectors)");
-    let optimises = env::var("OPT_LEVEL").is_ok_and(|level| level != "0");
+    // Where code is to be as small as can be, second ways to the same bits, which only are faster, are left out.
+    println!("cargo::rustc-check-cfg=cfg(smallest)");
+    let level = env::var("OPT_LEVEL").unwrap_or_default();
+    let optimises = !matches!(&*level, "" | "0");
+    if level == "z" {
+        println!("cargo::rustc-cfg=smallest");
+    }
     if optimises && env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "x86_64") {
         println!("cargo::rustc-cfg=wide_vectors");
     }

@@ -277,6 +277,10 @@ impl Route {
         if request.len() == 0 {
             return Self::Nothing;
         }
+        if cfg!(smallest) {
+            let limit = piece_limit(request, limits);
+            return Self::Pieces { limit };
+        }
         let in_rows = layout == Layout::TrackMajor;
         let in_order = matches!(request.timeline.ticks, Ticks::Frames { .. });
         let is_sparse =

@@ -38,6 +38,7 @@ impl Machine for CpuEngine {
         (self.private_threads.as_ref()).unwrap_or_else(|| Threads::of_process())
     }
 
+    #[cfg(not(smallest))]
     fn rows(
         &self,
         request: &SetRequest<'_>,

@@ -501,7 +501,7 @@ impl InLanesInto<(), [[f32; 4]]> for TracksAtCursor<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&self, (): &(), output: &mut [[f32; 4]]) {
         let form = self.group.prepared().segments.form;
-        if form == Form::Polynomial || self.time == self.cursor.start {
+        if cfg!(smallest) || form == Form::Polynomial || self.time == self.cursor.start {
             self.one_by_one(self.parts, output);
             return;
         }
