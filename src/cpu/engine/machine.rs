@@ -27,6 +27,7 @@ impl Machine for CpuEngine {
             memory: self.memory,
             group_bytes: None,
             prepares_arcs_from: None,
+            kept_segments: Some(self.kept_segments),
         }
     }
 
