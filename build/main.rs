@@ -9,8 +9,15 @@ fn main() {
     println!("cargo::rerun-if-changed=shaders");
     // Vectors wider than the baseline's: see src/simd/dispatch.rs.
     println!("cargo::rustc-check-cfg=cfg(wide_vectors)");
-    let optimises = env::var("OPT_LEVEL").is_ok_and(|level| level != "0");
-    if optimises && env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "x86_64") {
+    // WebAssembly that is to be as small as can be leaves out second ways to the same bits, which only are faster.
+    println!("cargo::rustc-check-cfg=cfg(smallest)");
+    let level = env::var("OPT_LEVEL").unwrap_or_default();
+    let target = env::var("CARGO_CFG_TARGET_ARCH").unwrap_or_default();
+    if level == "z" && target == "wasm32" {
+        println!("cargo::rustc-cfg=smallest");
+    }
+    let optimises = !matches!(&*level, "" | "0");
+    if optimises && target == "x86_64" {
         println!("cargo::rustc-cfg=wide_vectors");
     }
     let now = hashes::of_folder(Path::new("."), "shaders")

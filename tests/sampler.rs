@@ -3,8 +3,8 @@
 use glam::{DQuat, Quat, Vec4};
 use tumble::vulkan::tuning::PrepareArcs;
 use tumble::{
-    Axes, Clip, Device, Engine, EngineOptions, Error, Interpolation, KeySigns, METHODS, Quantity,
-    SampleTimes, Speed, TrackSet, WrapMode, method,
+    Axes, Clip, Device, Ends, Engine, EngineOptions, Error, Interpolation, KeySigns, Layout,
+    METHODS, Quantity, SampleTimes, Speed, TrackSet, WrapMode, method,
 };
 
 use crate::support::{Random, first_difference, hostile_set, vulkan_engines};
@@ -180,6 +180,128 @@ fn clips_of_devices_are_sampled_on_the_host() {
                 }
             }
         }
+    }
+}
+
+/// An engine whose clips keep keys beyond so many bytes of segments, within a limit of memory.
+fn keeping(kept_segments: u64, memory: Option<u64>) -> Engine {
+    let mut options = EngineOptions::default();
+    (options.kept_segments, options.memory) = (Some(kept_segments), memory);
+    Engine::with_options(Device::Cpu, &options).unwrap()
+}
+
+/// Tracks of motion at uneven times: steps are small, but for one of sixteen; some keys have the other sign, and tracks
+/// of one, two and three keys are among them.
+fn motion_set(seed: u64) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    let all: Vec<f64> = (0..160).map(|key| f64::from(key) / 30.0).collect();
+    let mut uneven = all.clone();
+    for time in &mut uneven[1..] {
+        *time += random.between(-0.01, 0.01);
+    }
+    for track in 0..37 {
+        let times = if track < 20 { &all } else { &uneven };
+        let count = match track {
+            3..6 => track - 2,
+            _ => times.len(),
+        };
+        let mut rotation = random.rotation();
+        let keys: Vec<Quat> = (0..count)
+            .map(|_| {
+                let angle = match random.next() % 16 {
+                    0 => random.between(0.2, 3.1),
+                    _ => random.between(0.0, 0.07),
+                };
+                let sign = if track % 5 == 4 && random.next() % 8 == 0 {
+                    -1.0
+                } else {
+                    1.0
+                };
+                let step = DQuat::from_axis_angle(random.direction(), angle);
+                rotation = (rotation * step).normalize() * sign;
+                rotation.as_quat()
+            })
+            .collect();
+        set.push("", &times[..count], &keys).unwrap();
+    }
+    set
+}
+
+/// Clips that keep keys, and segments only where a cubic rotates far, give what segments give.
+#[test]
+fn kept_keys_have_the_bits_of_segments() {
+    let set = motion_set(21);
+    let mut sampled = times(&set, &mut Random(22));
+    sampled.extend((0..1000).map(|frame| f64::from(frame) / 173.0));
+    let (of_segments, of_keys) = (keeping(u64::MAX, None), keeping(0, None));
+    let natural = Interpolation {
+        ends: Ends::Natural,
+        ..method::CATMULL_ROM.into()
+    };
+    let interpolations: [Interpolation; 4] = [
+        method::SLERP.into(),
+        method::BESSEL_OVERHAUSER.into(),
+        method::CATMULL_ROM.into(),
+        natural,
+    ];
+    for interpolation in interpolations {
+        let label = format!("{}, {:?}", interpolation.method, interpolation.ends);
+        let (segments, keys) = [&of_segments, &of_keys]
+            .map(|engine| engine.upload(&set, interpolation).unwrap())
+            .into();
+        let [each, of_each]: [f64; 2] = [segments.bytes_per_key(), keys.bytes_per_key()];
+        assert!(
+            of_each >= 16.0 && of_each < 0.5 * each,
+            "{label}: {of_each} of {each}"
+        );
+        assert_eq!(keys.sampler().unwrap().bytes_per_key(), of_each);
+        let frames = [24, 60, 97, 480].map(SampleTimes::fps);
+        for frames in frames.iter().chain([&SampleTimes::at(sampled.clone())]) {
+            for layout in Layout::ALL {
+                let [expected, found] = [&segments, &keys]
+                    .map(|clip| clip.request(frames).layout(layout).evaluate().unwrap());
+                let difference = first_difference(expected.as_quats(), found.as_quats());
+                assert_eq!(difference, None, "{label}, {layout}");
+            }
+        }
+        assert_sampled(&keys, &sampled, &label);
+        let frames = SampleTimes::fps(60);
+        let said = keys.request(&frames).explain().unwrap();
+        assert!(said.starts_with("from the clip's keys: "), "{said}");
+        let said = segments.request(&frames).explain().unwrap();
+        assert!(said.starts_with("from the clip's segments"), "{said}");
+    }
+    // Curves that are not computed from keys, and curves that rotate far everywhere, have segments.
+    let hostile = hostile_set(23, 12);
+    for (set, method) in [(&set, method::SQUAD), (&hostile, method::BESSEL_OVERHAUSER)] {
+        let clip = of_keys.upload(set, method).unwrap();
+        assert!(
+            clip.bytes_per_key() > 150.0,
+            "{method}: {}",
+            clip.bytes_per_key()
+        );
+    }
+    let each: Vec<Interpolation> = interpolations.into_iter().cycle().take(37).collect();
+    let clip = of_keys.upload(&set, each).unwrap();
+    assert!(clip.bytes_per_key() < 60.0);
+    assert_sampled(&clip, &sampled, "of each track");
+}
+
+/// Where segments exceed the limit of memory, keys within it serve for samplers; a smaller limit refuses these.
+#[test]
+fn kept_keys_keep_a_budget() {
+    let set = motion_set(24);
+    let needed = 64 * set.key_count() as u64;
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let clip = keeping(u64::MAX, Some(needed))
+            .upload(&set, method)
+            .unwrap();
+        let bytes = clip.bytes_per_key() * set.key_count() as f64;
+        assert!(bytes <= needed as f64, "{method}: {bytes} of {needed}");
+        assert_sampled(&clip, &times(&set, &mut Random(25)), "within a limit");
+        let clip = keeping(0, Some(1000)).upload(&set, method).unwrap();
+        assert!(matches!(clip.sampler(), Err(Error::OutOfMemory(_))));
     }
 }
 

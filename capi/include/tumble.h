@@ -1295,6 +1295,16 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
                            struct TumbleClip **clip);
 
 /*
+ Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
+ 68 or 212 and more of one that keeps segments. On the CPU, large clips whose samples can be computed from their keys
+ keep these.
+
+ # Safety
+ `bytes` must point to memory for a number.
+ */
+TumbleResult tumble_clip_bytes_per_key(const struct TumbleClip *clip, double *bytes);
+
+/*
  Returns the number of samples of each track of a clip. A result of `tumble_clip_evaluate` has 4 × tracks × samples
  floats.
 

@@ -147,6 +147,26 @@ pub unsafe extern "C" fn tumble_upload(
     })
 }
 
+/// Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
+/// 68 or 212 and more of one that keeps segments. On the CPU, large clips whose samples can be computed from their keys
+/// keep these.
+///
+/// # Safety
+/// `bytes` must point to memory for a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_clip_bytes_per_key(
+    clip: *const TumbleClip,
+    bytes: *mut f64,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(bytes, "bytes")?;
+        let found = handle::get(clip)?.inner.bytes_per_key();
+        // SAFETY: as the caller promises.
+        unsafe { out.set(found) };
+        Ok(())
+    })
+}
+
 /// Returns the number of samples of each track of a clip. A result of `tumble_clip_evaluate` has 4 × tracks × samples
 /// floats.
 ///

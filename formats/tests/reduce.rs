@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
 use tumble::reduce::ReducedCurve;
-use tumble::{Channel, Device, Engine, SampleTimes};
+use tumble::{Channel, Device, Engine, SampleTimes, TrackSet, method};
 use tumble_formats::format::{MotionOptions, Quantization};
 use tumble_formats::motion::{
     ChannelInterpolation, Channels, Joint, Motion, SampledClip, Transform,
@@ -129,6 +129,31 @@ fn a_captured_walk_is_near_everywhere() {
             reduced.keys[1]
         );
         assert!(reduced.keys[0] == 88_064);
+    }
+    assert_bytes_of_keys(&engine, clip);
+}
+
+/// Motion is kept in 16 bytes a key and segments for few intervals, at the rate of the capture and at that of animations.
+fn assert_bytes_of_keys(engine: &Engine, clip: &Motion) {
+    for rate in [120, 30] {
+        let frames = SampleTimes::fps(rate);
+        let rotations = engine.evaluate(&clip.set, method::SLERP, &frames).unwrap();
+        let times: Vec<f64> = (0..rotations.sample_count())
+            .map(|frame| frame as f64 / f64::from(rate))
+            .collect();
+        let set = TrackSet::with_shared_times(&times, rotations.as_quats()).unwrap();
+        for (method, bound) in [
+            (method::SLERP, 16.5),
+            (method::CATMULL_ROM, 34.0),
+            (method::BESSEL_OVERHAUSER, 34.0),
+        ] {
+            let bytes = engine.upload(&set, method).unwrap().bytes_per_key();
+            println!("{method} at {rate} Hz: {bytes:.1} bytes a key");
+            assert!(
+                (16.0..bound).contains(&bytes),
+                "{method} at {rate} Hz: {bytes}"
+            );
+        }
     }
 }
 

@@ -87,6 +87,18 @@ impl Sampler {
         self.clip.motion.set.track_count()
     }
 
+    /// The memory that the clip takes for each key, bytes: 16 and more where its keys are kept, as large clips do whose
+    /// samples can be computed from these, else 68 or 212 and more.
+    ///
+    /// >>> import tumble
+    /// >>> sampler = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]]).sampler(method="slerp")
+    /// >>> sampler.bytes_per_key > 16
+    /// True
+    #[getter]
+    fn bytes_per_key(&self) -> f64 {
+        self.locked().bytes_per_key()
+    }
+
     fn __repr__(&self) -> String {
         format!("Sampler({})", counted(self.__len__(), "track"))
     }

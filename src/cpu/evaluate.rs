@@ -188,7 +188,7 @@ fn run<L: Lanes, S: Evaluate, O: Sink>(
 ) {
     let iterations = count.div_ceil(S::samples::<L>());
     let prefetches = matches!(S::PIPELINE_FROM, Some(from) if iterations >= from);
-    if !segment.is_canonical() {
+    if cfg!(smallest) || !segment.is_canonical() {
         vectors::<L, S, O, true, false, WHOLE_DEGREE>(segment, affine, count, distances, output);
     } else if prefetches {
         vectors::<L, S, O, false, true, WHOLE_DEGREE>(segment, affine, count, distances, output);

@@ -36,6 +36,7 @@ impl Row<'_> {
         output: &mut RowOutput<'_, '_>,
     ) -> Result<(), SampleTimesError> {
         match output {
+            output if cfg!(smallest) => self.one_by_one(segments, output.samples()),
             RowOutput::Here(samples) => in_lanes_into(self.width, self, segments, *samples),
             RowOutput::Staged(staged) => in_lanes_into(self.width, self, segments, staged),
         }

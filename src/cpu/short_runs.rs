@@ -40,6 +40,9 @@ impl<'a> ShortRuns<'a> {
         samples: &Range<usize>,
         width: VectorWidth,
     ) -> Option<Self> {
+        if cfg!(smallest) {
+            return None;
+        }
         let &Ticks::Frames { rate, start } = &timeline.ticks else {
             return None;
         };
@@ -69,7 +72,7 @@ impl<'a> ShortRuns<'a> {
             return false;
         };
         let is_short = part.spans.len() < MIN_LANES;
-        if class == NONE || is_short || output.len() != self.samples.len() {
+        if cfg!(smallest) || class == NONE || is_short || output.len() != self.samples.len() {
             return false;
         }
         if class != self.class {

@@ -128,7 +128,7 @@ impl<'o> Stage<'o> {
     fn with(width: VectorWidth, is_staged: bool, output: &'o mut [[f32; 4]]) -> Self {
         // Where a rotation may lie across two cache lines, rows are written directly.
         let is_aligned = output.as_ptr().addr().is_multiple_of(size_of::<[f32; 4]>());
-        let is_staged = is_staged && is_aligned;
+        let is_staged = is_staged && is_aligned && !cfg!(smallest);
         let (before, lines, after) = match is_staged {
             true => bytemuck::pod_align_to_mut(output),
             false => (output, &mut [][..], &mut [][..]),

@@ -14,7 +14,7 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate;
 use crate::evaluate::pieces::PreparedWindow;
-use crate::evaluate::uploaded::Uploaded;
+use crate::evaluate::uploaded::{ClipSource, Uploaded};
 use crate::machine::Machine;
 use crate::machine::error::EvaluateError;
 use crate::machine::plan::{Chunks, PREPARED, Plan, tracks_at_once};
@@ -24,7 +24,6 @@ use crate::output::encoded::EncodedOutput;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
-use crate::prepare::clip_data::ClipData;
 use crate::prepare::preparation::SetRequest;
 use crate::stream::{Chunk, run};
 use crate::time::frames::Timeline;
@@ -187,8 +186,8 @@ pub(crate) struct GroupedTracks {
     pub(super) quantity: Quantity,
 }
 
-/// Groups of tracks, and for each track the index of its group and its index there.
-type GroupsAndTracks = (Vec<Arc<ClipData>>, Vec<(usize, usize)>);
+/// What samples of each group are computed from, and for each track the index of its group and its index there.
+type GroupsAndTracks = (Vec<ClipSource>, Vec<(usize, usize)>);
 
 /// The tracks that have equal interpolations.
 struct Group {
@@ -247,12 +246,17 @@ impl GroupedTracks {
         let mut groups = Vec::with_capacity(self.groups.len());
         let mut tracks = vec![(0, 0); self.track_count];
         for (index, group) in self.groups.iter().enumerate() {
-            groups.push(Arc::clone(group.uploaded.prepared()?.data()));
+            groups.push(group.uploaded.source()?);
             for (in_group, &track) in group.tracks.iter().enumerate() {
                 tracks[track] = (index, in_group);
             }
         }
         Ok((groups, tracks))
+    }
+
+    /// Bytes that the tracks take on the host.
+    pub(super) fn bytes(&self) -> usize {
+        self.groups.iter().map(|group| group.uploaded.bytes()).sum()
     }
 
     /// The sample times of each group's tracks.
@@ -366,7 +370,7 @@ impl GroupedTracks {
             let method = group.uploaded.data().interpolation.method;
             let tracks = if count == 1 { "track" } else { "tracks" };
             let route = match source {
-                WorkSource::Planned(_, plan) => plan.to_string(),
+                WorkSource::Planned(_, plan) => format!("{}{plan}", group.uploaded.kept_form()),
                 WorkSource::Prepared(_) | WorkSource::PreparedWindow(_) => PREPARED.to_owned(),
             };
             lines.push(format!("{count} {tracks} by {method}: {route}"));

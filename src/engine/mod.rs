@@ -103,7 +103,8 @@ impl Engine {
                 }
                 let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
                 let (stores, memory) = (options.streaming_stores, options.memory);
-                let engine = CpuEngine::new(width, stores, options.thread_count, memory)?;
+                let (threads, kept) = (options.thread_count, options.kept_segments);
+                let engine = CpuEngine::new(width, stores, threads, memory, kept)?;
                 Ok(Self {
                     machine: Arc::new(engine),
                 })
@@ -240,8 +241,10 @@ impl Engine {
 
     /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
     ///
-    /// If the prepared tracks of an interpolation would take more than [`EngineOptions::memory`], the clip stores the keys instead, and each
-    /// evaluation prepares them piece by piece: slower, with the same bits.
+    /// On the CPU, large clips whose samples can be computed from their keys keep these instead of segments, in much less
+    /// memory ([`Clip::bytes_per_key`]). If the prepared tracks of an interpolation would take more than
+    /// [`EngineOptions::memory`] in either form, the clip stores the keys, and each evaluation prepares them piece by
+    /// piece: slower, with the same bits.
     ///
     /// # Errors
     /// When a track cannot be interpolated as requested, there are interpolations for another number of tracks or with
@@ -252,12 +255,13 @@ impl Engine {
         interpolations: impl Into<PerTrack<Interpolation>>,
     ) -> Result<Clip, Error> {
         let (interpolations, tracks) = (interpolations.into(), set.track_count());
+        let keys = set.key_count();
         let Some(interpolation) = interpolations.uniform(tracks) else {
             let grouped = GroupedSet::new(self, set, interpolations);
-            return Ok(Clip::of_groups(self.clone(), grouped.prepared()?));
+            return Ok(Clip::of_groups(self.clone(), grouped.prepared()?, keys));
         };
         let uploaded = Uploaded::whole(&self.machine, set, interpolation)?;
-        Ok(Clip::new(self.clone(), uploaded))
+        Ok(Clip::new(self.clone(), uploaded, keys))
     }
 
     /// Starts a request for the samples of a set at the times of `frames`, by an interpolation, or by [one of each

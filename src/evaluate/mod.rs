@@ -49,11 +49,23 @@ pub(crate) fn fill(
 ) -> Result<(), EvaluateError> {
     check(request)?;
     stop::check().map_err(SetError::from)?;
-    let rows = match plan.route {
-        Route::Nothing => return Ok(()),
-        Route::Pieces { .. } => return pieces::evaluate(machine, request, plan, output),
-        Route::Rows(rows) => rows,
-    };
+    match plan.route {
+        Route::Nothing => Ok(()),
+        #[cfg(not(smallest))]
+        Route::Rows(rows) => fill_rows(machine, request, plan, rows, output),
+        _ => pieces::evaluate(machine, request, plan, output),
+    }
+}
+
+/// Evaluates a request in rows, and copies them into frames if the result is to be so.
+#[cfg(not(smallest))]
+fn fill_rows(
+    machine: &Arc<dyn Machine>,
+    request: &SetRequest<'_>,
+    plan: &Plan,
+    rows: Rows,
+    output: EncodedOutput<'_>,
+) -> Result<(), EvaluateError> {
     if !plan.transposes() {
         return evaluate_rows(&**machine, request, rows, output);
     }
@@ -78,6 +90,7 @@ pub(crate) fn fill(
 }
 
 /// Evaluates a request in rows, each with the samples of a track.
+#[cfg(not(smallest))]
 fn evaluate_rows(
     machine: &dyn Machine,
     request: &SetRequest<'_>,

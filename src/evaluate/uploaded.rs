@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::from_keys::kept::KeptKeys;
 use crate::machine::error::EvaluateError;
 use crate::machine::plan::segment_bytes;
 use crate::machine::{Machine, MachineClip};
@@ -9,7 +10,7 @@ use crate::memory::{OutOfMemoryError, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::error::SetError;
-use crate::prepare::prepared::SEGMENTS;
+use crate::prepare::prepared::{Prepared, SEGMENTS};
 use crate::tracks::set::TrackSet;
 
 /// Prepares the requested tracks of a set on a machine, in the memory of `spare`, which is no longer needed.
@@ -40,6 +41,9 @@ pub(crate) fn prepare(
 pub(crate) enum Uploaded {
     /// Prepared for any timeline.
     Prepared(Box<dyn MachineClip>),
+    /// Keys from which samples are computed: in much less memory than segments, which come from memory too where they
+    /// are many.
+    Keys(Arc<KeptKeys>),
     /// A set that every evaluation prepares anew, because its segments exceed the engine's memory limit.
     Unprepared(Box<UnpreparedSet>),
 }
@@ -67,7 +71,19 @@ impl Uploaded {
         interpolation: Interpolation,
     ) -> Result<Self, EvaluateError> {
         let needed = segment_bytes(set, &interpolation);
-        if machine.limits().memory.is_some_and(|limit| needed > limit) {
+        let limits = machine.limits();
+        let budget = limits.memory.unwrap_or(usize::MAX);
+        if !cfg!(smallest)
+            && let Some(kept) = limits.kept_segments
+            && needed > kept.min(budget)
+        {
+            // Where most intervals need a segment, a clip keeps all of them.
+            let bytes = if needed > budget { budget } else { needed / 2 };
+            if let Some(keys) = KeptKeys::new(set, interpolation, bytes)? {
+                return Ok(Self::Keys(Arc::new(keys)));
+            }
+        }
+        if needed > budget {
             return Self::of_set(set.clone(), interpolation);
         }
         refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
@@ -88,14 +104,16 @@ impl Uploaded {
     pub(crate) fn data(&self) -> &ClipData {
         match self {
             Self::Prepared(clip) => clip.data(),
+            Self::Keys(keys) => &keys.data,
             Self::Unprepared(unprepared) => &unprepared.data,
         }
     }
 
-    /// The set, if nothing is prepared.
+    /// The set, if nothing is prepared for evaluations of many samples.
     pub(crate) fn unprepared(&self) -> Option<&TrackSet> {
         match self {
             Self::Prepared(_) => None,
+            Self::Keys(keys) => Some(&keys.set),
             Self::Unprepared(unprepared) => Some(&unprepared.set),
         }
     }
@@ -104,11 +122,46 @@ impl Uploaded {
     pub(crate) fn prepared(&self) -> Result<&dyn MachineClip, EvaluateError> {
         match self {
             Self::Prepared(clip) => Ok(&**clip),
-            Self::Unprepared(unprepared) => {
-                let UnpreparedSet { set, data } = &**unprepared;
-                let needed = segment_bytes(set, &data.interpolation);
-                Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into())
-            }
+            Self::Keys(keys) => Err(exceeds(&keys.set, &keys.data)),
+            Self::Unprepared(unprepared) => Err(exceeds(&unprepared.set, &unprepared.data)),
         }
     }
+
+    /// What single samples are computed from; an error if the segments exceed the engine's memory limit, and samples
+    /// cannot be computed from keys within it.
+    pub(crate) fn source(&self) -> Result<ClipSource, EvaluateError> {
+        Ok(match self {
+            Self::Keys(keys) => ClipSource::Keys(Arc::clone(keys)),
+            _ => ClipSource::Segments(Arc::clone(self.prepared()?.data())),
+        })
+    }
+
+    /// Bytes that the tracks take on the host.
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Self::Prepared(clip) => clip.data().groups.iter().map(Prepared::bytes).sum(),
+            Self::Keys(keys) => keys.bytes(),
+            Self::Unprepared(unprepared) => unprepared.set.rotation_bytes(),
+        }
+    }
+
+    /// The form in which the tracks are kept, in words that begin a description of how they are evaluated; nothing for
+    /// segments.
+    pub(crate) fn kept_form(&self) -> &'static str {
+        match self {
+            Self::Keys(_) => "from the clip's keys: ",
+            _ => "",
+        }
+    }
+}
+
+fn exceeds(set: &TrackSet, data: &ClipData) -> EvaluateError {
+    let needed = segment_bytes(set, &data.interpolation);
+    OutOfMemoryError::new::<u8>(SEGMENTS, needed).into()
+}
+
+/// What single samples of a clip are computed from.
+pub(crate) enum ClipSource {
+    Segments(Arc<ClipData>),
+    Keys(Arc<KeptKeys>),
 }

@@ -50,6 +50,15 @@ impl WeightRule {
         }
     }
 
+    /// The weights of a key of a track with these times, as [`TrackWeights::weights_of`] has them.
+    pub(crate) fn at_key(self, ends: Ends, times: &[f64], key: usize) -> TangentWeights {
+        match (times.len(), key) {
+            (0..=2, _) => UNKNOWN,
+            (count, key) if key == 0 || key + 1 == count => Self::end(ends),
+            _ => self.between(times[key] - times[key - 1], times[key + 1] - times[key]),
+        }
+    }
+
     /// The weights of the first or the last key of a track of at least three keys.
     pub(crate) fn end(ends: Ends) -> TangentWeights {
         match ends {

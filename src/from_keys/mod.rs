@@ -5,12 +5,14 @@ pub(crate) mod arcs;
 pub(crate) mod cubics;
 pub(crate) mod evaluate;
 pub(crate) mod intervals;
+pub(crate) mod kept;
 
 use glam::Vec4;
 
 use crate::curve::options::KeySigns;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::dot;
+use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::SetRequest;
 use crate::shader::{Form, LONGEST_STEP, SMALL_SQUARED_EXTENT};
 use crate::tracks::set::TrackSet;
@@ -42,10 +44,21 @@ impl KeyCurve {
         let (set, interpolation) = (request.set, request.interpolation);
         let keys = set.keys_of(request.tracks.clone());
         let are_fewer = request.len() < keys;
-        let is_short = are_fewer || is_below(request, keys, limit);
+        if !are_fewer && !is_below(request, keys, limit) {
+            return None;
+        }
+        Self::of_set(set, interpolation).filter(|curve| match curve {
+            Self::Cubics(_) if are_fewer => has_small_steps(set),
+            Self::Cubics(_) => has_small_curves(set, request.len() / keys),
+            _ => true,
+        })
+    }
+
+    /// The curves of a set that can be evaluated from keys; cubics only where they have small angles.
+    fn of_set(set: &TrackSet, interpolation: &Interpolation) -> Option<Self> {
         // On the path as authored an arc may exceed half a turn; it is then two segments.
         let arcs_are_short = interpolation.signs == KeySigns::Shortest || set.arcs_are_short();
-        if !is_short || !arcs_are_short || !interpolation.wrap().are_held() {
+        if !arcs_are_short || !interpolation.wrap().are_held() {
             return None;
         }
         match interpolation.form() {
@@ -53,14 +66,7 @@ impl KeyCurve {
             Form::Polynomial if set.longest() <= 2 => {
                 interpolation.is_steady_alone().then_some(Self::TwoKeys)
             }
-            Form::Polynomial => {
-                let weights = interpolation.plain()?.fast?.weights;
-                let are_small = match are_fewer {
-                    true => has_small_steps(set),
-                    false => has_small_curves(set),
-                };
-                are_small.then_some(Self::Cubics(weights))
-            }
+            Form::Polynomial => Some(Self::Cubics(interpolation.plain()?.fast?.weights)),
         }
     }
 }
@@ -80,9 +86,10 @@ fn has_small_steps(set: &TrackSet) -> bool {
     3 * small > 2 * probes
 }
 
-/// Whether the small-angle series holds for more than four fifths of the curves between keys, if the tangents are means
-/// of steps. Each of the others is prepared, with its neighbours, which takes several times as long as the series.
-fn has_small_curves(set: &TrackSet) -> bool {
+/// Whether the small-angle series holds for nearly all curves between keys, if the tangents are means of steps. Each of the
+/// others is prepared, with its neighbours, which takes several times as long as the series; and their samples are
+/// evaluated twice, which counts where a key has several.
+fn has_small_curves(set: &TrackSet, samples_of_a_key: usize) -> bool {
     let is_small = |steps: [Vec4; 3]| {
         let [before, step, after] = steps;
         let vectors = [before + step, 4.0 * step - before - after, step + after];
@@ -91,7 +98,8 @@ fn has_small_curves(set: &TrackSet) -> bool {
         squared_extent <= 36.0 * SMALL_SQUARED_EXTENT && longest <= LONGEST_STEP
     };
     let (small, probes) = probed(set, is_small);
-    5 * small > 4 * probes
+    let of_large = if samples_of_a_key < 4 { 5 } else { 20 };
+    of_large * (probes - small) < probes
 }
 
 fn square(vector: Vec4) -> f32 {

@@ -47,6 +47,7 @@ impl Machine for Opened {
             memory: engine.clip_bytes,
             group_bytes: Some(engine.group_bytes),
             prepares_arcs_from: Some(arcs_from).filter(|&from| from < usize::MAX),
+            kept_segments: None,
         }
     }
 

@@ -58,6 +58,7 @@ pub(crate) trait Machine: Any + Send + Sync {
     }
 
     /// Evaluates a request in rows, each with the samples of a track, into `output`, which is exactly as long.
+    #[cfg(not(smallest))]
     fn rows(
         &self,
         request: &SetRequest<'_>,

@@ -113,6 +113,10 @@ pub struct EngineOptions {
     /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
     /// set. By default there is none. Larger sets are prepared piece by piece.
     pub memory: Option<u64>,
+    /// The segments, bytes, that a clip of the CPU keeps although its samples can be computed from its keys, which take an
+    /// eighth of the memory or less; by default 1 MiB. With few samples at once, and more than eight for a key, segments
+    /// are faster; from memory rather than the caches they are not.
+    pub kept_segments: Option<u64>,
     /// The number of worker threads of the CPU. By default all engines of the process share a pool of as many threads
     /// as the environment variable `RAYON_NUM_THREADS` says, or one for each core.
     pub thread_count: Option<usize>,

@@ -34,6 +34,9 @@ pub(crate) struct Limits {
     pub(crate) group_bytes: Option<usize>,
     /// With at least so many keys, the device prepares the arcs between them; `None` if the host always does.
     pub(crate) prepares_arcs_from: Option<usize>,
+    /// With more bytes of segments, a clip keeps keys alone where its samples can be computed from them; `None` if
+    /// clips always keep segments.
+    pub(crate) kept_segments: Option<usize>,
 }
 
 /// The kind of machine that evaluates.
@@ -276,6 +279,10 @@ impl Route {
     fn of(request: &SetRequest<'_>, layout: Layout, limits: &Limits) -> Self {
         if request.len() == 0 {
             return Self::Nothing;
+        }
+        if cfg!(smallest) {
+            let limit = piece_limit(request, limits);
+            return Self::Pieces { limit };
         }
         let in_rows = layout == Layout::TrackMajor;
         let in_order = matches!(request.timeline.ticks, Ticks::Frames { .. });

@@ -150,6 +150,6 @@ impl Engine {
 
     pub(super) fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {
         let uploaded = Uploaded::of_data(&self.machine, data)?;
-        Ok(Clip::new(self.clone(), uploaded))
+        Ok(Clip::new(self.clone(), uploaded, 0))
     }
 }

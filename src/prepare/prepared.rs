@@ -77,6 +77,43 @@ impl Prepared {
         self.spans.try_reserve_exact(keys).map_err(refused)
     }
 
+    /// Removes what only whole tracks need, so that the curves and their spans remain, in no more memory than these take.
+    pub(crate) fn keep_curves(&mut self) {
+        if !(self.spans.sources.iter()).any(|source| matches!(source, SpanSource::Constant(_))) {
+            self.constants = Vec::new();
+        }
+        (self.spans.keys, self.parts) = (Vec::new(), Vec::new());
+        self.spans.starts.shrink_to_fit();
+        self.spans.sources.shrink_to_fit();
+        self.segments.polynomials.shrink_to_fit();
+        self.exact.shrink_to_fit();
+    }
+
+    /// Bytes of its lists.
+    pub(crate) fn bytes(&self) -> usize {
+        let Segments {
+            arcs,
+            intervals,
+            polynomials,
+            ..
+        } = &self.segments;
+        let Spans {
+            starts,
+            sources,
+            keys,
+            ..
+        } = &self.spans;
+        size_of_val(&arcs[..])
+            + size_of_val(&intervals[..])
+            + size_of_val(&polynomials[..])
+            + size_of_val(&self.constants[..])
+            + size_of_val(&self.exact[..])
+            + size_of_val(&starts[..])
+            + size_of_val(&sources[..])
+            + size_of_val(&keys[..])
+            + size_of_val(&self.parts[..])
+    }
+
     /// Removes everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.segments.arcs.clear();

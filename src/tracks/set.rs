@@ -173,6 +173,38 @@ impl TrackSet {
         self.keys.len()
     }
 
+    /// A set of the rotations alone: without names, vectors, scalars, and what only some methods need of keys.
+    pub(crate) fn of_rotations(&self) -> Self {
+        Self {
+            keys: self.keys.clone(),
+            times: self.times.clone(),
+            tracks: self.tracks.clone(),
+            span: self.span,
+            longest: self.longest,
+            signs: self.signs.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// Bytes of such a set.
+    pub(crate) fn rotation_bytes(&self) -> usize {
+        size_of_val(&self.keys[..])
+            + size_of_val(&self.times[..])
+            + size_of_val(&self.tracks[..])
+            + self.signs.bytes()
+    }
+
+    /// The signs of some keys for the shortest path, by their indices among all keys.
+    pub(crate) fn signs_of<const COUNT: usize>(&self, keys: &[u32; COUNT]) -> [f32; COUNT] {
+        let signs = self.signs.of(0..self.keys.len());
+        keys.map(|key| signs.sign(key as usize))
+    }
+
+    /// Whether the sign of any key is changed for the shortest path.
+    pub(crate) fn changes_signs(&self) -> bool {
+        self.signs.bytes() > 0
+    }
+
     /// Number of keys of the longest track.
     pub(crate) fn longest(&self) -> usize {
         self.longest
@@ -244,7 +276,6 @@ impl TrackSet {
     }
 
     /// The keys of all tracks, one track after another.
-    #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn keys(&self) -> &[Quat] {
         &self.keys
     }
@@ -262,7 +293,7 @@ impl TrackSet {
     }
 
     /// The index of a track's first key among all keys; the number of keys for `track_count()`.
-    fn first_key(&self, track: usize) -> usize {
+    pub(crate) fn first_key(&self, track: usize) -> usize {
         let range = self.tracks.get(track);
         range.map_or(self.keys.len(), |range| range.first_key)
     }

@@ -50,6 +50,11 @@ impl SignBits {
         keys.windows(2).all(|pair| dot(pair[0], pair[1]) > IN_DOUBT)
     }
 
+    /// Bytes of the bits; 0 if no sign is changed.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.bits[..])
+    }
+
     /// The signs of consecutive keys, by their indices in the set.
     #[inline]
     pub(crate) fn of(&self, keys: Range<usize>) -> Signs<'_> {

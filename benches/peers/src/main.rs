@@ -8,6 +8,7 @@
 
 #[cfg(feature = "bevy")]
 mod bevy;
+mod poses;
 mod wide;
 
 use std::path::Path;
@@ -33,6 +34,8 @@ struct Contestant<'a> {
     name: &'static str,
     work: &'static str,
     threads: &'static str,
+    /// The memory of the keys in the form that it evaluates, where this is compared.
+    bytes_per_key: Option<f64>,
     fill: Box<dyn FnMut(&mut [Quat]) + 'a>,
 }
 
@@ -69,6 +72,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
+            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -82,6 +86,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads: "all",
+            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -100,6 +105,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
+            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -114,6 +120,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         name: "writing memory",
         work: "none",
         threads: "all",
+        bytes_per_key: None,
         fill: Box::new(write),
     };
     let mut first = TrackSet::new();
@@ -140,7 +147,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         }
     };
     let one = "one sample";
-    let contestants = vec![
+    let mut contestants = vec![
         write,
         tumble("Tumble, from keys", "slerp", "all", method::SLERP),
         tumble("Tumble, from keys, one thread", "slerp", "1", method::SLERP),
@@ -165,18 +172,20 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name: "Tumble, a kept clip",
             work: one,
             threads: "1",
+            bytes_per_key: None,
             fill: Box::new(one_tumble),
         },
         Contestant {
             name: "glam Quat::slerp, by hand",
             work: one,
             threads: "1",
+            bytes_per_key: None,
             fill: Box::new(one_glam),
         },
     ];
+    contestants.extend(poses::contestants());
     #[cfg(feature = "bevy")]
-    let contestants = {
-        let mut contestants = contestants;
+    {
         let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
         let fill = move |output: &mut [Quat]| bevy::sample(&arcs, times, output);
         let name = "Bevy UnevenSampleAutoCurve";
@@ -184,6 +193,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work: "slerp",
             threads: "all",
+            bytes_per_key: None,
             fill: Box::new(fill),
         });
         let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
@@ -192,10 +202,10 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work: "smooth",
             threads: "all",
+            bytes_per_key: None,
             fill: Box::new(fill),
         });
-        contestants
-    };
+    }
     contestants
 }
 
@@ -242,10 +252,13 @@ fn race(mut contestants: Vec<Contestant<'_>>, folder: &Path) {
         times.sort();
         let median: Duration = times[times.len() / 2];
         println!(
-            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"ms\": {}, \"row\": {:?}}}",
+            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"bytes_per_key\": {}, \"ms\": {}, \"row\": {:?}}}",
             contestant.name,
             contestant.work,
             contestant.threads,
+            contestant
+                .bytes_per_key
+                .map_or("null".to_owned(), |bytes| format!("{bytes:.1}")),
             1e3 * median.as_secs_f64(),
             row(contestant)
         );

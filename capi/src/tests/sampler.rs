@@ -30,6 +30,12 @@ fn samplers_have_the_bits_of_the_clip() {
         let done = tumble_clip_evaluate(clip, &raw const samples, layout, output, 8 * times.len());
         assert_eq!(done, TumbleResult::Ok, "{}", words());
         assert_eq!(tumble_sampler_new(clip, &raw mut sampler), TumbleResult::Ok);
+        let mut bytes = 0.0;
+        assert_eq!(
+            tumble_clip_bytes_per_key(clip, &raw mut bytes),
+            TumbleResult::Ok
+        );
+        assert!(bytes > 68.0, "{bytes}");
         assert_eq!(tumble_clip_free(clip), TumbleResult::Ok);
         assert_eq!(
             tumble_sampler_copy(sampler, &raw mut copy),

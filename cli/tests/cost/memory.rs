@@ -22,37 +22,64 @@ const MIB: usize = 1 << 20;
 #[test]
 fn a_sampler_allocates_nothing_after_it_was_made() {
     let _one = one_at_a_time();
-    let mut set = TrackSet::new();
-    for track in 0..60 {
-        let key = |i: i32| Quat::from_rotation_y(0.1 * (i * track) as f32);
-        let keys: Vec<Quat> = (0..20).map(key).collect();
-        let times: Vec<f64> = (0..20).map(f64::from).collect();
-        set.push("", &times, &keys).unwrap();
-    }
-    let engine = Engine::new(Device::Cpu).unwrap();
-    for after in [WrapMode::Loop, WrapMode::Extrapolate] {
-        for method in [method::SLERP, method::SQUAD, method::C2] {
-            let interpolation = Interpolation {
-                after,
-                ..method.into()
-            };
-            let clip = engine.upload(&set, interpolation).unwrap();
-            let mut sampler = clip.sampler().unwrap();
-            let mut pose = vec![Quat::IDENTITY; 60];
-            let sample_all = || {
-                for frame in 0..200 {
-                    let time = f64::from(frame) * 0.25 - 3.0;
-                    sampler.pose(time, &mut pose).unwrap();
-                    sampler.sample(7, -time).unwrap();
-                }
-            };
-            // Another thread's message may come between.
-            let peaks = std::iter::repeat_with({
-                let mut sample_all = sample_all;
-                move || peak_of(&mut sample_all).1
-            });
-            assert!(peaks.take(5).any(|peak| peak == 0), "{method}, {after}");
+    let turning = |step: f32| {
+        let mut set = TrackSet::new();
+        for track in 0..60 {
+            let key = |i: i32| Quat::from_rotation_y(step * (i * track) as f32);
+            let keys: Vec<Quat> = (0..20).map(key).collect();
+            let times: Vec<f64> = (0..20).map(f64::from).collect();
+            set.push("", &times, &keys).unwrap();
         }
+        set
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut options = EngineOptions::default();
+    options.kept_segments = Some(0);
+    let keeping_keys = Engine::with_options(Device::Cpu, &options).unwrap();
+    let (turning_fast, turning_little) = (turning(0.1), turning(0.003));
+    for (engine, set, method, after) in [
+        (&engine, &turning_fast, method::SLERP, WrapMode::Loop),
+        (&engine, &turning_fast, method::SQUAD, WrapMode::Loop),
+        (&engine, &turning_fast, method::C2, WrapMode::Loop),
+        (&engine, &turning_fast, method::SLERP, WrapMode::Extrapolate),
+        (&engine, &turning_fast, method::SQUAD, WrapMode::Extrapolate),
+        (&engine, &turning_fast, method::C2, WrapMode::Extrapolate),
+        (
+            &keeping_keys,
+            &turning_little,
+            method::SLERP,
+            WrapMode::Hold,
+        ),
+        (
+            &keeping_keys,
+            &turning_little,
+            method::BESSEL_OVERHAUSER,
+            WrapMode::Hold,
+        ),
+    ] {
+        let interpolation = Interpolation {
+            after,
+            ..method.into()
+        };
+        let clip = engine.upload(set, interpolation).unwrap();
+        if std::ptr::eq(set, &turning_little) {
+            assert!(clip.bytes_per_key() < 100.0, "{method}");
+        }
+        let mut sampler = clip.sampler().unwrap();
+        let mut pose = vec![Quat::IDENTITY; 60];
+        let sample_all = || {
+            for frame in 0..200 {
+                let time = f64::from(frame) * 0.25 - 3.0;
+                sampler.pose(time, &mut pose).unwrap();
+                sampler.sample(7, -time).unwrap();
+            }
+        };
+        // Another thread's message may come between.
+        let peaks = std::iter::repeat_with({
+            let mut sample_all = sample_all;
+            move || peak_of(&mut sample_all).1
+        });
+        assert!(peaks.take(5).any(|peak| peak == 0), "{method}, {after}");
     }
 }
 
@@ -177,9 +204,13 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
     let (frames, layout) = (SampleTimes::fps(50), Layout::FrameMajor);
     let method = method::BESSEL_OVERHAUSER;
     let limit = 8 * MIB;
-    for memory in [None, Some(limit as u64)] {
+    for (memory, kept_segments) in [
+        (None, Some(u64::MAX)),
+        (Some(limit as u64), Some(u64::MAX)),
+        (None, None),
+    ] {
         let mut options = EngineOptions::default();
-        options.memory = memory;
+        (options.memory, options.kept_segments) = (memory, kept_segments);
         let engine = Engine::with_options(Device::Cpu, &options).unwrap();
         let (clip, uploading) = peak_of(|| engine.upload(&set, method).unwrap());
         let mut rotations = vec![Quat::IDENTITY; tracks as usize * 100];
@@ -226,6 +257,10 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         assert!(of_part < 2 * MIB, "{of_part}");
         let segments = set.key_count() * 176;
         match memory {
+            None if kept_segments.is_none() => {
+                // Keys alone, and what finds the intervals that rotate far.
+                assert!(uploading <= of_keys + MIB, "{uploading}");
+            }
             None => {
                 assert!(uploading > segments && streaming > 4 * limit);
                 // Segments, keys and spans, and the working memory of the threads.

@@ -111,7 +111,8 @@ impl CpuEngine {
     ) -> Result<(), SampleTimesError> {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
         let in_rows = window.layout == Layout::TrackMajor || samples == 1;
-        if let Ticks::Times { times, stride } = &timeline.ticks
+        if !cfg!(smallest)
+            && let Ticks::Times { times, stride } = &timeline.ticks
             && samples <= SAMPLES_ONE_BY_ONE
             && in_rows
             && !clip.interpolation.wrap().repeats()

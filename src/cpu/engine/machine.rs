@@ -27,6 +27,7 @@ impl Machine for CpuEngine {
             memory: self.memory,
             group_bytes: None,
             prepares_arcs_from: None,
+            kept_segments: Some(self.kept_segments),
         }
     }
 
@@ -38,6 +39,7 @@ impl Machine for CpuEngine {
         (self.private_threads.as_ref()).unwrap_or_else(|| Threads::of_process())
     }
 
+    #[cfg(not(smallest))]
     fn rows(
         &self,
         request: &SetRequest<'_>,

@@ -28,6 +28,9 @@ use crate::time::frames::Timeline;
 /// among all threads.
 pub(crate) const TASK: usize = 16 * 1024;
 
+/// Half of the caches of a core or more: segments beyond it come from memory for every pose.
+const KEPT_SEGMENTS: usize = 1 << 20;
+
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
@@ -38,6 +41,8 @@ pub(crate) struct CpuEngine {
     pub(crate) scratch_pool: ScratchPool,
     /// The limit of the segments of a clip, bytes, if there is one.
     pub(crate) memory: Option<usize>,
+    /// Bytes of segments that a clip keeps although its samples can be computed from its keys.
+    pub(crate) kept_segments: usize,
 }
 
 impl CpuEngine {
@@ -47,15 +52,18 @@ impl CpuEngine {
         streaming_stores: Option<bool>,
         threads: Option<usize>,
         memory: Option<u64>,
+        kept_segments: Option<u64>,
     ) -> Result<Self, OutOfThreadsError> {
         let private_threads = threads.map(|count| Threads::new(Some(count)));
         if let Some(threads) = &private_threads {
             threads.start()?;
         }
+        let size = |bytes: u64| usize::try_from(bytes).unwrap_or(usize::MAX);
         Ok(Self {
             streaming_stores,
             private_threads,
-            memory: memory.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX)),
+            memory: memory.map(size),
+            kept_segments: kept_segments.map_or(KEPT_SEGMENTS, size),
             ..Self::on_shared_threads(width)
         })
     }
@@ -68,6 +76,7 @@ impl CpuEngine {
             private_threads: None,
             scratch_pool: ScratchPool::default(),
             memory: None,
+            kept_segments: KEPT_SEGMENTS,
         }
     }
 

@@ -28,6 +28,8 @@ use crate::time::frames::{SampleTimes, Timeline};
 pub struct Clip {
     engine: Engine,
     pub(crate) tracks: ClipTracks,
+    /// Number of keys of all tracks.
+    keys: usize,
 }
 
 /// The tracks of a clip.
@@ -38,14 +40,22 @@ pub(crate) enum ClipTracks {
 }
 
 impl Clip {
-    pub(crate) fn new(engine: Engine, uploaded: Uploaded) -> Self {
+    pub(crate) fn new(engine: Engine, uploaded: Uploaded, keys: usize) -> Self {
         let tracks = ClipTracks::Alike(uploaded);
-        Self { engine, tracks }
+        Self {
+            engine,
+            tracks,
+            keys,
+        }
     }
 
-    pub(crate) fn of_groups(engine: Engine, grouped: GroupedTracks) -> Self {
+    pub(crate) fn of_groups(engine: Engine, grouped: GroupedTracks, keys: usize) -> Self {
         let tracks = ClipTracks::Grouped(Arc::new(grouped));
-        Self { engine, tracks }
+        Self {
+            engine,
+            tracks,
+            keys,
+        }
     }
 
     /// The tracks as one set of segments, as results need that stay on a device.
@@ -72,6 +82,21 @@ impl Clip {
             ClipTracks::Alike(uploaded) => uploaded.data().track_count(),
             ClipTracks::Grouped(grouped) => grouped.track_count,
         }
+    }
+
+    /// The memory that the clip takes on the host for each key, bytes; 0 for no keys.
+    ///
+    /// On the CPU, a clip of more than [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) keeps its keys
+    /// (16 bytes each, with their times once for tracks that share them) where samples can be computed from these: arcs,
+    /// and cubics that mostly rotate little between keys, with segments for the others. Other clips keep a segment for
+    /// each key (68 bytes of an arc, 212 of a polynomial).
+    #[must_use]
+    pub fn bytes_per_key(&self) -> f64 {
+        let bytes = match &self.tracks {
+            ClipTracks::Alike(uploaded) => uploaded.bytes(),
+            ClipTracks::Grouped(grouped) => grouped.bytes(),
+        };
+        bytes as f64 / self.keys.max(1) as f64
     }
 
     /// The sample times of `frames` for this clip.
@@ -176,18 +201,18 @@ impl Clip {
     /// has, too.
     ///
     /// # Errors
-    /// When the segments of the clip exceed the engine's memory limit, so that they are not kept.
+    /// When the segments of the clip exceed the engine's memory limit, so that they are not kept, and samples cannot be
+    /// computed from its keys within the limit.
     pub fn sampler(&self) -> Result<Sampler, Error> {
         let (clips, tracks) = match &self.tracks {
             ClipTracks::Alike(uploaded) => {
-                let data = Arc::clone(uploaded.prepared()?.data());
-                let tracks = (0..data.track_count()).map(|track| (0, track)).collect();
-                (vec![data], tracks)
+                let tracks = (0..self.track_count()).map(|track| (0, track)).collect();
+                (vec![uploaded.source()?], tracks)
             }
             ClipTracks::Grouped(grouped) => grouped.prepared_tracks()?,
         };
-        let width = self.engine.machine.width();
-        Ok(Sampler::new(clips, tracks, self.quantity(), width))
+        let (width, bytes) = (self.engine.machine.width(), self.bytes_per_key());
+        Ok(Sampler::new(clips, tracks, self.quantity(), width, bytes))
     }
 
     /// Evaluates a window of the result in chunks of about `chunk` values, of tracks with the same interpolation.

@@ -9,17 +9,21 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Quat;
+use bytemuck::Zeroable as _;
+use glam::{Quat, Vec4};
 
 use crate::checks::check_rows;
 use crate::cpu::evaluate::at_parameter;
-use crate::curve::options::Quantity;
+use crate::curve::options::{Ends, Quantity};
 use crate::error::Error;
+use crate::evaluate::uploaded::ClipSource;
+use crate::fit::tangent_weights::WeightRule;
+use crate::from_keys::kept::{KeptKeys, TimeBetweenKeys, TracksInLanes};
 use crate::output::value::OutputValue;
 use crate::prepare::arcs::listed_arcs;
 use crate::prepare::clip_data::{ClipData, PartRef};
 use crate::prepare::prepared::Prepared;
-use crate::shader::{ArcSegment, Form};
+use crate::shader::{ArcSegment, Form, TangentWeights};
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::error::SampleTimesError;
@@ -71,6 +75,7 @@ struct SampledClip {
     batches: Vec<TrackBatch>,
     quantity: Quantity,
     width: VectorWidth,
+    bytes_per_key: f64,
 }
 
 /// Consecutive tracks that are evaluated together in poses: a single one, or several of one group and one cursor, each
@@ -80,8 +85,14 @@ struct TrackBatch {
     has_one_part: bool,
 }
 
+/// Tracks that are sampled from the same lists.
+enum SampledGroup {
+    Prepared(PreparedGroup),
+    Keys(Arc<KeptKeys>),
+}
+
 /// A group of prepared tracks.
-struct SampledGroup {
+struct PreparedGroup {
     clip: Arc<ClipData>,
     /// Its index among the groups of `clip`.
     index: usize,
@@ -89,11 +100,13 @@ struct SampledGroup {
     arcs: Vec<ArcSegment>,
 }
 
-/// A part of a track.
+/// A part of a track; a whole track of a group of keys.
 struct SampledPart {
     /// An index in [`SampledClip::groups`].
     group: u32,
-    /// The index in the group of its first span.
+    /// The track's index in its clip.
+    track: u32,
+    /// The index in the group of its first span, or of its first key.
     first_span: usize,
 }
 
@@ -115,6 +128,8 @@ struct Cursor {
     /// The number of the part, counted in each track, and of the span, counted in the part.
     part: usize,
     span: usize,
+    /// Of the keys at both ends of the span, for tracks that are sampled from keys.
+    weights: [TangentWeights; 2],
 }
 
 impl Cursor {
@@ -138,6 +153,19 @@ impl Cursor {
             in_seconds: in_seconds(1.0),
             part: 0,
             span: 0,
+            weights: [TangentWeights::zeroed(); 2],
+        }
+    }
+
+    /// A time in the span, for tracks that are sampled from keys.
+    #[inline(always)]
+    fn between_keys(&self, time: f64) -> TimeBetweenKeys {
+        TimeBetweenKeys {
+            key: self.span,
+            weights: self.weights,
+            end: self.end,
+            time,
+            parameter: self.in_seconds.parameter(time - self.start),
         }
     }
 }
@@ -145,22 +173,28 @@ impl Cursor {
 impl Sampler {
     /// A sampler of tracks in several clips: for each track the index of its clip in `clips`, and its index there.
     pub(crate) fn new(
-        clips: Vec<Arc<ClipData>>,
+        clips: Vec<ClipSource>,
         tracks: Vec<(usize, usize)>,
         quantity: Quantity,
         width: VectorWidth,
+        bytes_per_key: f64,
     ) -> Self {
         let mut groups = Vec::new();
         let mut first_groups = Vec::with_capacity(clips.len());
         for clip in &clips {
             first_groups.push(groups.len());
-            groups.extend(
-                (clip.groups.iter().enumerate()).map(|(index, prepared)| SampledGroup {
-                    clip: Arc::clone(clip),
-                    index,
-                    arcs: listed_arcs(prepared),
-                }),
-            );
+            match clip {
+                ClipSource::Segments(clip) => {
+                    groups.extend((clip.groups.iter().enumerate()).map(|(index, prepared)| {
+                        SampledGroup::Prepared(PreparedGroup {
+                            clip: Arc::clone(clip),
+                            index,
+                            arcs: listed_arcs(prepared),
+                        })
+                    }));
+                }
+                ClipSource::Keys(keys) => groups.push(SampledGroup::Keys(Arc::clone(keys))),
+            }
         }
         let mut sampled = SampledClip {
             groups,
@@ -169,23 +203,34 @@ impl Sampler {
             batches: Vec::new(),
             quantity,
             width,
+            bytes_per_key,
         };
         // For each hash of times the cursors of such tracks, each with a track that has it.
         let mut known: HashMap<u64, Vec<(usize, usize, usize)>> = HashMap::new();
         let mut cursors = 0;
         for (clip, index) in tracks {
             let first_part = sampled.parts.len();
-            let data = &clips[clip];
-            for &(group, part) in data.part_indices(index) {
-                let PartRef { part, .. } = data.part((group, part));
+            let mut push = |group: u32, first_span| {
                 sampled.parts.push(SampledPart {
-                    group: (first_groups[clip] + group as usize) as u32,
-                    first_span: part.spans.start,
+                    group: first_groups[clip] as u32 + group,
+                    track: index as u32,
+                    first_span,
                 });
+            };
+            let source = &clips[clip];
+            match source {
+                ClipSource::Segments(data) => {
+                    for &(group, part) in data.part_indices(index) {
+                        push(group, data.part((group, part)).part.spans.start);
+                    }
+                }
+                ClipSource::Keys(keys) => push(0, keys.set.first_key(index)),
             }
-            let alike = known.entry(hash_of_times(data, index)).or_default();
+            let times = times_of(source, index);
+            let alike = known.entry(hash_of_times(&times)).or_default();
             let is_alike = |&&(_, other, track): &&(usize, usize, usize)| {
-                have_same_times((data, index), (&clips[other], track))
+                let other = &clips[other];
+                weight_rule(source) == weight_rule(other) && times == times_of(other, track)
             };
             let cursor = match alike.iter().find(is_alike) {
                 Some(&(cursor, ..)) => cursor,
@@ -211,6 +256,12 @@ impl Sampler {
     #[must_use]
     pub fn track_count(&self) -> usize {
         self.clip.tracks.len()
+    }
+
+    /// As [`Clip::bytes_per_key`](crate::Clip::bytes_per_key) of the clip, whose memory the sampler keeps.
+    #[must_use]
+    pub fn bytes_per_key(&self) -> f64 {
+        self.clip.bytes_per_key
     }
 
     /// The rotation of a track at a time, seconds.
@@ -371,7 +422,10 @@ impl SampledClip {
     #[inline(always)]
     fn at_cursor(&self, track: &SampledTrack, cursor: &Cursor, time: f64) -> [f32; 4] {
         let part = &self.parts[track.first_part + cursor.part];
-        let group = &self.groups[part.group as usize];
+        let group = match &self.groups[part.group as usize] {
+            SampledGroup::Prepared(group) => group,
+            SampledGroup::Keys(keys) => return of_keys(keys, part, cursor, time),
+        };
         let prepared = group.prepared();
         match source_at(prepared, part, cursor, time) {
             SpanSource::Segment(index) => {
@@ -399,10 +453,10 @@ impl SampledClip {
         })
     }
 
-    /// The clip of a track; `None` if it has no parts.
-    fn clip_of(&self, track: &SampledTrack) -> Option<&ClipData> {
+    /// The group of a track's first part; `None` if it has no parts.
+    fn group_of(&self, track: &SampledTrack) -> Option<&SampledGroup> {
         let first = self.parts.get(track.first_part)?;
-        Some(&self.groups[first.group as usize].clip)
+        self.groups.get(first.group as usize)
     }
 
     /// The time between the keys whose value a track that repeats has at `time`.
@@ -410,8 +464,10 @@ impl SampledClip {
         if !time.is_finite() {
             return Err(SampleTimesError::TimeNotFinite { index: 0, time });
         }
-        let clip = self.clip_of(track);
-        Ok(clip.map_or(time, |clip| clip.folded_time(track.index, time)))
+        Ok(match self.group_of(track) {
+            Some(SampledGroup::Prepared(group)) => group.clip.folded_time(track.index, time),
+            _ => time,
+        })
     }
 
     /// Moves a cursor to the span of a time; returns whether there is one.
@@ -419,8 +475,10 @@ impl SampledClip {
         if cursor.contains(time) {
             return true;
         }
-        let Some(clip) = self.clip_of(track) else {
-            return false;
+        let clip = match self.group_of(track) {
+            Some(SampledGroup::Prepared(group)) => &group.clip,
+            Some(SampledGroup::Keys(keys)) => return move_among_keys(keys, track, cursor, time),
+            None => return false,
         };
         let parts = clip.part_indices(track.index);
         let number = parts.partition_point(|&index| clip.part(index).part.end <= time);
@@ -440,14 +498,21 @@ impl SampledClip {
             in_seconds: in_seconds(end - start),
             part: number,
             span,
+            ..*cursor
         };
         true
     }
 
     /// The value before the first key, which the track's first part has, or from the last key on, which the last has.
     fn outside(&self, track: &SampledTrack, time: f64) -> [f32; 4] {
-        let Some(clip) = self.clip_of(track) else {
-            return [0.0; 4];
+        let clip = match self.group_of(track) {
+            Some(SampledGroup::Prepared(group)) => &group.clip,
+            Some(SampledGroup::Keys(keys)) => {
+                let (times, keys) = keys.set.times_and_keys(track.index);
+                let held = if time < times[0] { 0 } else { keys.len() - 1 };
+                return keys[held].to_array();
+            }
+            None => return [0.0; 4],
         };
         let parts = clip.part_indices(track.index);
         let is_before = |&index: &(u32, u32)| clip.part(index).part.end > time;
@@ -456,14 +521,17 @@ impl SampledClip {
             false => parts.len() - 1,
         };
         let PartRef { prepared, part } = clip.part(parts[number]);
-        let group = &self.groups[self.parts[track.first_part + number].group as usize];
+        let group = self.parts[track.first_part + number].group as usize;
         let (_, source) = outside(part, prepared.spans.begin(part), time);
         match source {
             Some(RunSource::Constant(index)) => prepared.constants[index as usize],
             Some(RunSource::Segment(index, distance, affine)) => {
                 let distance = distance.at_sample(0, || time);
                 let parameter = distance * affine.scale + affine.offset;
-                group.at_parameter(index as usize, parameter)
+                match &self.groups[group] {
+                    SampledGroup::Prepared(group) => group.at_parameter(index as usize, parameter),
+                    SampledGroup::Keys(_) => [0.0; 4],
+                }
             }
             Some(RunSource::Exact { index, parameter }) => {
                 prepared.exact_at_time(index, parameter, time)
@@ -500,29 +568,35 @@ impl InLanesInto<(), [[f32; 4]]> for TracksAtCursor<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(&self, (): &(), output: &mut [[f32; 4]]) {
-        let form = self.group.prepared().segments.form;
-        if form == Form::Polynomial || self.time == self.cursor.start {
-            self.one_by_one(self.parts, output);
+        let group = match self.group {
+            SampledGroup::Prepared(group) => group,
+            SampledGroup::Keys(keys) => {
+                return pose_of_keys::<L>(keys, self.parts, self.cursor, self.time, output);
+            }
+        };
+        let form = group.prepared().segments.form;
+        if cfg!(smallest) || form == Form::Polynomial || self.time == self.cursor.start {
+            self.one_by_one(group, self.parts, output);
             return;
         }
         let mut parts = self.parts.chunks_exact(L::COUNT);
         let (whole, rest) = output.split_at_mut(output.len() - parts.remainder().len());
         for (parts, values) in (&mut parts).zip(whole.chunks_exact_mut(L::COUNT)) {
-            self.arcs::<L>(parts, values);
+            self.arcs::<L>(group, parts, values);
         }
-        self.one_by_one(parts.remainder(), rest);
+        self.one_by_one(group, parts.remainder(), rest);
     }
 }
 
 impl TracksAtCursor<'_> {
     #[inline(always)]
-    fn one_by_one(&self, parts: &[SampledPart], output: &mut [[f32; 4]]) {
+    fn one_by_one(&self, group: &PreparedGroup, parts: &[SampledPart], output: &mut [[f32; 4]]) {
         let Self { cursor, time, .. } = *self;
-        let prepared = self.group.prepared();
+        let prepared = group.prepared();
         let parameter = cursor.in_seconds.parameter(time - cursor.start);
         for (part, value) in parts.iter().zip(output) {
             *value = match source_at(prepared, part, cursor, time) {
-                SpanSource::Segment(index) => self.group.at_parameter(index as usize, parameter),
+                SpanSource::Segment(index) => group.at_parameter(index as usize, parameter),
                 SpanSource::Constant(index) => prepared.constants[index as usize],
                 SpanSource::Exact(index) => cursor.exact(prepared, index, time),
             };
@@ -531,15 +605,20 @@ impl TracksAtCursor<'_> {
 
     /// A lane for each track, if all are on arcs.
     #[inline(always)]
-    fn arcs<L: Lanes>(&self, parts: &[SampledPart], output: &mut [[f32; 4]]) {
-        let spans = &self.group.prepared().spans;
+    fn arcs<L: Lanes>(
+        &self,
+        group: &PreparedGroup,
+        parts: &[SampledPart],
+        output: &mut [[f32; 4]],
+    ) {
+        let spans = &group.prepared().spans;
         // A middle and a tangent each.
-        let rotations: &[[f32; 4]] = bytemuck::cast_slice(self.group.arcs());
+        let rotations: &[[f32; 4]] = bytemuck::cast_slice(group.arcs());
         let (mut middles, mut tangents) = ([0; MAX_LANES], [0; MAX_LANES]);
         for (part, (middle, tangent)) in parts.iter().zip(middles.iter_mut().zip(&mut tangents)) {
             let SpanSource::Segment(index) = spans.sources[part.first_span + self.cursor.span]
             else {
-                return self.one_by_one(parts, output);
+                return self.one_by_one(group, parts, output);
             };
             (*middle, *tangent) = (2 * index, 2 * index + 1);
         }
@@ -552,7 +631,41 @@ impl TracksAtCursor<'_> {
     }
 }
 
-impl SampledGroup {
+/// The value of a track at a time in the span of its cursor, from keys.
+fn of_keys(keys: &KeptKeys, part: &SampledPart, cursor: &Cursor, time: f64) -> [f32; 4] {
+    let mut value = [[0.0; 4]];
+    pose_of_keys::<Vec4>(keys, std::slice::from_ref(part), cursor, time, &mut value);
+    value[0]
+}
+
+/// The same of several tracks, a lane for each.
+#[inline(always)]
+fn pose_of_keys<L: Lanes>(
+    keys: &KeptKeys,
+    parts: &[SampledPart],
+    cursor: &Cursor,
+    time: f64,
+    output: &mut [[f32; 4]],
+) {
+    if time == cursor.start {
+        for (part, value) in parts.iter().zip(output) {
+            *value = keys.set.keys()[part.first_span + cursor.span].to_array();
+        }
+        return;
+    }
+    let at = cursor.between_keys(time);
+    let chunks = parts.chunks(L::COUNT);
+    for (parts, values) in chunks.zip(output.chunks_mut(L::COUNT)) {
+        let mut tracks = TracksInLanes::zeroed();
+        for (lane, part) in parts.iter().enumerate() {
+            tracks.indices[lane] = part.track;
+            tracks.first_keys[lane] = part.first_span as u32;
+        }
+        keys.evaluate::<L>(&at, &tracks, values);
+    }
+}
+
+impl PreparedGroup {
     #[inline(always)]
     fn prepared(&self) -> &Prepared {
         &self.clip.groups[self.index]
@@ -578,22 +691,55 @@ impl SampledGroup {
 }
 
 /// The bounds of a track's spans: for each part the starts, and the end of the last one.
-fn times_of(clip: &ClipData, track: usize) -> impl ExactSizeIterator<Item = (&[f64], f64)> {
-    clip.part_indices(track).iter().map(|&index| {
-        let PartRef { prepared, part } = clip.part(index);
-        (&prepared.spans.starts[part.spans.clone()], part.end)
-    })
+fn times_of(clip: &ClipSource, track: usize) -> Vec<(&[f64], f64)> {
+    match clip {
+        ClipSource::Segments(clip) => (clip.part_indices(track).iter())
+            .map(|&index| {
+                let PartRef { prepared, part } = clip.part(index);
+                (&prepared.spans.starts[part.spans.clone()], part.end)
+            })
+            .collect(),
+        ClipSource::Keys(keys) => {
+            let (times, _) = keys.set.times_and_keys(track);
+            let last = times.len() - 1;
+            vec![(&times[..last], times[last])]
+        }
+    }
 }
 
-fn hash_of_times(clip: &ClipData, track: usize) -> u64 {
+fn hash_of_times(parts: &[(&[f64], f64)]) -> u64 {
     let mut hasher = DefaultHasher::new();
-    for (starts, end) in times_of(clip, track) {
+    for (starts, end) in parts {
         bytemuck::cast_slice::<f64, u8>(starts).hash(&mut hasher);
         end.to_bits().hash(&mut hasher);
     }
     hasher.finish()
 }
 
-fn have_same_times(one: (&ClipData, usize), other: (&ClipData, usize)) -> bool {
-    times_of(one.0, one.1).eq(times_of(other.0, other.1))
+/// What the weights of a cursor follow from, which all its tracks share.
+fn weight_rule(clip: &ClipSource) -> Option<(WeightRule, Ends)> {
+    match clip {
+        ClipSource::Segments(_) => None,
+        ClipSource::Keys(keys) => keys.weight_rule(),
+    }
+}
+
+/// Moves a cursor to the interval of a track's keys that has a time; returns whether there is one.
+fn move_among_keys(keys: &KeptKeys, track: &SampledTrack, cursor: &mut Cursor, time: f64) -> bool {
+    let (times, _) = keys.set.times_and_keys(track.index);
+    let last = times.len() - 1;
+    if time < times[0] || time >= times[last] {
+        return false;
+    }
+    let span = interval_at(&times[..last], time, cursor.span);
+    let (start, end) = (times[span], times[span + 1]);
+    *cursor = Cursor {
+        start,
+        end,
+        in_seconds: in_seconds(end - start),
+        part: 0,
+        span,
+        weights: keys.weights_at(times, span),
+    };
+    true
 }

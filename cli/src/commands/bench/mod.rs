@@ -120,6 +120,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+/// The forms in which clips of motion are kept, and the option that selects each.
+pub(crate) const KEPT_FORMS: [(&str, u64); 2] = [("segments", u64::MAX), ("keys", 0)];
+
 fn measure(
     kind: WorkloadKind,
     workload: &Workload,
@@ -178,6 +181,12 @@ fn measure(
         for width in VectorWidth::available() {
             let narrow = cpu_clip(&|options| options.vector_width = Some(width))?;
             contestants.push(evaluate(format!("CPU, {width:?}"), narrow));
+        }
+    }
+    if kind == WorkloadKind::Motion {
+        for (form, kept_segments) in KEPT_FORMS {
+            let clip = cpu_clip(&|options| options.kept_segments = Some(kept_segments))?;
+            contestants.push(evaluate(format!("CPU, {form} kept"), clip));
         }
     }
     contestants.push(Contestant::new(

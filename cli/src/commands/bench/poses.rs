@@ -2,12 +2,12 @@
 
 use fastrand::Rng;
 use glam::{Quat, Vec3};
-use tumble::{Device, Engine, Layout, Method, SampleTimes, method};
+use tumble::{Device, Engine, EngineOptions, Layout, Method, SampleTimes, method};
 
-use crate::commands::bench::naive;
 use crate::commands::bench::race::{Contestant, Repetitions, race};
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{MOTION_KEYS, RATE, motion};
+use crate::commands::bench::{KEPT_FORMS, naive};
 
 /// Calls of a measurement, each at a time of its own.
 const CALLS: usize = 600;
@@ -34,13 +34,17 @@ fn of_tracks(
 ) -> Result<Section, tumble::Error> {
     let set = &motion(tracks, MOTION_KEYS);
     let clip = &Engine::new(Device::Cpu)?.upload(set, method)?;
+    let of_form = |kept_segments| {
+        let mut options = EngineOptions::default();
+        options.kept_segments = Some(kept_segments);
+        Engine::with_options(Device::Cpu, &options)?.upload(set, method)
+    };
     // Between the frames of the keys: on them there would be nothing to evaluate.
     let played: &Vec<f64> = &(0..CALLS).map(|call| (call as f64 + 0.3) / RATE).collect();
     let mut shuffled = played.clone();
     Rng::with_seed(5).shuffle(&mut shuffled);
-    let (mut sampler, mut jumping) = (clip.sampler()?, clip.sampler()?);
     let mut known = vec![(usize::MAX, [Vec3::ZERO; 3]); tracks];
-    let contestants: Vec<Contestant<'_, tumble::Error>> = vec![
+    let mut contestants: Vec<Contestant<'_, tumble::Error>> = vec![
         Contestant::new("naive (glam), next times", |output: &mut [Quat]| {
             for &time in played {
                 if method == method::SLERP {
@@ -58,19 +62,20 @@ fn of_tracks(
             }
             Ok(Vec::new())
         }),
-        Contestant::new("sampler, next times", move |output: &mut [Quat]| {
-            for &time in played {
-                sampler.pose(time, output)?;
-            }
-            Ok(Vec::new())
-        }),
-        Contestant::new("sampler, any times", move |output: &mut [Quat]| {
-            for &time in &shuffled {
-                jumping.pose(time, output)?;
-            }
-            Ok(Vec::new())
-        }),
     ];
+    for (form, kept_segments) in KEPT_FORMS {
+        let clip = of_form(kept_segments)?;
+        for (order, times) in [("next", played), ("any", &shuffled)] {
+            let mut sampler = clip.sampler()?;
+            let name = format!("sampler of {form}, {order} times");
+            contestants.push(Contestant::new(name, move |output: &mut [Quat]| {
+                for &time in times {
+                    sampler.pose(time, output)?;
+                }
+                Ok(Vec::new())
+            }));
+        }
+    }
     let mut output = vec![Quat::IDENTITY; tracks];
     let rows = race(contestants, &mut output, repetitions)?;
     Ok(Section::of_poses(method, tracks, tracks * CALLS, rows))

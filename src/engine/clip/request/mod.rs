@@ -104,6 +104,17 @@ impl RequestSource<'_> {
         })
     }
 
+    /// As [`Uploaded::kept_form`](crate::evaluate::uploaded::Uploaded::kept_form) of a clip.
+    fn kept_form(&self) -> &'static str {
+        match self {
+            Self::Clip(Clip {
+                tracks: ClipTracks::Alike(uploaded),
+                ..
+            }) => uploaded.kept_form(),
+            _ => "",
+        }
+    }
+
     /// What is evaluated for a part of the result.
     fn work<'r>(&'r self, part: &'r RequestPart) -> Result<RequestWork<'r>, Error> {
         let (engine, set, interpolation) = match self {
@@ -375,7 +386,7 @@ impl Request<'_> {
             RequestWork::Prepared(_) => PREPARED.to_owned(),
             RequestWork::Set(SetWork { engine, request }) => {
                 let plan = engine.plan(&request, self.layout, self.encoding, chunk);
-                plan.to_string()
+                format!("{}{plan}", self.source.kept_form())
             }
             RequestWork::Groups { engine, groups } => {
                 groups.explain(engine, &part.timeline, &part.window, self.encoding, chunk)?

@@ -1,0 +1,309 @@
+//! Clips that keep keys instead of segments: 16 bytes a key, and segments for the few intervals that the series of small
+//! angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
+
+use bytemuck::Zeroable;
+use glam::Vec4;
+
+use crate::curve::options::Ends;
+use crate::fit::tangent_weights::{TrackWeights, WeightRule};
+use crate::from_keys::cubics::sample;
+use crate::from_keys::intervals::{IntervalPlan, evaluate_intervals};
+use crate::from_keys::{KeyCurve, UNRESOLVED};
+use crate::method::interpolation::Interpolation;
+use crate::prepare::clip_data::ClipData;
+use crate::prepare::error::SetError;
+use crate::prepare::preparation::{PART_INTERVALS, Preparation};
+use crate::prepare::prepared::Prepared;
+use crate::shader::{KEY_INNER, KeySample, PolynomialSegment, TangentWeights};
+use crate::simd::dispatch::VectorWidth;
+use crate::simd::lanes::{Lanes, MAX_LANES, Number as _, canonical};
+use crate::time::frame_clock::in_seconds;
+use crate::time::runs::Parameter;
+use crate::time::spans::SpanSource;
+use crate::time::times::interval_at;
+use crate::tracks::set::TrackSet;
+use crate::tracks::track_keys::TrackKeys;
+use crate::twin::Evaluate as _;
+use crate::twin::arc_between::arc_between;
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
+use crate::twin::small_angle::small_angle_cubic;
+
+/// Keys from which samples are computed.
+pub(crate) struct KeptKeys {
+    pub(crate) set: TrackSet,
+    /// The parts of a clip that are known without its segments.
+    pub(crate) data: ClipData,
+    curve: KeyCurve,
+    rest: Rest,
+}
+
+/// The curves of the intervals that the series does not hold, in order of tracks and time.
+struct Rest {
+    /// The index of each track's first span, and the number of all spans.
+    tracks: Vec<usize>,
+    prepared: Prepared,
+}
+
+/// An interval between two keys that one or more tracks have, and a time in it.
+#[derive(Clone, Copy)]
+pub(crate) struct TimeBetweenKeys {
+    /// The index in each track of the key before it.
+    pub(crate) key: usize,
+    /// The weights of the keys at its start and its end, by [`KeptKeys::weights_at`].
+    pub(crate) weights: [TangentWeights; 2],
+    /// Its end and the time, seconds.
+    pub(crate) end: f64,
+    pub(crate) time: f64,
+    pub(crate) parameter: f32,
+}
+
+/// A track in each lane: its index and the index of its first key. Lanes that stay unused have a track, too.
+#[derive(Zeroable)]
+pub(crate) struct TracksInLanes {
+    pub(crate) indices: [u32; MAX_LANES],
+    pub(crate) first_keys: [u32; MAX_LANES],
+}
+
+/// Bytes of an interval whose segment is kept: mostly one span.
+const REST_BYTES: usize =
+    size_of::<PolynomialSegment>() + size_of::<f64>() + size_of::<SpanSource>();
+
+impl KeptKeys {
+    /// Keeps the keys of a set if its curves can be computed from them, in at most so many bytes; `None` otherwise.
+    pub(crate) fn new(
+        set: &TrackSet,
+        interpolation: Interpolation,
+        bytes: usize,
+    ) -> Result<Option<Self>, SetError> {
+        let curve = match KeyCurve::of_set(set, &interpolation) {
+            Some(curve @ (KeyCurve::Arcs | KeyCurve::Cubics(_)))
+                if u32::try_from(set.key_count()).is_ok() =>
+            {
+                curve
+            }
+            _ => return Ok(None),
+        };
+        let data = ClipData::unprepared(set, interpolation)?;
+        let large = match curve {
+            KeyCurve::Cubics(rule) => large_intervals(set, rule, interpolation.ends),
+            _ => Vec::new(),
+        };
+        if set.rotation_bytes() + large.len() * REST_BYTES > bytes {
+            return Ok(None);
+        }
+        let kept = Self {
+            rest: Rest::new(set, &interpolation, &large)?,
+            set: set.of_rotations(),
+            data,
+            curve,
+        };
+        // An interval that was cut has several segments.
+        Ok((kept.bytes() <= bytes).then_some(kept))
+    }
+
+    /// Bytes that it takes.
+    pub(crate) fn bytes(&self) -> usize {
+        let Rest { tracks, prepared } = &self.rest;
+        self.set.rotation_bytes() + size_of_val(&**tracks) + prepared.bytes()
+    }
+
+    /// What the weights of keys follow from, in addition to their times.
+    pub(crate) fn weight_rule(&self) -> Option<(WeightRule, Ends)> {
+        match self.curve {
+            KeyCurve::Cubics(rule) => Some((rule, self.data.interpolation.ends)),
+            _ => None,
+        }
+    }
+
+    /// The tangent weights at both ends of the interval after a key of a track with these times.
+    pub(crate) fn weights_at(&self, times: &[f64], key: usize) -> [TangentWeights; 2] {
+        match self.weight_rule() {
+            Some((rule, ends)) => [key, key + 1].map(|key| rule.at_key(ends, times, key)),
+            None => [Zeroable::zeroed(); 2],
+        }
+    }
+
+    /// The rotations of the tracks in the lanes at a time between two of their keys, in the first elements of `output`, which
+    /// may be fewer than there are lanes.
+    #[inline(always)]
+    pub(crate) fn evaluate<L: Lanes>(
+        &self,
+        at: &TimeBetweenKeys,
+        tracks: &TracksInLanes,
+        output: &mut [[f32; 4]],
+    ) {
+        if cfg!(smallest) {
+            return; // no clip keeps keys there
+        }
+        let mut found = [[0.0; 4]; MAX_LANES];
+        L::store_rotations(self.lanes::<L>(at, tracks), &mut found[..L::COUNT]);
+        let mut has_unresolved = false;
+        for (value, found) in output.iter_mut().zip(&found) {
+            *value = *found;
+            has_unresolved |= found[3] == 0.0;
+        }
+        if has_unresolved && self.has_rest() {
+            self.resolve(at, tracks, output);
+        }
+    }
+
+    /// Evaluates the rotations that the series does not hold.
+    #[cold]
+    #[inline(never)]
+    fn resolve(&self, at: &TimeBetweenKeys, tracks: &TracksInLanes, output: &mut [[f32; 4]]) {
+        for (value, &track) in output.iter_mut().zip(&tracks.indices) {
+            if *value == UNRESOLVED {
+                *value = self.rest.at(track as usize, at);
+            }
+        }
+    }
+
+    fn has_rest(&self) -> bool {
+        matches!(self.curve, KeyCurve::Cubics(_))
+    }
+
+    /// A track in each lane.
+    #[inline(always)]
+    fn lanes<L: Lanes>(&self, at: &TimeBetweenKeys, tracks: &TracksInLanes) -> [L; 4] {
+        let key = at.key as u32;
+        let from = self.keys::<L>(key, tracks);
+        let to = self.keys::<L>(key + 1, tracks);
+        let parameter = L::all(at.parameter);
+        if let KeyCurve::Arcs = self.curve {
+            let (middle, tangent) = arc_between(from, to);
+            return canonical(on_arc(middle, tangent, norm_squared(tangent), parameter));
+        }
+        let [first, last] = at.weights;
+        let before = key - u32::from(first.kind == KEY_INNER);
+        let after = key + 1 + u32::from(last.kind == KEY_INNER);
+        let before = self.keys::<L>(before, tracks);
+        let after = self.keys::<L>(after, tracks);
+        let (first, last) = (alike::<L>(first), alike::<L>(last));
+        let curve = small_angle_cubic(before, from, to, after, first.into(), last.into());
+        sample(&curve, parameter)
+    }
+
+    /// The key of each track with this index in it, with its sign for the shortest path.
+    #[inline(always)]
+    fn keys<L: Lanes>(&self, key: u32, tracks: &TracksInLanes) -> [L; 4] {
+        let mut indices = tracks.first_keys;
+        for index in &mut indices {
+            *index += key;
+        }
+        let mut keys = L::gather_rotations(bytemuck::cast_slice(self.set.keys()), &indices);
+        if self.set.changes_signs() {
+            let sign = L::load(&self.set.signs_of(&indices));
+            keys = [
+                keys[0] * sign,
+                keys[1] * sign,
+                keys[2] * sign,
+                keys[3] * sign,
+            ];
+        }
+        keys
+    }
+}
+
+/// The same weights in all lanes.
+#[inline(always)]
+fn alike<L: Lanes>(weights: TangentWeights) -> [L; 4] {
+    let TangentWeights {
+        before,
+        after,
+        outgoing,
+        kind,
+    } = weights;
+    [
+        L::all(before),
+        L::all(after),
+        L::all(outgoing),
+        L::all(kind),
+    ]
+}
+
+impl Rest {
+    /// Prepares these intervals, each by its track and the key before it.
+    fn new(
+        set: &TrackSet,
+        interpolation: &Interpolation,
+        intervals: &[(usize, usize)],
+    ) -> Result<Self, SetError> {
+        let mut prepared = Prepared::new(interpolation);
+        let ranges = intervals.iter().map(|&(track, key)| (track, key..key + 1));
+        Preparation::new(interpolation).push(&mut prepared, set, ranges)?;
+        let mut tracks = Vec::with_capacity(set.track_count() + 1);
+        for part in &prepared.parts {
+            while tracks.len() <= part.track as usize {
+                tracks.push(part.spans.start);
+            }
+        }
+        tracks.resize(set.track_count() + 1, prepared.spans.len());
+        prepared.keep_curves();
+        Ok(Self { tracks, prepared })
+    }
+
+    /// The value of a track at a time in one of the intervals.
+    #[cold]
+    #[inline(never)]
+    fn at(&self, track: usize, at: &TimeBetweenKeys) -> [f32; 4] {
+        let (spans, segments) = (&self.prepared.spans, &self.prepared.segments);
+        let first = self.tracks[track];
+        let starts = &spans.starts[first..self.tracks[track + 1]];
+        let span = interval_at(starts, at.time, 0);
+        let start = starts[span];
+        // An interval may be cut into several spans.
+        let end = starts.get(span + 1).map_or(at.end, |next| next.min(at.end));
+        match spans.sources[first + span] {
+            SpanSource::Segment(index) => {
+                let parameter = in_seconds(end - start).parameter(at.time - start);
+                let value: Vec4 = segments.polynomials[index as usize].at(parameter);
+                value.canonical().to_array()
+            }
+            SpanSource::Exact(index) => {
+                let length = end - start;
+                (self.prepared).exact_at_time(index, Parameter { start, length }, at.time)
+            }
+            SpanSource::Constant(index) => self.prepared.constants[index as usize],
+        }
+    }
+}
+
+/// The intervals of a set whose cubics rotate too far for the series, by track and key.
+fn large_intervals(set: &TrackSet, rule: WeightRule, ends: Ends) -> Vec<(usize, usize)> {
+    let width = VectorWidth::widest();
+    let (mut weights, mut plan) = (
+        TrackWeights::new(rule, ends),
+        IntervalPlan::new(KeyCurve::Cubics(rule)),
+    );
+    let (mut signed, mut found, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut times, mut number): (&[f64], usize) = (&[], 0);
+    let mut large = Vec::new();
+    for track in 0..set.track_count() {
+        let whole = TrackKeys::whole(set, track);
+        let count = whole.keys.len() - 1;
+        for first in (0..count).step_by(PART_INTERVALS) {
+            let intervals = first..count.min(first + PART_INTERVALS);
+            let keys = whole.around(&intervals, 1);
+            let of_keys = weights.weights_of(keys.times, keys.first_key, keys.track_key_count);
+            if !std::ptr::eq(times, keys.times) {
+                (times, number) = (keys.times, number + 1);
+                let keys = intervals.clone().map(|key| key - keys.first_key);
+                samples.clear();
+                samples.extend(keys.map(|key| KeySample {
+                    key: key as u32,
+                    parameter: 0.0,
+                }));
+            }
+            plan.find(number, &samples, of_keys);
+            found.resize(samples.len(), UNRESOLVED);
+            let (authored, keys) = (keys.authored(), keys.signed(&mut signed));
+            if !evaluate_intervals(width, &plan, authored, keys, &mut found) {
+                let unresolved = intervals
+                    .zip(&found)
+                    .filter(|(_, value)| **value == UNRESOLVED);
+                large.extend(unresolved.map(|(key, _)| (track, key)));
+            }
+        }
+    }
+    large
+}
