@@ -44,7 +44,7 @@ build() {
     local package
     for package in libvulkan1 vulkan-validationlayers; do
         compgen -G "$place/packages/${package}_*.deb" >/dev/null ||
-            (cd "$place/packages" && apt-get -qq download "$package") ||
+            (cd "$place/packages" && apt-get -qq -o APT::Sandbox::User=root download "$package") ||
             fail "$package could not be downloaded; run apt-get update first"
         rm -rf "$place/unpacked"
         dpkg-deb --extract "$place/packages/${package}"_*.deb "$place/unpacked"

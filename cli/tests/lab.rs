@@ -30,6 +30,19 @@ fn every_variant_has_the_bits_of_the_cpu() {
         "{page}"
     );
 
+    // With a second for measurements the ceilings are measured at least, and the rules decide with what there is.
+    let line = ["lab", "--time-limit", "1", "-o", "timed.json"];
+    let timed = finish(with_driver(folder, LAVAPIPE, &line).output().unwrap());
+    let page = String::from_utf8_lossy(&timed.out);
+    assert_eq!(timed.code, 0, "{page}{}", timed.words);
+    assert!(page.lines().count() <= 60, "{page}");
+    let file = read(&folder.join("timed.json"));
+    assert_eq!(faults(&schema("lab"), &file), Vec::<String>::new());
+    let lab = &file["lab"];
+    let counts = ["ceilings", "decisions"].map(|of| lab[of].as_array().unwrap().len());
+    assert!(counts[0] == 14 && counts[1] >= 3, "{page}");
+    assert!(lab["row"] == 2 && lab["run_lanes"].as_array().unwrap().len() == 5);
+
     // A proof with its lanes needs some, and another file is no report.
     std::fs::write(folder.join("no.json"), "{\"format\": \"tumble-proof\"}").unwrap();
     for (file, why) in [

@@ -2015,16 +2015,6 @@ pub(crate) async fn finish_2_of_together_3<M: Machine>(
     barrier().await;
 }
 
-/// Where the first sample of a run is stored, in a repetition.
-pub(crate) fn first_of_run<M: Machine>(machine: &M, item: SpreadRun<M::F>, repetition: u32) -> u32 {
-    let _block = machine.block(line!(), 5);
-    let loaded = machine.load::<u32>(Global::Dispatch, 3);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
-    item.output
-        .wrapping_add(loaded)
-        .wrapping_add(repetition.wrapping_mul(loaded_2))
-}
-
 /// 0 where the magnitude is below 2^-50.
 pub(crate) fn flushed<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 4);
@@ -2686,102 +2676,86 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
     let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut j: u32 = Default::default();
     let mut rotation: [M::F; 4] = Default::default();
+    let mut j: u32 = Default::default();
     let mut pair_end: u32 = Default::default();
-    let _block = machine.block(line!(), 42);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
+    let _block = machine.block(line!(), 34);
+    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << lanes_log2;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
     let index = workgroup
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> loaded_2;
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded_3 {
+        >> lanes_log2;
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    if index >= loaded {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
-    let count = sample_count(machine, item);
-    let first = first_of_run(machine, item, group[2]);
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_5;
-    j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
-    if item.count != count {
-        let _block = machine.block(line!(), 2);
-        let loaded_6 = j;
-        store_with_care(machine, item, first, count, loaded_6, lanes, group[2]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
+    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
+    let place = place_of(machine, item, group[2]);
+    let first = place[1];
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_3;
+    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    if item.count >= NEEDS_CARE {
+        let _block = machine.block(line!(), 1);
+        store_with_care(machine, item, place, first_j, lanes, group[2]);
         return;
     }
-    let result = segment_of_run(machine, item, group[2]);
-    let segment = segment_at_arc_segment(machine, result);
+    let count = item.count;
+    let segment = segment_at_arc_segment(machine, place[0]);
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_7 = j;
-    if loaded_7 < count {
-        let _block = machine.block(line!(), 12);
-        let loaded_8 = j;
-        let result_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_8);
-        rotation = result_2;
-        let loaded_9 = j;
-        if (loaded_9 == 0u32) & (item.key != NO_KEY) {
+    if first_j < count {
+        let _block = machine.block(line!(), 9);
+        let result = evaluate_near_arc_segment(machine, item, segment, constant, first_j);
+        rotation = result;
+        if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_3 = constant_of_run(machine, item.key, group[2]);
-            rotation = result_3;
+            let result_2 = constant_at(machine, place[2]);
+            rotation = result_2;
         }
-        let loaded_10 = j;
-        let loaded_11 = rotation;
-        store(machine, first.wrapping_add(loaded_10), loaded_11);
+        let loaded_4 = rotation;
+        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    let loaded_12 = j;
-    j = loaded_12.wrapping_add(lanes);
+    j = first_j.wrapping_add(lanes);
     let end = count.wrapping_add(idle);
-    pair_end = 3u32.wrapping_mul(lanes);
-    let loaded_13 = pair_end;
-    if loaded_13 <= end {
+    let first_pair_end = 3u32.wrapping_mul(lanes);
+    if first_pair_end <= end {
+        let _block = machine.block(line!(), 2);
+        let pair = 2u32.wrapping_mul(lanes);
+        pair_end = first_pair_end;
         loop {
-            let _block = machine.block(line!(), 23);
-            let loaded_14 = j;
-            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_14);
-            let loaded_15 = j;
-            let next = evaluate_near_arc_segment(
-                machine,
-                item,
-                segment,
-                constant,
-                loaded_15.wrapping_add(lanes),
-            );
-            let loaded_16 = j;
-            store(machine, first.wrapping_add(loaded_16), rotation_2);
-            let loaded_17 = j;
-            store(
-                machine,
-                first.wrapping_add(loaded_17).wrapping_add(lanes),
-                next,
-            );
-            let loaded_18 = j;
-            j = loaded_18.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_19 = pair_end;
-            pair_end = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_20 = pair_end;
-            if loaded_20 > end {
+            let _block = machine.block(line!(), 18);
+            let loaded_5 = j;
+            let next_j = loaded_5.wrapping_add(lanes);
+            let loaded_6 = j;
+            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_6);
+            let next = evaluate_near_arc_segment(machine, item, segment, constant, next_j);
+            let loaded_7 = j;
+            store(machine, first.wrapping_add(loaded_7), rotation_2);
+            store(machine, first.wrapping_add(next_j), next);
+            j = next_j.wrapping_add(lanes);
+            let loaded_8 = pair_end;
+            pair_end = loaded_8.wrapping_add(pair);
+            let loaded_9 = pair_end;
+            if loaded_9 > end {
                 break;
             }
         }
     }
-    let loaded_21 = j;
-    if loaded_21 < count {
+    let loaded_10 = j;
+    if loaded_10 < count {
         loop {
             let _block = machine.block(line!(), 11);
-            let loaded_22 = j;
-            let loaded_23 = j;
-            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_23);
-            store(machine, first.wrapping_add(loaded_22), result_4);
-            let loaded_24 = j;
-            j = loaded_24.wrapping_add(lanes);
-            let loaded_25 = j;
-            if loaded_25 >= count {
+            let loaded_11 = j;
+            let loaded_12 = j;
+            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_12);
+            store(machine, first.wrapping_add(loaded_11), result_3);
+            let loaded_13 = j;
+            j = loaded_13.wrapping_add(lanes);
+            let loaded_14 = j;
+            if loaded_14 >= count {
                 break;
             }
         }
@@ -2802,7 +2776,7 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
     let mut all: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -2825,97 +2799,96 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_1(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 3u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 3u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_18) as usize,
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize,
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
+            let loaded_28 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize,
-                loaded_29,
+                first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize,
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -2930,7 +2903,7 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
     let mut all: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -2953,97 +2926,96 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_2(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 9u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 9u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_18) as usize,
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize,
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(9u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(9u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(9u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(9u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(9u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(9u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
+            let loaded_28 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_27) as usize,
-                loaded_29,
+                first.wrapping_mul(9u32).wrapping_add(loaded_26) as usize,
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -3058,7 +3030,7 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
     let mut all: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3081,97 +3053,96 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_3(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 3u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 3u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_18) as usize),
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize),
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_28) as usize));
+            let loaded_28 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_27) as usize));
             machine.store::<[M::F; 4]>(
                 Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize),
-                loaded_29,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize),
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -3337,104 +3308,88 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
     let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut j: u32 = Default::default();
     let mut rotation: [M::F; 4] = Default::default();
+    let mut j: u32 = Default::default();
     let mut pair_end: u32 = Default::default();
-    let _block = machine.block(line!(), 42);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
+    let _block = machine.block(line!(), 34);
+    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
+    let lanes = 1u32 << lanes_log2;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
     let index = workgroup
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> loaded_2;
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded_3 {
+        >> lanes_log2;
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    if index >= loaded {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_4.wrapping_add(index));
-    let count = sample_count(machine, item);
-    let first = first_of_run(machine, item, group[2]);
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_5;
-    j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
-    if item.count != count {
-        let _block = machine.block(line!(), 2);
-        let loaded_6 = j;
-        store_with_care(machine, item, first, count, loaded_6, lanes, group[2]);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
+    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
+    let place = place_of(machine, item, group[2]);
+    let first = place[1];
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_3;
+    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    if item.count >= NEEDS_CARE {
+        let _block = machine.block(line!(), 1);
+        store_with_care(machine, item, place, first_j, lanes, group[2]);
         return;
     }
-    let result = segment_of_run(machine, item, group[2]);
-    let segment = segment_at_polynomial_segment(machine, result);
+    let count = item.count;
+    let segment = segment_at_polynomial_segment(machine, place[0]);
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_7 = j;
-    if loaded_7 < count {
-        let _block = machine.block(line!(), 12);
-        let loaded_8 = j;
-        let result_2 = evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_8);
-        rotation = result_2;
-        let loaded_9 = j;
-        if (loaded_9 == 0u32) & (item.key != NO_KEY) {
+    if first_j < count {
+        let _block = machine.block(line!(), 9);
+        let result = evaluate_near_polynomial_segment(machine, item, segment, constant, first_j);
+        rotation = result;
+        if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_3 = constant_of_run(machine, item.key, group[2]);
-            rotation = result_3;
+            let result_2 = constant_at(machine, place[2]);
+            rotation = result_2;
         }
-        let loaded_10 = j;
-        let loaded_11 = rotation;
-        store(machine, first.wrapping_add(loaded_10), loaded_11);
+        let loaded_4 = rotation;
+        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    let loaded_12 = j;
-    j = loaded_12.wrapping_add(lanes);
+    j = first_j.wrapping_add(lanes);
     let end = count.wrapping_add(idle);
-    pair_end = 3u32.wrapping_mul(lanes);
-    let loaded_13 = pair_end;
-    if loaded_13 <= end {
+    let first_pair_end = 3u32.wrapping_mul(lanes);
+    if first_pair_end <= end {
+        let _block = machine.block(line!(), 2);
+        let pair = 2u32.wrapping_mul(lanes);
+        pair_end = first_pair_end;
         loop {
-            let _block = machine.block(line!(), 23);
-            let loaded_14 = j;
+            let _block = machine.block(line!(), 18);
+            let loaded_5 = j;
+            let next_j = loaded_5.wrapping_add(lanes);
+            let loaded_6 = j;
             let rotation_2 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_14);
-            let loaded_15 = j;
-            let next = evaluate_near_polynomial_segment(
-                machine,
-                item,
-                segment,
-                constant,
-                loaded_15.wrapping_add(lanes),
-            );
-            let loaded_16 = j;
-            store(machine, first.wrapping_add(loaded_16), rotation_2);
-            let loaded_17 = j;
-            store(
-                machine,
-                first.wrapping_add(loaded_17).wrapping_add(lanes),
-                next,
-            );
-            let loaded_18 = j;
-            j = loaded_18.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_19 = pair_end;
-            pair_end = loaded_19.wrapping_add(2u32.wrapping_mul(lanes));
-            let loaded_20 = pair_end;
-            if loaded_20 > end {
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_6);
+            let next = evaluate_near_polynomial_segment(machine, item, segment, constant, next_j);
+            let loaded_7 = j;
+            store(machine, first.wrapping_add(loaded_7), rotation_2);
+            store(machine, first.wrapping_add(next_j), next);
+            j = next_j.wrapping_add(lanes);
+            let loaded_8 = pair_end;
+            pair_end = loaded_8.wrapping_add(pair);
+            let loaded_9 = pair_end;
+            if loaded_9 > end {
                 break;
             }
         }
     }
-    let loaded_21 = j;
-    if loaded_21 < count {
+    let loaded_10 = j;
+    if loaded_10 < count {
         loop {
             let _block = machine.block(line!(), 11);
-            let loaded_22 = j;
-            let loaded_23 = j;
-            let result_4 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_23);
-            store(machine, first.wrapping_add(loaded_22), result_4);
-            let loaded_24 = j;
-            j = loaded_24.wrapping_add(lanes);
-            let loaded_25 = j;
-            if loaded_25 >= count {
+            let loaded_11 = j;
+            let loaded_12 = j;
+            let result_3 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_12);
+            store(machine, first.wrapping_add(loaded_11), result_3);
+            let loaded_13 = j;
+            j = loaded_13.wrapping_add(lanes);
+            let loaded_14 = j;
+            if loaded_14 >= count {
                 break;
             }
         }
@@ -3455,7 +3410,7 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     let mut all: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3478,97 +3433,96 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_1(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 3u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 3u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_18) as usize,
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize,
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
+            let loaded_28 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize,
-                loaded_29,
+                first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize,
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -3583,7 +3537,7 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let mut all: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3606,97 +3560,96 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_2(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 9u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 9u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_18) as usize,
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize,
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(9u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(9u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(9u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(9u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(9u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(9u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_28) as usize);
+            let loaded_28 =
+                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
             machine.store::<M::F>(
                 Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_27) as usize,
-                loaded_29,
+                first.wrapping_mul(9u32).wrapping_add(loaded_26) as usize,
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -3711,7 +3664,7 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let mut all: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 36);
+    let _block = machine.block(line!(), 34);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3734,97 +3687,96 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let index_of_segment = segment_of_run(machine, loaded_8, group[2]);
+    let place = place_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            index_of_segment
+            place[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let loaded_11 = item;
-    let first = first_of_run(machine, loaded_11, group[2]);
-    let loaded_12 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_12;
+    let first = place[1];
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
     end = lanes.wrapping_sub(idle);
     loop {
         let _block = machine.block(line!(), 35);
-        let loaded_13 = iteration;
-        if !(loaded_13 < iterations) {
+        let loaded_12 = iteration;
+        if !(loaded_12 < iterations) {
             break;
         }
-        let loaded_14 = iteration;
-        let values = (loaded_14 & 1u32)
+        let loaded_13 = iteration;
+        let values = (loaded_13 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_15 = end;
-        let j = loaded_15.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_14 = end;
+        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
             let _block = machine.block(line!(), 5);
-            let loaded_16 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_16, segment, j, group[2]);
+            let loaded_15 = item;
+            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
             let result_4 = parts_3(machine, result_3);
             all = result_4;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_17 = part;
-                if !(loaded_17 < 3u32) {
+                let loaded_16 = part;
+                if !(loaded_16 < 3u32) {
                     break;
                 }
+                let loaded_17 = part;
                 let loaded_18 = part;
-                let loaded_19 = part;
-                let loaded_20 = all[loaded_19 as usize];
+                let loaded_19 = all[loaded_18 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_18) as usize),
-                    loaded_20,
+                        .wrapping_add(loaded_17) as usize),
+                    loaded_19,
                 );
-                let loaded_21 = part;
-                part = loaded_21.wrapping_add(1u32);
+                let loaded_20 = part;
+                part = loaded_20.wrapping_add(1u32);
             }
         }
         barrier().await;
+        let loaded_21 = end;
+        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
         let loaded_22 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_22).wrapping_mul(3u32));
         let loaded_23 = end;
-        let loaded_24 = end;
-        let parts_end = (if count < loaded_24 { count } else { loaded_23 }).wrapping_mul(3u32);
-        let loaded_25 = begin;
-        part_2 = loaded_25.wrapping_mul(3u32).wrapping_add(lane);
+        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
+        let loaded_24 = begin;
+        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
         loop {
             let _block = machine.block(line!(), 13);
-            let loaded_26 = part_2;
-            if !(loaded_26 < parts_end) {
+            let loaded_25 = part_2;
+            if !(loaded_25 < parts_end) {
                 break;
             }
+            let loaded_26 = part_2;
             let loaded_27 = part_2;
-            let loaded_28 = part_2;
-            let loaded_29 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_28) as usize));
+            let loaded_28 = machine
+                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_27) as usize));
             machine.store::<[M::F; 4]>(
                 Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_27) as usize),
-                loaded_29,
+                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize),
+                loaded_28,
             );
-            let loaded_30 = part_2;
-            part_2 = loaded_30.wrapping_add(lanes);
+            let loaded_29 = part_2;
+            part_2 = loaded_29.wrapping_add(lanes);
         }
+        let loaded_30 = end;
+        begin = loaded_30;
         let loaded_31 = end;
-        begin = loaded_31;
-        let loaded_32 = end;
-        end = loaded_32.wrapping_add(lanes);
-        let loaded_33 = iteration;
-        iteration = loaded_33.wrapping_add(1u32);
+        end = loaded_31.wrapping_add(lanes);
+        let loaded_32 = iteration;
+        iteration = loaded_32.wrapping_add(1u32);
     }
 }
 
@@ -4680,6 +4632,26 @@ pub(crate) fn parts_3_of_matrix3x4_2<M: Machine>(
             third
         },
     ]
+}
+
+/// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
+pub(crate) fn place_of<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    repetition: u32,
+) -> [u32; 3] {
+    let _block = machine.block(line!(), 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let steps = [loaded, loaded_2, loaded_3];
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let listed = [item.source, item.output.wrapping_add(loaded_4), item.key];
+    both(
+        listed,
+        both([repetition; 3], steps, |x, y| x.wrapping_mul(y)),
+        |x, y| x.wrapping_add(y),
+    )
 }
 
 /// The coefficients are those of 1, s, s², … s¹⁰. Neighbouring powers are added in pairs (Estrin's
@@ -5653,17 +5625,6 @@ pub(crate) fn segment_of_polynomial_segment<M: Machine>(
     result
 }
 
-/// The index of a run's segment, in a repetition.
-pub(crate) fn segment_of_run<M: Machine>(
-    machine: &M,
-    item: SpreadRun<M::F>,
-    repetition: u32,
-) -> u32 {
-    let _block = machine.block(line!(), 3);
-    let loaded = machine.load::<u32>(Global::Dispatch, 6);
-    item.source.wrapping_add(repetition.wrapping_mul(loaded))
-}
-
 /// Sine (x) and cosine (y).
 pub(crate) fn sine_cosine<M: Machine>(machine: &M, angle: M::F) -> [M::F; 2] {
     let _block = machine.block(line!(), 3);
@@ -6253,8 +6214,7 @@ pub(crate) fn store_of_f32_2<M: Machine>(machine: &M, index: u32, rotation: [M::
 pub(crate) fn store_with_care<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    first: u32,
-    count: u32,
+    place: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
@@ -6269,8 +6229,8 @@ pub(crate) fn store_with_care<M: Machine>(
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => store_with_care_of_alone(machine, item, first, count, first_j, lanes, repetition),
-        _ => store_with_care_of_alone_2(machine, item, first, count, first_j, lanes, repetition),
+        0 => store_with_care_of_alone(machine, item, place, first_j, lanes, repetition),
+        _ => store_with_care_of_alone_2(machine, item, place, first_j, lanes, repetition),
     }
 }
 
@@ -6278,14 +6238,15 @@ pub(crate) fn store_with_care<M: Machine>(
 pub(crate) fn store_with_care_of_alone<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    first: u32,
-    count: u32,
+    place: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
     let _block = machine.block(line!(), 12);
+    let count = sample_count(machine, item);
+    let first = place[1];
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
@@ -6311,15 +6272,14 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         }
         return;
     }
-    let result = segment_of_run(machine, item, repetition);
-    let segment = segment_at_arc_segment(machine, result);
+    let segment = segment_at_arc_segment(machine, place[0]);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);
         let loaded_8 = j;
         let loaded_9 = j;
-        let result_2 = sample_of_arc_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result_2);
+        let result = sample_of_arc_segment(machine, item, segment, loaded_9, repetition);
+        store(machine, first.wrapping_add(loaded_8), result);
     }
     let loaded_10 = j;
     j = loaded_10.wrapping_add(lanes);
@@ -6331,8 +6291,8 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         }
         let loaded_12 = j;
         let loaded_13 = j;
-        let result_3 = sample_of_arc_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_3);
+        let result_2 = sample_of_arc_segment(machine, item, segment, loaded_13, repetition);
+        store(machine, first.wrapping_add(loaded_12), result_2);
         let loaded_14 = j;
         j = loaded_14.wrapping_add(lanes);
     }
@@ -6342,14 +6302,15 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
 pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    first: u32,
-    count: u32,
+    place: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
     let _block = machine.block(line!(), 12);
+    let count = sample_count(machine, item);
+    let first = place[1];
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
@@ -6375,15 +6336,14 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         }
         return;
     }
-    let result = segment_of_run(machine, item, repetition);
-    let segment = segment_at_polynomial_segment(machine, result);
+    let segment = segment_at_polynomial_segment(machine, place[0]);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);
         let loaded_8 = j;
         let loaded_9 = j;
-        let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result_2);
+        let result = sample_of_polynomial_segment(machine, item, segment, loaded_9, repetition);
+        store(machine, first.wrapping_add(loaded_8), result);
     }
     let loaded_10 = j;
     j = loaded_10.wrapping_add(lanes);
@@ -6395,8 +6355,8 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         }
         let loaded_12 = j;
         let loaded_13 = j;
-        let result_3 = sample_of_polynomial_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_3);
+        let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_13, repetition);
+        store(machine, first.wrapping_add(loaded_12), result_2);
         let loaded_14 = j;
         j = loaded_14.wrapping_add(lanes);
     }

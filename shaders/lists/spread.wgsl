@@ -57,14 +57,11 @@ const NO_KEY: u32 = 0xffffffff;
 
 var<immediate> dispatch: Spread;
 
-// Where the first sample of a run is stored, in a repetition.
-fn first_of_run(item: SpreadRun, repetition: u32) -> u32 {
-    return item.output + dispatch.first_output + repetition * dispatch.outputs;
-}
-
-// The index of a run's segment, in a repetition.
-fn segment_of_run(item: SpreadRun, repetition: u32) -> u32 {
-    return item.source + repetition * dispatch.segments;
+// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
+fn place_of(item: SpreadRun, repetition: u32) -> vec3u {
+    let steps = vec3u(dispatch.segments, dispatch.outputs, dispatch.constants);
+    let listed = vec3u(item.source, item.output + dispatch.first_output, item.key);
+    return listed + repetition * steps;
 }
 
 // A constant of a run, in a repetition.

@@ -10,44 +10,50 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) invocation: u32,
 ) {
-    let lanes = 1u << dispatch.lanes_log2;
+    let lanes_log2 = dispatch.lanes_log2;
+    let lanes = 1u << lanes_log2;
     let workgroup = group.y * groups.x + group.x;
-    let index = (workgroup * SPREAD_WORKGROUP + invocation) >> dispatch.lanes_log2;
+    let index = (workgroup * SPREAD_WORKGROUP + invocation) >> lanes_log2;
     if index >= dispatch.item_count {
         return;
     }
     let item = item_at(dispatch.first_item + index);
-    let count = sample_count(item);
-    let first = first_of_run(item, group.z);
+    let place = place_of(item, group.z);
+    let first = place.y;
     // The first iteration begins where the line of the first sample does. What lies before that sample wraps to a
     // large number.
     let idle = first & dispatch.line_mask;
-    var j = (invocation & (lanes - 1u)) - idle;
-    if item.count != count {
-        store_with_care(item, first, count, j, lanes, group.z);
+    let first_j = (invocation & (lanes - 1u)) - idle;
+    if item.count >= NEEDS_CARE {
+        store_with_care(item, place, first_j, lanes, group.z);
         return;
     }
-    let segment = segment_at(segment_of_run(item, group.z));
+    // No bits are set in it.
+    let count = item.count;
+    let segment = segment_at(place.x);
     let constant = constant_of(segment);
-    if j < count {
-        var rotation = evaluate_near(item, segment, constant, j);
-        if (j == 0u) & (item.key != NO_KEY) {
-            rotation = constant_of_run(item.key, group.z);
+    if first_j < count {
+        var rotation = evaluate_near(item, segment, constant, first_j);
+        if (first_j == 0u) & (item.key != NO_KEY) {
+            rotation = constant_at(place.z);
         }
-        store(first + j, rotation);
+        store(first + first_j, rotation);
     }
-    j += lanes;
+    var j = first_j + lanes;
     // Iterations in which every lane has a sample, two at a time.
     let end = count + idle;
-    var pair_end = 3u * lanes;
-    if pair_end <= end {
+    let first_pair_end = 3u * lanes;
+    if first_pair_end <= end {
+        let pair = 2u * lanes;
+        var pair_end = first_pair_end;
         loop {
+            let next_j = j + lanes;
             let rotation = evaluate_near(item, segment, constant, j);
-            let next = evaluate_near(item, segment, constant, j + lanes);
+            let next = evaluate_near(item, segment, constant, next_j);
             store(first + j, rotation);
-            store(first + j + lanes, next);
-            j += 2u * lanes;
-            pair_end += 2u * lanes;
+            store(first + next_j, next);
+            j = next_j + lanes;
+            pair_end += pair;
             continuing {
                 break if pair_end > end;
             }
@@ -72,12 +78,13 @@ fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> ve
 // A constant, or a run whose samples are not all simple, which is rare.
 fn store_with_care(
     item: SpreadRun,
-    first: u32,
-    count: u32,
+    place: vec3u,
     first_j: u32,
     lanes: u32,
     repetition: u32,
 ) {
+    let count = sample_count(item);
+    let first = place.y;
     var j = first_j;
     if (item.count & IS_CONSTANT) != 0u {
         let constant = constant_of_run(item.source, repetition);
@@ -89,7 +96,7 @@ fn store_with_care(
         }
         return;
     }
-    let segment = segment_at(segment_of_run(item, repetition));
+    let segment = segment_at(place.x);
     if j < count {
         store(first + j, sample_of(item, segment, j, repetition));
     }

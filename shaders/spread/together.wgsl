@@ -26,10 +26,10 @@ fn main(
         item = item_at(dispatch.first_item + index);
     }
     // Constants have no segment; the first one exists in any case.
-    let index_of_segment = segment_of_run(item, group.z);
-    let segment = segment_at(select(index_of_segment, 0u, (item.count & IS_CONSTANT) != 0u));
+    let place = place_of(item, group.z);
+    let segment = segment_at(select(place.x, 0u, (item.count & IS_CONSTANT) != 0u));
     let count = sample_count(item);
-    let first = first_of_run(item, group.z);
+    let first = place.y;
     let idle = first & dispatch.line_mask;
     let lane = invocation & (lanes - 1u);
     // The samples of an iteration: the first iteration begins where the line of the first sample does.

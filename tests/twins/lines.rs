@@ -676,10 +676,10 @@ fn even(tracks: usize, step: usize) -> (TrackSet, SampleTimes) {
 #[test]
 fn a_wave_executes_few_operations_for_a_rotation() {
     for (step, counted) in [
-        (8, [101.8, 116.2]),
-        (16, [71.7, 79.4]),
-        (48, [62.8, 68.8]),
-        (192, [53.2, 57.1]),
+        (8, [93.2, 107.4]),
+        (16, [66.5, 74.2]),
+        (48, [58.5, 64.5]),
+        (192, [49.9, 53.8]),
     ] {
         for (method, counted) in [SLERP, BESSEL_OVERHAUSER].into_iter().zip(counted) {
             let (set, frames) = even(40, step);

@@ -14,7 +14,7 @@ use crate::machine::error::VulkanError;
 use crate::machine::options::RunLanes;
 use crate::output::encoding::Encoding;
 use crate::shader::{Form, IS_CONSTANT, Kernel, NO_KEY, Spread, SpreadRun, Variants};
-use crate::verify::lab::rules::{self, ROW, Timed};
+use crate::verify::lab::rules::{self, Timed};
 use crate::verify::lab::variant::{KernelVariant, LabKernel, RunList};
 use crate::verify::lab::{
     Ceiling, Decision, LabOptions, LabReport, LabRow, RejectedVariant, VariantTime,
@@ -23,9 +23,33 @@ use crate::work::lists::WorkChunk;
 use crate::work::lists::spread::{NO_RUN, RunRepetitions, SpreadLanes};
 use crate::work::recording::Users;
 
-/// Samples of a measured dispatch: 4096 tracks of 1200 frames, or fewer on software devices.
-const CARD_SAMPLES: u32 = 4096 * 1200;
-const SOFTWARE_SAMPLES: u32 = 1 << 14;
+/// How much is measured.
+struct Effort {
+    /// Samples of a dispatch.
+    samples: u32,
+    /// Dispatches of a row.
+    dispatches: u32,
+    /// Rows whose median is a time in the last measurements.
+    rows: u32,
+    /// What the ceiling of empty workgroups is called, and their number.
+    workgroups: (&'static str, u32),
+}
+
+/// 4096 tracks of 1200 frames. What [`rules`] decide was written for such rows.
+const OF_CARDS: Effort = Effort {
+    samples: 4096 * TRACK_SAMPLES,
+    dispatches: 32,
+    rows: 5,
+    workgroups: ("32 768 workgroups that end at once", 1 << 15),
+};
+
+/// On software devices the times decide nothing; everything is measured there to see that the lab comes to its end.
+const OF_SOFTWARE: Effort = Effort {
+    samples: 2 * LISTED_TRACKS * TRACK_SAMPLES,
+    dispatches: 2,
+    rows: 1,
+    workgroups: ("64 workgroups that end at once", 64),
+};
 
 /// The runs that are measured, the most typical first: samples, and whether each begins with a key.
 const RUNS: [(u32, bool); 7] = [
@@ -75,7 +99,7 @@ struct Bench<'a> {
     submission: Submission,
     deadline: Instant,
     is_software: bool,
-    samples: u32,
+    effort: Effort,
     pipelines: Vec<MadePipeline>,
     report: LabReport,
 }
@@ -118,10 +142,9 @@ pub(super) fn run(engine: &VulkanEngine, options: &LabOptions) -> Result<LabRepo
         submission: Submission::new(&engine.device, QueueLane::Kernels)?,
         deadline: Instant::now() + options.budget,
         is_software,
-        samples: if is_software {
-            SOFTWARE_SAMPLES
-        } else {
-            CARD_SAMPLES
+        effort: match is_software {
+            true => OF_SOFTWARE,
+            false => OF_CARDS,
         },
         pipelines: Vec::new(),
         report: LabReport {
@@ -129,6 +152,7 @@ pub(super) fn run(engine: &VulkanEngine, options: &LabOptions) -> Result<LabRepo
             words_compared: 0,
             rejected: Vec::new(),
             samples: 0,
+            row: 0,
             ceilings: Vec::new(),
             rows: Vec::new(),
             decisions: Vec::new(),
@@ -138,7 +162,8 @@ pub(super) fn run(engine: &VulkanEngine, options: &LabOptions) -> Result<LabRepo
     };
     bench.compare()?;
     if !options.bits_only && engine.device.physical.timestamp_bits() > 0 {
-        bench.report.samples = bench.samples;
+        bench.report.samples = bench.effort.samples;
+        bench.report.row = bench.effort.dispatches;
         bench.measure()?;
     }
     Ok(bench.report)
@@ -149,10 +174,15 @@ impl Bench<'_> {
         Instant::now() > self.deadline
     }
 
+    /// The variants of a kernel. Software devices take a tenth of a second for a pipeline: they have as few as have all
+    /// workgroups and both kinds of stores, and those that the rules compare.
     fn variants(&self, kernel: LabKernel, lanes: u32) -> Vec<KernelVariant> {
         let physical = &self.engine.device.physical;
         let largest = physical.info.max_compute_work_group_invocations;
-        kernel.variants(lanes, physical.converts_halves, largest)
+        let mut all = kernel.variants(lanes, physical.converts_halves, largest);
+        let cached = all[0].cached();
+        all.retain(|variant| !self.is_software || variant.is_typical() || *variant == cached);
+        all
     }
 
     fn pipeline(
@@ -175,8 +205,7 @@ impl Bench<'_> {
         Ok(made)
     }
 
-    /// Compares every variant of every kernel with the kernel's twin, word for word. Software devices take a tenth of a
-    /// second for a pipeline: of each kernel they compare as few as have all workgroups and both kinds of stores.
+    /// Compares every variant of every kernel with the kernel's twin, word for word.
     fn compare(&mut self) -> Result<(), VulkanError> {
         for lab_kernel in LabKernel::all() {
             let LabKernel { form, encoding } = lab_kernel;
@@ -191,9 +220,6 @@ impl Bench<'_> {
             let [each, shared] = [RunList::EachTrack, RunList::Shared]
                 .map(|list| trial(SpreadLanes::new(3), list).expected(kernel));
             for variant in self.variants(lab_kernel, 8) {
-                if self.is_software && !variant.is_typical() {
-                    continue;
-                }
                 let pipeline = self.pipeline(kernel, variant)?;
                 let expected = match variant.list {
                     RunList::EachTrack => each.clone(),
@@ -229,7 +255,7 @@ impl Bench<'_> {
             let work = &mut self.submission.work;
             let bindings = dispatch.buffers.map(|buffer| work.whole(buffer).into());
             let set = work.recording.set(dispatch.pipeline.kernel, bindings);
-            for _ in 0..ROW {
+            for _ in 0..self.effort.dispatches {
                 work.recording
                     .dispatch(set, &dispatch.push, dispatch.groups);
                 if let Some([from, to]) = barrier {
@@ -246,7 +272,7 @@ impl Bench<'_> {
     fn submitted(&mut self) -> Result<f64, VulkanError> {
         let spent = self.submission.run()?;
         let seconds = spent.map_or(0.0, |spent| spent.on_device.as_secs_f64());
-        Ok(seconds * 1e6 / f64::from(ROW))
+        Ok(seconds * 1e6 / f64::from(self.effort.dispatches))
     }
 
     /// As [`Bench::row`], twice, after a row that is ignored.
@@ -255,10 +281,10 @@ impl Bench<'_> {
         dispatch: RowDispatch<'_>,
         barrier: Option<[Users; 2]>,
     ) -> Result<Timed, VulkanError> {
-        const ROWS: u32 = 5;
+        let rows = self.effort.rows;
         self.row(dispatch, barrier, 1)?;
-        let one = self.row(dispatch, barrier, ROWS)?;
-        Ok(Timed::new(one, self.row(dispatch, barrier, ROWS)?))
+        let one = self.row(dispatch, barrier, rows)?;
+        Ok(Timed::new(one, self.row(dispatch, barrier, rows)?))
     }
 
     /// The time of filling so many bytes, in a row with a barrier between any commands, or none.
@@ -271,7 +297,7 @@ impl Bench<'_> {
         let mut times = [0.0; 3];
         for time in &mut times {
             self.submission.begin()?;
-            for _ in 0..ROW {
+            for _ in 0..self.effort.dispatches {
                 let commands = self.submission.commands();
                 if has_barriers {
                     commands.barrier(Users::Any, Users::Any);
@@ -305,12 +331,16 @@ impl Bench<'_> {
     ) -> Result<ListedRuns, VulkanError> {
         let runs_of_track = TRACK_SAMPLES.div_ceil(count);
         let (track, listed, repetitions) = match list {
-            RunList::EachTrack => (self.samples, self.samples, RunRepetitions::ONE),
+            RunList::EachTrack => (
+                self.effort.samples,
+                self.effort.samples,
+                RunRepetitions::ONE,
+            ),
             RunList::Shared => (
                 TRACK_SAMPLES,
                 TRACK_SAMPLES * LISTED_TRACKS,
                 RunRepetitions {
-                    count: self.samples / TRACK_SAMPLES / LISTED_TRACKS,
+                    count: self.effort.samples / TRACK_SAMPLES / LISTED_TRACKS,
                     segments: runs_of_track * LISTED_TRACKS,
                     constants: 0,
                     outputs: TRACK_SAMPLES * LISTED_TRACKS,
@@ -320,7 +350,7 @@ impl Bench<'_> {
         let mut chunk = WorkChunk::default();
         let mut output = 0;
         while output < listed {
-            let source = chunk.runs.len() as u32 % SEGMENTS.min(self.samples / 4);
+            let source = chunk.runs.len() as u32 % SEGMENTS.min(self.effort.samples / 4);
             let count = count.min(track - output % track);
             chunk.runs.push(SpreadRun {
                 source: if run.count & IS_CONSTANT != 0 {
@@ -347,18 +377,18 @@ impl Bench<'_> {
 
     /// Whether the segments are enough for runs of so many samples in a list of a kind.
     fn has_segments(&self, run: u32, list: RunList) -> bool {
-        let tracks = u64::from(self.samples / TRACK_SAMPLES);
+        let tracks = u64::from(self.effort.samples / TRACK_SAMPLES);
         let needed = tracks * u64::from(TRACK_SAMPLES.div_ceil(run));
-        list == RunList::EachTrack || needed <= u64::from(SEGMENTS.min(self.samples / 4))
+        list == RunList::EachTrack || needed <= u64::from(SEGMENTS.min(self.effort.samples / 4))
     }
 
     fn measure(&mut self) -> Result<(), VulkanError> {
         let largest = (Encoding::ALL.into_iter().map(Encoding::bytes).max()).unwrap_or_default();
-        let results = self.results(u64::from(self.samples) * largest as u64)?;
+        let results = self.results(u64::from(self.effort.samples) * largest as u64)?;
         let constants = self.resident(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
         let fill = self.ceilings(&results, &constants)?;
         let segments = [Form::Arc, Form::Polynomial]
-            .map(|form| rotations(form, SEGMENTS.min(self.samples / 4) as usize));
+            .map(|form| rotations(form, SEGMENTS.min(self.effort.samples / 4) as usize));
         let [arcs, polynomials] = segments;
         let of_forms = [self.resident(&arcs)?, self.resident(&polynomials)?];
         // Of each class of runs the lanes, with their times as shares of today's for each kernel.
@@ -477,7 +507,7 @@ impl Bench<'_> {
             kernel: prepared[0].0.name,
             run,
             has_keys,
-            bytes: u64::from(self.samples) * lab_kernel.encoding.bytes() as u64,
+            bytes: u64::from(self.effort.samples) * lab_kernel.encoding.bytes() as u64,
             today,
             winner,
             share_of_filling: 0.0,
@@ -490,7 +520,7 @@ impl Bench<'_> {
     fn ceilings(&mut self, results: &Buffer, constants: &Buffer) -> Result<f64, VulkanError> {
         let mut found = Vec::new();
         let mut add = |name, time, bytes| found.push(Ceiling { name, time, bytes });
-        let bytes = u64::from(self.samples) * 16;
+        let bytes = u64::from(self.effort.samples) * 16;
         let more = (bytes / 10 * 34).min(results.size) / 16 * 16;
         for (name, bytes, has_barriers) in [
             ("fill", bytes, false),
@@ -546,10 +576,7 @@ impl Bench<'_> {
         for (name, barrier) in BARRIERS {
             add(name, self.twice(nothing, Some(barrier))?, None);
         }
-        let (name, workgroups) = match self.is_software {
-            true => ("64 workgroups that end at once", 64),
-            false => ("32 768 workgroups that end at once", 1 << 15),
-        };
+        let (name, workgroups) = self.effort.workgroups;
         let many = RowDispatch {
             groups: [workgroups, 1, 1],
             ..nothing

@@ -36,6 +36,8 @@ pub struct LabReport {
     pub rejected: Vec<RejectedVariant>,
     /// The samples of each measured dispatch.
     pub samples: u32,
+    /// The dispatches of a row, which are timed together; 0 if nothing was timed.
+    pub row: u32,
     /// Rates that no kernel exceeds. Empty if nothing was timed.
     pub ceilings: Vec<Ceiling>,
     /// Each kernel over runs of each length.

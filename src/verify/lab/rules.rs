@@ -1,9 +1,6 @@
 //! How the lab decides: functions of measured times, in microseconds, which a test calls with made-up ones. They were
 //! written before a card was measured, so that nothing is chosen by looking at results.
 
-/// The number of dispatches of a row, which are timed together.
-pub(super) const ROW: u32 = 32;
-
 /// How much shorter a time must be than another's beyond what two measurements of the same differ.
 const MARGIN: f64 = 0.02;
 

@@ -30,7 +30,7 @@ pub(super) fn page(device: &str, seconds: f64, lab: &LabReport) -> String {
     }
     if !lab.ceilings.is_empty() {
         let samples = grouped(u64::from(lab.samples));
-        lines.push(format!("ceilings, rows of 32, {samples} samples"));
+        lines.push(format!("ceilings, rows of {}, {samples} samples", lab.row));
     }
     for ceiling in &lab.ceilings {
         let time = ceiling.time.best();
@@ -185,6 +185,7 @@ mod tests {
             words_compared: 1_234_567,
             rejected: vec![rejected; 9],
             samples: 4_915_200,
+            row: 32,
             ceilings: vec![ceiling; 14],
             rows: [48, 16]
                 .into_iter()
