@@ -37,6 +37,7 @@ const ARGUMENTS: &str = "
 4 | eval a.dat -o o.npy --ends loop              | equals the first
 2 | eval a.dat -o o.npy --memory 5parsecs        | 256MiB
 2 | eval a.dat -o o.txt                          | .npy, .parquet
+2 | eval a.dat -o z.glb --to npy                | its name is one of glb, and --format says npy
 2 | eval a.dat --output velocity                | --quantity velocity
 2 | eval a.dat -o world                         | for a directory of this name give -o ./world
 2 | eval a.dat -o a.dat --format npy --overwrite | is the input

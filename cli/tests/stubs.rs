@@ -57,7 +57,7 @@ fn options() -> Vec<(&'static str, Vec<&'static str>)> {
         ("_UpAxis", names!(UpAxis)),
         ("_Values", names!(CrowdValues)),
         ("_VectorMethod", names!(VectorMethod)),
-        ("_Way", names!(KeySigns)),
+        ("_KeySigns", names!(KeySigns)),
     ]
 }
 
@@ -89,7 +89,7 @@ fn the_names_in_pythons_stubs_are_those_of_the_engine() {
 fn type_of(option: &InterpolationOption) -> &'static str {
     match option.name {
         _ if option.is_number => "float",
-        "path" => "_Way",
+        "path" => "_KeySigns",
         "ends" => "_Ends",
         "speed" => "_Speed",
         "before" | "after" => "_Outside",

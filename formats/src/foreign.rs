@@ -25,7 +25,7 @@ macro_rules! of_markers {
 }
 
 /// The first row whose signature or extension fits.
-const ALL: [Foreign; 22] = [
+const ALL: [Foreign; 25] = [
     Foreign {
         extensions: &["gz"],
         begins: &[b"\x1f\x8b"],
@@ -132,6 +132,23 @@ const ALL: [Foreign; 22] = [
         description: "Acclaim motion capture; convert it to BVH first",
     },
     Foreign {
+        extensions: &[
+            "gif", "png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff", "svg",
+        ],
+        begins: &[b"GIF8", b"\x89PNG", b"\xff\xd8\xff"],
+        description: "a picture, which has no keyframes",
+    },
+    Foreign {
+        extensions: &["mp4", "mov", "avi", "mkv", "webm"],
+        begins: &[b"\x1aE\xdf\xa3", b"RIFF"],
+        description: "a film, which has no keyframes; programs that estimate poses from films write NPZ or pickles, which are read",
+    },
+    Foreign {
+        extensions: &["md", "rst", "html", "htm", "pdf", "toml", "yaml", "yml"],
+        begins: &[b"%PDF", b"<!DOCTYPE"],
+        description: "a document, which has no keyframes",
+    },
+    Foreign {
         extensions: &["blend", "ma", "mb", "max", "c4d"],
         begins: &[b"BLENDER"],
         description: "a scene of a 3D program; export its animation as GLB, FBX or BVH",
@@ -219,6 +236,9 @@ mod tests {
             ("x.usda", b"#usda 1.0\n", "OpenUSD", "GLB"),
             ("x.usd", b"PXR-USDC\0", "OpenUSD", "GLB"),
             ("x.vrma", b"\0\0\0\0", "VRM", "export it again"),
+            ("x.gif", b"GIF89a\xc9\0", "a picture", "no keyframes"),
+            ("x.mp4", b"\0\0\0\x20ftypisom", "a film", "estimate poses"),
+            ("README.md", b"# Tumble\n", "a document", "no keyframes"),
         ] {
             let options = crate::ReadOptions::default();
             let read = crate::Format::read_detected(name, bytes.to_vec(), &options);

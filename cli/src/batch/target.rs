@@ -35,6 +35,18 @@ pub(crate) fn choose(
     } else {
         of(path)
     };
+    if let (Some(format), Some(named)) = (format, named)
+        && format.name != named.name
+        && !(format.is_text && named.is_text)
+        && !names::is_standard(path)
+    {
+        return Err(Failure::usage(format!(
+            "{}: its name is one of {}, and --format says {}; give another name, or leave out --format",
+            path.display(),
+            named.name,
+            format.name
+        )));
+    }
     format.or(named).ok_or_else(|| {
         let (path, extensions) = (path.display(), extensions(|name| format!(".{name}")));
         let extensions = extensions.join(", ");
