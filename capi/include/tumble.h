@@ -1302,7 +1302,8 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
  # Safety
  `bytes` must point to memory for a number.
  */
-TumbleResult tumble_clip_bytes_per_key(const struct TumbleClip *clip, double *bytes);
+TumbleResult tumble_clip_bytes_per_key(const struct TumbleClip *clip,
+                                       double *bytes);
 
 /*
  Returns the number of samples of each track of a clip. A result of `tumble_clip_evaluate` has 4 × tracks × samples

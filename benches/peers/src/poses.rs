@@ -56,7 +56,7 @@ pub fn contestants() -> Vec<Contestant<'static>> {
             work,
             threads: "1",
             bytes_per_key: Some(clip.bytes_per_key()),
-            fill: Box::new(move |output| {
+            fill: Box::new(move |output: &mut [Quat]| {
                 for call in 0..CALLS {
                     let done = sampler.pose(time_of(call), &mut output[..TRACKS]);
                     done.expect("what fits");
