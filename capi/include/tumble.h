@@ -1121,8 +1121,8 @@ TumbleResult tumble_set_time_span(const struct TumbleSet *set,
 TumbleResult tumble_set_free(struct TumbleSet *set);
 
 /*
- Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, pickles, Parquet, Arrow, CSV, TUM, `EuRoC`, KITTI, MCAP or
- `.dat`.
+ Reads a motion file: glTF and GLB, BVH, FBX, NPZ and NPY, pickles, Parquet, Arrow, CSV, JSON of robots, TUM, `EuRoC`,
+ KITTI, MCAP or `.dat`.
 
  The format is recognised by the first bytes of the file, otherwise by the extension of its name. `path` is UTF-8;
  on Unix it may have any bytes. If some clips of the file are invalid, the others are read, and the messages of the

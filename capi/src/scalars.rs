@@ -121,7 +121,7 @@ pub unsafe extern "C" fn tumble_scalars_evaluate(
         }
         // SAFETY: as the caller promises.
         let output = unsafe { list_mut(output, output_count, "output")? };
-        let method = how.method.vector_method;
+        let method = how.method.scalar_method();
         let found = (engine.inner).scalars(&set, quantity, method, how, &frames, layout)?;
         output.copy_from_slice(found.as_slice());
         Ok(())

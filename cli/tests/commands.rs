@@ -30,9 +30,17 @@ pub(crate) fn has(command: &Command, option: &str) -> bool {
     options.any(|argument| argument.get_id() == option)
 }
 
-/// The commands that make a result of each motion file, with a manifest for many.
+/// The commands that make a result of each motion file, with a manifest for many, and need nothing else.
 pub(crate) fn writing_results() -> Vec<String> {
-    let all = commands().into_iter();
+    let needs_more = |command: &Command| {
+        let mut required = command
+            .get_arguments()
+            .filter(|argument| argument.is_required_set());
+        required.any(|argument| argument.get_long().is_some())
+    };
+    let all = commands()
+        .into_iter()
+        .filter(|command| !needs_more(command));
     let writing = all.filter(|command| has(command, "files_from") && has(command, "resume"));
     let names: Vec<String> = writing
         .map(|command| command.get_name().to_owned())

@@ -382,6 +382,165 @@ fn options_without_effect_are_refused() {
     assert_eq!(files, 2, "nothing is written");
 }
 
+/// Limits without a dialect: of clips, and of joints alone, whose velocities are 0 where they are kept inside.
+#[test]
+fn limits_hold_in_every_result() {
+    let folder = folder();
+    let folder = folder.path();
+    let eval = "eval take.csv --fps 60 -m slerp --robot robot.xml";
+    for (result, of) in [
+        ("clip.npz", ""),
+        ("joints.npy", "--output scalars"),
+        ("rates.npy", "--output scalar-velocities"),
+    ] {
+        let reported = line(folder, &format!("{eval} {of} -o report_{result}"));
+        assert!(
+            reported.words.contains("W904") && reported.words.contains("left_shoulder"),
+            "{}",
+            reported.words
+        );
+        line(folder, &format!("{eval} {of} --limits clamp -o {result}"));
+        refused(
+            folder,
+            &format!("{eval} {of} --limits refuse -o no_{result}"),
+            "E919",
+        );
+        assert!(!folder.join(format!("no_{result}")).exists());
+    }
+    let numbers = |file: &str| {
+        let bytes = fs::read(folder.join(file)).unwrap();
+        tumble_formats::npy::read_numbers(file, &bytes, |_| Ok(()))
+            .unwrap()
+            .values
+    };
+    let [before, after] = ["report_joints.npy", "joints.npy"].map(numbers);
+    let [rates_before, rates_after] = ["report_rates.npy", "rates.npy"].map(numbers);
+    let mut clamped = 0;
+    for (index, (before, after)) in before.iter().zip(&after).enumerate() {
+        let is_outside = index % 4 == 0 && *before > 0.25;
+        assert_eq!(*after, if is_outside { 0.25 } else { *before });
+        assert_eq!(
+            rates_after[index],
+            if is_outside { 0.0 } else { rates_before[index] }
+        );
+        clamped += usize::from(is_outside);
+    }
+    assert!(clamped > 5, "{clamped}");
+    assert!(
+        arrays(&folder.join("clip.npz"))["scalars"]
+            .iter()
+            .take(61)
+            .all(|value| *value <= 0.25)
+    );
+    refused(
+        folder,
+        "convert take.csv --robot robot.xml --limits clamp -o x.npz",
+        "tumble eval",
+    );
+    refused(
+        folder,
+        "eval take.csv --limits clamp --fps 60 -o x.npz",
+        "--robot",
+    );
+}
+
+/// A robot in several files: results are made again where an included one has changed.
+#[test]
+fn included_files_belong_to_the_robot() {
+    let folder = folder();
+    let folder = folder.path();
+    let (start, end) = (
+        ROBOT.find("<worldbody>").unwrap(),
+        ROBOT.find("</mujoco>").unwrap(),
+    );
+    let body = format!("<mujoco>{}</mujoco>", &ROBOT[start..end]);
+    fs::write(folder.join("body.xml"), &body).unwrap();
+    let main = format!("{}<include file=\"body.xml\"/></mujoco>", &ROBOT[..start]);
+    fs::write(folder.join("robot.xml"), main).unwrap();
+    fs::create_dir(folder.join("takes")).unwrap();
+    fs::copy(folder.join("take.csv"), folder.join("takes/a.csv")).unwrap();
+    let eval = "eval takes -o out --fps 50 --robot robot.xml --dialect mjlab --resume";
+    line(folder, eval);
+    let first = fs::read(folder.join("out/a.npz")).unwrap();
+    fs::write(
+        folder.join("body.xml"),
+        body.replace("0 0.2 0.3", "0 0.25 0.3"),
+    )
+    .unwrap();
+    line(folder, eval);
+    assert_ne!(fs::read(folder.join("out/a.npz")).unwrap(), first);
+}
+
+/// The commands of the guides about robots, features and other skeletons do what they say.
+#[test]
+fn commands_of_the_guides_run() {
+    let folder = folder();
+    let folder = folder.path();
+    for name in ["arm.xml", "g1.xml"] {
+        fs::write(folder.join(name), ROBOT).unwrap();
+    }
+    line(
+        folder,
+        "convert take.csv --robot robot.xml --dialect gmr -o walk.pkl",
+    );
+    let human = crate::retarget::human(|role| role);
+    for name in ["walk.bvh", "take.bvh"] {
+        fs::write(folder.join(name), &human).unwrap();
+    }
+    line(folder, "convert take.bvh -o character.glb");
+    fs::write(
+        folder.join("bones.json"),
+        r#"{"hips": "hips", "spine": "spine", "head": "head"}"#,
+    )
+    .unwrap();
+    fs::write(folder.join("log.csv"), "time,knee_deg\n0,10\n1,20\n").unwrap();
+    let mut log = zip::ZipWriter::new(fs::File::create(folder.join("log.npz")).unwrap());
+    for (name, shape, count) in [("t", "(2,)", 2), ("joint_pos", "(2, 7)", 14)] {
+        let numbers: Vec<f64> = (0..count).map(f64::from).collect();
+        log.start_file(
+            format!("{name}.npy"),
+            zip::write::SimpleFileOptions::default(),
+        )
+        .unwrap();
+        std::io::Write::write_all(&mut log, &crate::features::npy(shape, &numbers)).unwrap();
+    }
+    log.finish().unwrap();
+    let mut count = 0;
+    for (guide, takes) in [
+        ("robots", "take.csv"),
+        ("features", "take.csv"),
+        ("retarget", "take.bvh"),
+    ] {
+        let _ = fs::remove_dir_all(folder.join("takes"));
+        fs::create_dir(folder.join("takes")).unwrap();
+        fs::copy(folder.join(takes), folder.join("takes").join(takes)).unwrap();
+        let text =
+            fs::read_to_string(crate::program::root().join(format!("docs/{guide}.md"))).unwrap();
+        // Models of bodies are not free.
+        let commands = text
+            .lines()
+            .filter(|line| line.starts_with("tumble ") && !line.contains("amass"));
+        for words in commands {
+            let command = words.split(" # ").next().unwrap();
+            let command = command.replace('\'', "");
+            let _ = fs::remove_dir_all(folder.join("out"));
+            let parts: Vec<&str> = command.split_whitespace().skip(1).collect();
+            if let Some(out) = parts.iter().position(|part| *part == "-o") {
+                let made = folder.join(parts[out + 1]);
+                // An input of the same name was made by a command before.
+                if made.is_file() && !parts[..out].contains(&parts[out + 1]) {
+                    fs::remove_file(made).unwrap();
+                }
+            }
+            let _ = fs::remove_file(folder.join("pairs.json"));
+            let run = run(folder, &parts);
+            assert_eq!(run.code, 0, "docs/{guide}.md: {words}: {}", run.words);
+            count += 1;
+        }
+    }
+    assert!(count >= 15, "{count}");
+}
+
 /// The joints alone, as numbers: an array (frames, joints), and columns with their names.
 #[test]
 fn scalars_are_evaluated_alone() {

@@ -291,6 +291,7 @@ codes! {
     PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
+    NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body that their names mean, and these names are not those of a known kind of skeleton, or hang on each other in another way. `--bones` pairs joints by their names.";
     Dialect = "E918" elsewhere, "a motion that a dialect cannot hold", "The layout of another program has no room for it: it has a number for each hinge and slide, one root, and frames of one rate. The message says what is too much.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
@@ -358,6 +359,7 @@ codes! {
     RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
     UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as of a robot that stands where w is first. The columns have no names that say it; `--source-order` does.";
+    TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On another skeleton, joints are as far from their parents as it has them; only the hips move. The source's other joints move too, by at most what the message says.";
     InertObjects = "W911", "objects of classes that are not read", "They are kept by the names of their classes alone; nothing is looked up or run. A value that the motion needs must not be one of them.";
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";

@@ -80,7 +80,7 @@ impl Feature {
 
     /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 14] = [
+    pub(crate) const OF_TABLES: [Self; 15] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -88,6 +88,7 @@ impl Feature {
         Self::Skeleton,
         Self::Translations,
         Self::Scales,
+        Self::Scalars,
         Self::Curves,
         Self::World,
         Self::SeveralClips,

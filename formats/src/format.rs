@@ -392,6 +392,23 @@ pub trait Document: fmt::Debug + Send + Sync {
         path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError>;
+
+    /// Writes the file with the keys of these clips instead of all of its animations. Their tracks move what the file calls
+    /// by the tracks' names. Returns warnings.
+    ///
+    /// # Errors
+    /// As [`Document::write`]; [`io::ErrorKind::Unsupported`] if the format has one clip, whose keys `write` replaces.
+    fn write_instead(
+        &self,
+        clips: &[&Motion],
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let _ = (clips, options, path, out);
+        let message = "only animations of glTF are replaced";
+        Err(io::Error::new(io::ErrorKind::Unsupported, message).into())
+    }
 }
 
 /// Writes sampled clips; returns warnings about data that is changed.

@@ -6,6 +6,7 @@ mod contacts;
 mod heading;
 mod humanml3d;
 mod mirror;
+mod sets;
 mod six;
 
 pub use contacts::{ContactLimits, contacts, majority};
@@ -14,6 +15,10 @@ pub use humanml3d::{
     HUMANML3D_JOINTS, HUMANML3D_NUMBERS, Humanml3dError, humanml3d, positions_of_humanml3d,
 };
 pub use mirror::{mirror_pairs, mirrored_point, mirrored_rotation};
+pub use sets::{
+    FeatureArray, FeatureError, FeatureRequest, FeatureSet, WorldFrames, feature_arrays,
+    write_features,
+};
 pub use six::{SixOrder, rotation_of_six, six};
 
 use glam::{DQuat, DVec3};

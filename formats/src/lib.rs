@@ -102,6 +102,7 @@ pub static FORMATS: &[&Format] = &[
     #[cfg(feature = "parquet")]
     &arrow::FORMAT,
     &csv::FORMAT,
+    &dialect::json::FORMAT,
     &tum::FORMAT,
     &euroc::FORMAT,
     &kitti::FORMAT,

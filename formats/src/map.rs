@@ -7,7 +7,9 @@
 //! - the form of a rotation: `:xyzw` or `:wxyz` for a quaternion, `:rotvec` for a rotation vector, `:matrix` for the
 //!   rows of a matrix, or the axes of Euler angles, `:ZXY` (rotating axes) or `:zxy` (fixed axes); `:deg` makes
 //!   rotation vectors and angles degrees;
-//! - the first axis of the array: `:track` or `:frame`.
+//! - the first axis of the array: `:track` or `:frame`;
+//! - `:scalar`, that the source has one number for each key, or several scalars: of which kind, `:angle` (`:deg` if in
+//!   degrees), `:length`, `:contact` or, by default, `:plain`.
 //!
 //! A bracket after a blank belongs to the name of the source: `time=#timestamp [ns]`.
 
@@ -16,6 +18,7 @@ use std::str::FromStr;
 
 use tumble::Layout;
 
+use crate::motion::ScalarKind;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
@@ -41,6 +44,10 @@ pub struct Entry {
     pub form: Option<RotationForm>,
     /// Whether tracks or frames are the first axis, if it is specified.
     pub layout: Option<Layout>,
+    /// The kind of scalar, if the source has scalars.
+    pub scalar: Option<ScalarKind>,
+    /// Whether the angles of scalars are in degrees.
+    pub is_scalar_in_degrees: bool,
 }
 
 /// Why a text is not a map.
@@ -66,7 +73,8 @@ pub enum MapError {
     /// A word after the source is neither a form of rotations nor a layout.
     #[error(
         "`{word}` in `{entry}` is neither a form of rotations (xyzw, wxyz, rotvec, matrix, axes such as ZXY, of \
-         which rotvec and axes take deg) nor a layout (track, frame)"
+         which rotvec and axes take deg) nor a layout (track, frame), nor scalar (scalar:angle, which takes deg, \
+         scalar:length, scalar:contact)"
     )]
     Word {
         /// Text of the entry.
@@ -92,6 +100,8 @@ impl Map {
             order: None,
             form: None,
             layout: None,
+            scalar: None,
+            is_scalar_in_degrees: false,
         };
         Self {
             entries: vec![entry],
@@ -153,6 +163,8 @@ impl FromStr for Entry {
             order: None,
             form: None,
             layout: None,
+            scalar: None,
+            is_scalar_in_degrees: false,
         };
         let mut degrees = false;
         let mut words = words.split(':');
@@ -166,8 +178,17 @@ impl FromStr for Entry {
             return Err(unknown(glued));
         }
         for word in words {
-            let is_free = parsed.order.is_none() && parsed.form.is_none();
-            match (word.trim(), is_free, parsed.layout) {
+            let word = word.trim();
+            if parsed.scalar == Some(ScalarKind::Plain)
+                && let Ok(kind) = word.parse()
+            {
+                parsed.scalar = Some(kind);
+                continue;
+            }
+            let has_form = parsed.order.is_some() || parsed.form.is_some();
+            let is_free = !has_form && parsed.scalar.is_none();
+            match (word, is_free, parsed.layout) {
+                ("scalar", true, _) => parsed.scalar = Some(ScalarKind::Plain),
                 ("xyzw", true, _) => parsed.order = Some(ComponentOrder::Xyzw),
                 ("wxyz", true, _) => parsed.order = Some(ComponentOrder::Wxyz),
                 ("rotvec", true, _) => parsed.form = Some(RotationForm::Vector { degrees }),
@@ -188,6 +209,9 @@ impl FromStr for Entry {
             ) => {
                 *unit = degrees;
             }
+            None if degrees && parsed.scalar == Some(ScalarKind::Angle) => {
+                parsed.is_scalar_in_degrees = true;
+            }
             _ if degrees => return Err(unknown("deg")),
             _ => {}
         }
@@ -196,6 +220,14 @@ impl FromStr for Entry {
 }
 
 impl Entry {
+    /// The names of the scalars that the source has: that of the entry, or, of several, `name_0`, `name_1` ….
+    pub(crate) fn scalar_names(&self, count: usize) -> impl Iterator<Item = String> + '_ {
+        (0..count).map(move |index| match count {
+            1 => self.name.clone(),
+            _ => format!("{}_{index}", self.name),
+        })
+    }
+
     /// The form of a rotation; a quaternion unless another form is specified.
     #[must_use]
     pub fn form(&self) -> RotationForm {

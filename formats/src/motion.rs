@@ -526,6 +526,21 @@ impl SampledClip<'_> {
         self.clip.origin(track) + self.translation(sample, track).as_dvec3()
     }
 
+    /// The value of a scalar at a sample.
+    pub(crate) fn scalar_value(&self, sample: usize, index: usize) -> f64 {
+        let all = self.clip.set.scalar_count();
+        let value = f64::from(self.scalars[sample * all + index]);
+        value + self.clip.scalar(index).origin
+    }
+
+    /// The value of a scalar as text, with every digit.
+    pub(crate) fn scalar_text(&self, sample: usize, index: usize) -> String {
+        match self.clip.scalar(index).origin == 0.0 {
+            true => (self.scalar_value(sample, index) as f32).to_string(),
+            false => self.scalar_value(sample, index).to_string(),
+        }
+    }
+
     /// The position of a track as text.
     pub(crate) fn coordinates(&self, sample: usize, track: usize) -> [String; 3] {
         let (origin, relative) = (self.clip.origin(track), self.translation(sample, track));

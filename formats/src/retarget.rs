@@ -8,11 +8,16 @@
 
 mod roles;
 
+use std::path::Path;
+
 use glam::{DMat3, DQuat, DVec3};
 use tumble::{TrackError, names};
 
 pub use roles::{Role, Roles, recognise};
 
+use crate::diagnostic::Diagnostic;
+use crate::format::{Format, Loaded, ReadOptions};
+use crate::gltf;
 use crate::learning::rotation_between;
 use crate::motion::keyed::{KeyedError, keyed};
 use crate::motion::world::{HierarchyError, parents_first};
@@ -25,6 +30,9 @@ pub struct RetargetOptions {
     pub bones: Vec<(String, String)>,
     /// How the rest poses are compared.
     pub rest: RestAlignment,
+    /// The key of the source whose pose counts as the source's rest pose, from 0; `None` for the skeleton's own. Takes of
+    /// motion capture often begin in a T-pose, and rest in another.
+    pub rest_frame: Option<usize>,
     /// The factor for the translations of the hips.
     pub scale: HipsScale,
     /// The rotation from the axes of the source to those of the target; `None` to find it from where hips, head and
@@ -82,6 +90,14 @@ pub struct RetargetReport {
     pub are_axes_assumed: bool,
     /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
     pub dropped_translation: f64,
+    /// The largest angle between the differences from rest of a joint and its partner, radians: that of rounding.
+    pub largest_difference: f64,
+    /// How far hands and feet come away from where the source's are, relative to the hips and to the height of the hips: by
+    /// the names of the target's joints. Empty where a skeleton is not recognised.
+    pub ends: Vec<(String, f64)>,
+    /// How far a foot of the target comes below the lowest joint at rest, in the target's unit; 0 where it does not, or
+    /// where the skeleton is not recognised.
+    pub below_ground: f64,
 }
 
 /// Why a motion cannot be carried over.
@@ -112,6 +128,14 @@ pub enum RetargetError {
         which: &'static str,
         /// The name.
         name: String,
+    },
+    /// There is no such key.
+    #[error("rest frame: there is no frame {frame}; the source has {count}, from 0")]
+    RestFrame {
+        /// The number of the key.
+        frame: usize,
+        /// How many keys the source has.
+        count: usize,
     },
     /// The scale is not a positive number.
     #[error("scale: {0} is not a number greater than 0")]
@@ -204,6 +228,25 @@ impl<'a> Rig<'a> {
     }
 }
 
+/// Reads the skeleton that motions are carried to: that of a glTF file, with or without animations, whose
+/// [`document`](Loaded::document) can be written with other animations; of any other file, that of its first clip.
+///
+/// # Errors
+/// When the file cannot be opened or is invalid, or has no skeleton.
+pub fn open_target(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let format = Format::detected(path);
+    if std::ptr::eq(format, &raw const gltf::FORMAT) {
+        return gltf::open_skeleton(path, options);
+    }
+    let mut loaded = format.open(path, options)?;
+    loaded.document = None;
+    loaded.clips.truncate(1);
+    match loaded.refused.pop().filter(|_| loaded.clips.is_empty()) {
+        Some(refused) => Err(refused),
+        None => Ok(loaded),
+    }
+}
+
 /// Carries the keys of `source` over to the skeleton of `target`; times, rate and names of the clip are the source's.
 /// Joints of the target without a partner rest.
 ///
@@ -214,8 +257,26 @@ pub fn retarget(
     target: &Motion,
     options: &RetargetOptions,
 ) -> Result<(Motion, RetargetReport), RetargetError> {
-    let from = Rig::new(source, "source")?;
+    let mut from = Rig::new(source, "source")?;
     let to = Rig::new(target, "target")?;
+    let samples = keyed(source)?;
+    let joints = from.names.len();
+    let local = |sample: usize, joint: usize| {
+        let index = sample * joints + joint;
+        let moved = samples.translations.get(index);
+        let position = moved.map_or_else(
+            || source.rest_position(joint),
+            |&moved| source.origin(joint) + moved.as_dvec3(),
+        );
+        (samples.rotations[index].as_dquat().normalize(), position)
+    };
+    if let Some(frame) = options.rest_frame {
+        let count = samples.times.len();
+        if frame >= count {
+            return Err(RetargetError::RestFrame { frame, count });
+        }
+        from.rest = from.world(|joint| local(frame, joint));
+    }
     let roles = [&from, &to].map(|rig| recognise(&rig.names, &rig.parents));
     let pairs = match &options.bones[..] {
         [] => Pairs::by_roles(&to, &roles)?,
@@ -235,27 +296,25 @@ pub fn retarget(
         HipsScale::Hips => pairs.height_ratio(&from, &to, axes),
         HipsScale::Legs => Pairs::leg_ratio(&from, &to, [from_roles.as_ref(), to_roles.as_ref()]),
     };
-    let samples = keyed(source)?;
-    let joints = from.names.len();
     let (mut rotations, mut hips) = (vec![Vec::new(); to.names.len()], Vec::new());
     let mut dropped_translation = 0f64;
+    let mut ends = Ends::of(
+        &from,
+        &to,
+        from_roles.as_ref(),
+        to_roles.as_ref(),
+        &pairs,
+        axes,
+    );
+    let mut largest_difference = 0f64;
     for sample in 0..samples.times.len() {
-        let local = |joint: usize| {
-            let index = sample * joints + joint;
-            let moved = samples.translations.get(index);
-            let position = moved.map_or_else(
-                || source.rest_position(joint),
-                |&moved| source.origin(joint) + moved.as_dvec3(),
-            );
-            (samples.rotations[index].as_dquat().normalize(), position)
-        };
         for joint in (0..joints).filter(|&joint| Some(joint) != pairs.hips.map(|hips| hips.1)) {
-            let moved = (local(joint).1 - source.rest_position(joint)).length();
+            let moved = (local(sample, joint).1 - source.rest_position(joint)).length();
             if from.parents[joint].is_some() {
                 dropped_translation = dropped_translation.max(moved);
             }
         }
-        let now = from.world(local);
+        let now = from.world(|joint| local(sample, joint));
         let mut world = vec![DQuat::IDENTITY; to.names.len()];
         for &joint in &to.order {
             let above = to.parents[joint].map_or(DQuat::IDENTITY, |parent| world[parent]);
@@ -267,8 +326,15 @@ pub fn retarget(
                     (difference * alignments[joint] * to.rest.rotations[joint]).normalize()
                 }
             };
-            if pairs.source_of[joint].is_some() {
-                rotations[joint].push((above.inverse() * world[joint]).normalize().as_quat());
+            if let Some(partner) = pairs.source_of[joint] {
+                let key = (above.inverse() * world[joint]).normalize().as_quat();
+                rotations[joint].push(key);
+                let from_rest = now.rotations[partner] * from.rest.rotations[partner].inverse();
+                let stored = above * key.as_dquat() * to.rest.rotations[joint].inverse();
+                let kept = stored * alignments[joint].inverse();
+                let off = kept * (axes * from_rest * axes.inverse()).inverse();
+                largest_difference =
+                    largest_difference.max(2.0 * libm::asin(off.xyz().length().min(1.0)));
             }
         }
         if let Some((joint, partner)) = pairs.hips {
@@ -282,6 +348,10 @@ pub fn retarget(
                 }
             });
         }
+        ends.add(
+            &now,
+            &posed(&to, &world, hips.last().copied().zip(pairs.hips)),
+        );
     }
     let mut motion = Motion {
         name: source.name.clone(),
@@ -335,8 +405,110 @@ pub fn retarget(
         axes,
         are_axes_assumed: known_axes.is_none(),
         dropped_translation,
+        largest_difference,
+        below_ground: ends.below_ground,
+        ends: ends.distances(&to),
     };
     Ok((motion, report))
+}
+
+/// Where the joints of the target are with these rotations in the world, and the hips at this position in their parent.
+fn posed(to: &Rig<'_>, world: &[DQuat], hips: Option<(DVec3, (usize, usize))>) -> Pose {
+    let mut positions = vec![DVec3::ZERO; world.len()];
+    for &joint in &to.order {
+        let local = match hips {
+            Some((position, (moved, _))) if moved == joint => position,
+            _ => to.clip.rest_position(joint),
+        };
+        positions[joint] = match to.parents[joint] {
+            None => local,
+            Some(parent) => positions[parent] + world[parent] * local,
+        };
+    }
+    Pose {
+        rotations: world.to_vec(),
+        positions,
+    }
+}
+
+/// Where hands and feet are, compared between source and target.
+struct Ends {
+    axes: DQuat,
+    /// The hips of the source and of the target, and their heights above the ground.
+    hips: [(usize, f64); 2],
+    up: DVec3,
+    /// How high the target's lowest joint is at rest.
+    ground: f64,
+    /// Hands and feet: of the source and of the target, whether it is a foot, and the largest distance so far.
+    all: Vec<([usize; 2], bool, f64)>,
+    below_ground: f64,
+}
+
+impl Ends {
+    fn of(
+        from: &Rig<'_>,
+        to: &Rig<'_>,
+        from_roles: Option<&Roles>,
+        to_roles: Option<&Roles>,
+        pairs: &Pairs,
+        axes: DQuat,
+    ) -> Self {
+        let up = axes * from.up();
+        let lowest = |rig: &Rig<'_>, up: DVec3| {
+            let heights = rig.rest.positions.iter().map(|point| point.dot(up));
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        let (joint, partner) = pairs.hips.unwrap_or_default();
+        let ground = lowest(to, up);
+        let heights = [
+            from.rest.positions[partner].dot(from.up()) - lowest(from, from.up()),
+            to.rest.positions[joint].dot(up) - ground,
+        ];
+        let roles = [
+            Role::LeftHand,
+            Role::RightHand,
+            Role::LeftFoot,
+            Role::RightFoot,
+        ];
+        let paired = |role: Role| {
+            let both = [from_roles?.joint(role)?, to_roles?.joint(role)?];
+            let is_foot = matches!(role, Role::LeftFoot | Role::RightFoot);
+            Some((both, is_foot, 0.0))
+        };
+        let are_high = pairs.hips.is_some() && heights.iter().all(|&height| height > 0.0);
+        Self {
+            axes,
+            hips: [(partner, heights[0]), (joint, heights[1])],
+            up,
+            ground,
+            all: roles
+                .into_iter()
+                .filter(|_| are_high)
+                .filter_map(paired)
+                .collect(),
+            below_ground: 0.0,
+        }
+    }
+
+    /// Compares the poses of a sample.
+    fn add(&mut self, source: &Pose, target: &Pose) {
+        let [(of_source, source_height), (of_target, target_height)] = self.hips;
+        for ([partner, joint], is_foot, largest) in &mut self.all {
+            let from = (source.positions[*partner] - source.positions[of_source]) / source_height;
+            let to = (target.positions[*joint] - target.positions[of_target]) / target_height;
+            *largest = largest.max((to - self.axes * from).length());
+            if *is_foot {
+                let below = self.ground - target.positions[*joint].dot(self.up);
+                self.below_ground = self.below_ground.max(below);
+            }
+        }
+    }
+
+    fn distances(&self, to: &Rig<'_>) -> Vec<(String, f64)> {
+        let all = self.all.iter();
+        all.map(|([_, joint], _, largest)| (to.names[*joint].clone(), *largest))
+            .collect()
+    }
 }
 
 /// The axes of a skeleton by where its parts are at rest: its left, up and forward as columns, each along an axis of the

@@ -176,3 +176,223 @@ fn files_of_robots_hold_the_stored_numbers() {
     // Breadth first, with other joints in other places, and nothing that says so.
     assert_eq!(open("beyondmimic.npz").clips[0].set.scalar_count(), 13);
 }
+
+fn at_rate(file: &str, rate: u64) -> Loaded {
+    let options = ReadOptions {
+        source_rate: tumble::FrameRate::new(rate, 1).ok(),
+        ..ReadOptions::default()
+    };
+    Format::open_detected(&layouts().unwrap().join(file), &options).unwrap()
+}
+
+fn positions(clip: &Motion, track: usize) -> Vec<f32> {
+    let keys = clip.set.vector_keys(tumble::Channel::Translation, track);
+    keys.unwrap()
+        .keys
+        .iter()
+        .flat_map(|key| key.to_array())
+        .collect()
+}
+
+/// The numbers of a pickle, as they are stored.
+fn stored(file: &str, name: &str) -> Vec<f32> {
+    let path = layouts().unwrap().join(file);
+    let contents = Contents::open(&path, &ReadOptions::default()).unwrap();
+    contents
+        .numbers(name)
+        .unwrap()
+        .values
+        .iter()
+        .map(|&number| number as f32)
+        .collect()
+}
+
+/// The scalars of a clip, `[frame][scalar]`.
+fn scalars(clip: &Motion) -> Vec<f32> {
+    let count = clip.set.scalar_count();
+    let frames = clip.set.scalar(0).unwrap().keys.len();
+    let all = (0..frames).flat_map(|frame| (0..count).map(move |scalar| (frame, scalar)));
+    all.map(|(frame, scalar)| clip.set.scalar(scalar).unwrap().keys[frame])
+        .collect()
+}
+
+/// People of WHAM, TRAM and Kimodo: numbers bit for bit, bodies and joints by name, frames by their numbers.
+#[test]
+fn files_of_people_hold_the_stored_numbers() {
+    if layouts().is_none() {
+        return;
+    }
+    let wham = at_rate("wham_output.pkl", 25);
+    let [clip] = &wham.clips[..] else {
+        panic!("{:?}", wham.refused)
+    };
+    assert_eq!(
+        positions(clip, 0),
+        stored("wham_output.pkl", "0.trans_world")
+    );
+    assert_eq!(
+        (clip.set.track_count(), &*clip.set.track_name(23)),
+        (24, "right_hand")
+    );
+    assert_eq!(clip.set.track(0).times[1], 0.04);
+    let pose = stored("wham_output.pkl", "0.pose_world");
+    for (frame, key) in clip.set.track(1).keys.iter().enumerate() {
+        let vector = [0, 1, 2].map(|axis| f64::from(pose[72 * frame + 3 + axis]));
+        let expected = tumble::glam::DQuat::from_scaled_axis(vector.into());
+        let off = 1.0 - key.as_dquat().normalize().dot(expected).abs();
+        assert!(off < 1e-12, "{frame}: {off}");
+    }
+    let tram = at_rate("tram_hps_track_0.npy", 25);
+    let [clip] = &tram.clips[..] else {
+        panic!("{:?}", tram.refused)
+    };
+    assert_eq!((clip.set.track_count(), positions(clip, 0).len()), (24, 93));
+    assert!(
+        clip.set
+            .tracks()
+            .all(|track| track.keys.iter().all(|key| *key == Quat::IDENTITY))
+    );
+    let kimodo = at_rate("kimodo.npz", 30);
+    let [clip] = &kimodo.clips[..] else {
+        panic!("{:?}", kimodo.refused)
+    };
+    let bodies = expected("exact30_body_pos_w");
+    let rotations = expected("exact30_body_quat_w");
+    assert_eq!((clip.set.track_count(), clip.set.scalar_count()), (17, 4));
+    assert_eq!(clip.scalar(0).kind, ScalarKind::Contact);
+    // z up, x forward, became y up, z forward.
+    let turn = tumble::glam::DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
+    for body in 0..17 {
+        let found = positions(clip, body);
+        for frame in 0..31 {
+            let [x, y, z] = [0, 1, 2].map(|axis| bodies[(frame * 17 + body) * 3 + axis] as f32);
+            assert_eq!(found[3 * frame..][..3], [y, z, x], "{body} {frame}");
+            let [w, x, y, z] = [0, 1, 2, 3].map(|i| rotations[(frame * 17 + body) * 4 + i]);
+            let rotation = tumble::glam::DQuat::from_xyzw(x, y, z, w);
+            let expected = turn * rotation * turn.inverse();
+            let key = clip.set.track(body).keys[frame].as_dquat().normalize();
+            assert!(
+                key.dot(expected).abs() > 1.0 - 1e-12,
+                "{body} {frame}: {key} {expected}"
+            );
+        }
+    }
+}
+
+/// Robots in JSON and in the tables of LeRobot, and libraries of clips.
+#[test]
+fn files_of_joints_hold_the_stored_numbers() {
+    if layouts().is_none() {
+        return;
+    }
+    let joints: Vec<f32> = expected("joint_pos")
+        .iter()
+        .map(|&number| number as f32)
+        .collect();
+    let amp = open("amp.txt");
+    let [clip] = &amp.clips[..] else {
+        panic!("{:?}", amp.refused)
+    };
+    assert_eq!(clip.rate.unwrap().per_second(), 30.0);
+    for (found, expected) in scalars(clip).iter().zip(&joints) {
+        // It stores seven digits.
+        assert!((found - expected).abs() < 1e-7, "{found} {expected}");
+    }
+    assert_eq!((clip.set.track_count(), clip.set.scalar_count()), (1, 13));
+    let episode = open("xr_teleoperate.json");
+    let [clip] = &episode.clips[..] else {
+        panic!("{:?}", episode.refused)
+    };
+    let names: Vec<String> = (0..8)
+        .map(|i| clip.set.scalar(i).unwrap().name.to_owned())
+        .collect();
+    assert_eq!(names[0], "states.left_arm.kLeftShoulderPitch");
+    assert_eq!(names[3], "states.right_arm.kRightElbow");
+    assert_eq!(names[4], "actions.left_arm.kLeftShoulderPitch");
+    let column =
+        |joint: usize| -> Vec<f32> { joints.iter().skip(joint).step_by(13).copied().collect() };
+    // left_shoulder_pitch, left_elbow, right_shoulder_pitch, right_elbow
+    for (scalar, joint) in [(0, 3), (1, 4), (2, 1), (3, 2)] {
+        assert_eq!(
+            clip.set.scalar(scalar).unwrap().keys,
+            column(joint),
+            "{scalar}"
+        );
+    }
+    for (folder, tables) in [
+        (
+            "lerobot_v21",
+            vec!["episode_000000.parquet", "episode_000001.parquet"],
+        ),
+        ("lerobot_v30", vec!["file-000.parquet"]),
+    ] {
+        let mut found = Vec::new();
+        for table in tables {
+            let loaded = open(&format!("{folder}/data/chunk-000/{table}"));
+            assert!(loaded.refused.is_empty(), "{:?}", loaded.refused);
+            for clip in &loaded.clips {
+                let first = clip.set.scalar(0).unwrap();
+                assert_eq!(first.name, "observation.state.waist_yaw");
+                assert_eq!(clip.set.scalar(13).unwrap().name, "action.0");
+                assert_eq!(clip.rate.unwrap().per_second(), 30.0);
+                for frame in scalars(clip).chunks(26) {
+                    assert_eq!(frame[..13], frame[13..]);
+                    found.extend_from_slice(&frame[..13]);
+                }
+            }
+        }
+        assert_eq!(found, joints, "{folder}");
+    }
+    let library = open("protomotions_library.pt");
+    let [clip] = &library.clips[..] else {
+        panic!("{:?}", library.refused)
+    };
+    assert_eq!(clip.name.as_deref(), Some("walk.motion"));
+    check("protomotions_library.pt", clip, "");
+    assert_eq!(at_rate("transposed.pt", 30).clips[0].set.track_count(), 22);
+}
+
+/// No file of the layouts is left out of these tests.
+#[test]
+fn every_file_of_the_layouts_is_read() {
+    let Some(folder) = layouts() else { return };
+    let mut folders = vec![folder];
+    let mut count = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            // Values to compare with, and the description of a data set.
+            if ["expected.npz", "info.json"].contains(&&*name) {
+                continue;
+            }
+            let loaded = Format::open_detected(&path, &ReadOptions::default());
+            let rate = tumble::FrameRate::new(30, 1).ok();
+            let with_rate = || {
+                let options = ReadOptions {
+                    source_rate: rate,
+                    ..ReadOptions::default()
+                };
+                Format::open_detected(&path, &options)
+            };
+            // Only a rate may be missing.
+            let loaded = match loaded {
+                Err(error) if error.code == Code::NoRate => with_rate(),
+                Ok(loaded) if loaded.clips.is_empty() => with_rate(),
+                loaded => loaded,
+            };
+            let loaded = loaded.unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(
+                !loaded.clips.is_empty() && loaded.refused.is_empty(),
+                "{name}: {:?}",
+                loaded.refused
+            );
+            count += 1;
+        }
+    }
+    assert_eq!(count, 25);
+}

@@ -168,6 +168,7 @@ fn rotations_are_those_of_the_formulas() {
             rest,
             scale: HipsScale::Factor(expected["scale"].as_f64().unwrap()),
             axes: Some(rotations(&data["axes_wxyz"])[0]),
+            ..RetargetOptions::default()
         };
         let (found, report) = retarget(&from, &to, &options).unwrap();
         let local = rotations(&expected["local_wxyz"]);

@@ -2,7 +2,10 @@
 
 use tumble::glam::{DQuat, Quat};
 use tumble::reduce::ReducedCurve;
-use tumble::{Device, Engine, SampleTimes, Smoothing, SmoothingKernel};
+use tumble::{
+    Device, Engine, Layout, SampleTimes, ScalarQuantity, Smoothing, SmoothingKernel, VectorMethod,
+    method,
+};
 use tumble_formats::adjust::adjust;
 use tumble_formats::compare::ClipPair;
 use tumble_formats::format::MotionOptions;
@@ -90,7 +93,7 @@ fn our_npz_keeps_scalars_with_names_kinds_and_limits() {
     };
     assert_eq!(kinds(again), kinds(&clip));
     // Other formats say that they cannot.
-    for name in ["bvh", "glb", "tum", "csv"] {
+    for name in ["bvh", "glb", "tum"] {
         let format = Format::named(name).unwrap();
         let warnings = format.write_clips(&sampled, &MotionOptions::default(), &mut Vec::new());
         let warnings = warnings.unwrap();
@@ -270,4 +273,150 @@ fn scalars_are_compared_by_name() {
         (contact.kind, contact.difference.spread.mean),
         ("contact", 0.5)
     );
+}
+
+/// Tables store scalars beside the keys of tracks and alone, with their names and kinds, and read the same bits.
+#[test]
+fn tables_store_scalars() {
+    let alone = || {
+        let mut clip = clip();
+        let mut bare = Motion::default();
+        for (index, scalar) in std::mem::take(&mut clip.scalars).into_iter().enumerate() {
+            bare.push_scalar(scalar, clip.set.scalar(index).unwrap())
+                .unwrap();
+        }
+        bare
+    };
+    for (format, clip) in ["csv", "parquet", "arrow", "npz"]
+        .into_iter()
+        .flat_map(|it| [(it, clip()), (it, alone())])
+    {
+        let format = Format::named(format).unwrap();
+        let samples = keyed(&clip).unwrap();
+        let mut bytes = Vec::new();
+        let options = MotionOptions::default();
+        let warnings = format.write_clips(&[samples.of(&clip, None, &[])], &options, &mut bytes);
+        let warnings = warnings.unwrap();
+        let lost = warnings
+            .iter()
+            .map(|it| it.message.clone())
+            .collect::<String>();
+        assert!(!lost.contains("scalars"), "{}: {lost}", format.name);
+        let loaded = (format.read_bytes)("a", bytes, &ReadOptions::default()).unwrap();
+        let found = &loaded.clips[0];
+        assert_eq!(
+            found.set.track_count(),
+            clip.set.track_count(),
+            "{}",
+            format.name
+        );
+        assert_eq!(
+            found.set.scalar_count(),
+            clip.set.scalar_count(),
+            "{}",
+            format.name
+        );
+        for index in 0..clip.set.scalar_count() {
+            let [found_keys, keys] = [found, &clip].map(|clip| clip.set.scalar(index).unwrap());
+            assert_eq!(
+                (found_keys.name, found_keys.times, found_keys.keys),
+                (keys.name, keys.times, keys.keys)
+            );
+            assert_eq!(
+                found.scalar(index).kind,
+                clip.scalar(index).kind,
+                "{}",
+                format.name
+            );
+        }
+    }
+}
+
+/// `--map` names scalars: of columns, of parts of lists and of arrays, in degrees where it says so.
+#[test]
+fn maps_name_scalars() {
+    let read = |text: &str, map: &str| {
+        let options = ReadOptions {
+            map: Some(map.to_owned()),
+            ..ReadOptions::default()
+        };
+        (Format::named("csv").unwrap().read_bytes)("a.csv", text.as_bytes().to_vec(), &options)
+    };
+    let text = "time,a,b\n0,90,1\n0.5,180,2\n";
+    let loaded = read(text, "knee=a:scalar:angle:deg,lift=b:scalar:length").unwrap();
+    let clip = &loaded.clips[0];
+    assert_eq!((clip.set.track_count(), clip.set.scalar_count()), (0, 2));
+    let knee = clip.set.scalar(0).unwrap();
+    assert_eq!(
+        (knee.name, knee.keys[0], knee.times),
+        ("knee", std::f32::consts::FRAC_PI_2, &[0.0, 0.5][..])
+    );
+    assert_eq!(
+        (clip.scalar(0).kind, clip.scalar(1).kind),
+        (ScalarKind::Angle, ScalarKind::Length)
+    );
+    assert_eq!(clip.set.scalar(1).unwrap().keys, [1.0, 2.0]);
+    let refused = |map: &str| read(text, map).unwrap_err();
+    assert_eq!(refused("knee=c:scalar").code, Code::ColumnMissing);
+    assert_eq!(refused("knee=a:scalar:deg").code, Code::Map);
+    assert_eq!(refused("knee=a:scalar:wxyz").code, Code::Map);
+    assert_eq!(refused("knee=a[0]:scalar").code, Code::ColumnType);
+    assert_eq!(
+        read("time,a\n0,x\n", "knee=a:scalar").unwrap_err().code,
+        Code::Number
+    );
+    let missing = read("time,a\n0,1\n1,nan\n", "knee=a:scalar").unwrap_err();
+    assert_eq!(missing.code, Code::NotFinite);
+    // A part of an array.
+    let numbers: Vec<f32> = (0..6).map(|i| i as f32).collect();
+    let mut array =
+        b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }"
+            .to_vec();
+    array.resize(79, b' ');
+    array.push(b'\n');
+    array.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+    let options = ReadOptions {
+        map: Some("arm=arr_0[1:3]:scalar:angle".to_owned()),
+        source_rate: tumble::FrameRate::new(2, 1).ok(),
+        ..ReadOptions::default()
+    };
+    let loaded = (Format::named("npy").unwrap().read_bytes)("a.npy", array, &options).unwrap();
+    let clip = &loaded.clips[0];
+    let names: Vec<&str> = (0..2)
+        .map(|index| clip.set.scalar(index).unwrap().name)
+        .collect();
+    assert_eq!(names, ["arm_0", "arm_1"]);
+    assert_eq!(clip.set.scalar(1).unwrap().keys, [2.0, 5.0]);
+    assert_eq!(clip.set.scalar(1).unwrap().times, [0.0, 0.5]);
+}
+
+/// A method that vectors have under the same name is that of scalars: `c2` is no other curve.
+#[test]
+fn scalars_take_the_method_that_is_asked_for() {
+    let mut clip = Motion::default();
+    let keys = [0.0, 1.0, -1.0, 0.5];
+    clip.set.push_scalar("a", &TIMES, &keys, &[]).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let (frames, velocity) = (SampleTimes::fps(20), ScalarQuantity::Velocity);
+    for (named, method) in [
+        (method::C2, VectorMethod::C2),
+        (method::B_SPLINE, VectorMethod::BSpline),
+        (method::BESSEL_OVERHAUSER, VectorMethod::BesselOverhauser),
+        (method::SQUAD, method::SQUAD.vector_method),
+    ] {
+        let found = ChannelMethods::by(named)
+            .scalars(&engine, &clip, &frames, velocity)
+            .unwrap();
+        let expected = engine
+            .scalars(
+                &clip.set,
+                velocity,
+                method,
+                named,
+                &frames,
+                Layout::FrameMajor,
+            )
+            .unwrap();
+        assert_eq!(found, expected.as_slice(), "{}", named.name);
+    }
 }

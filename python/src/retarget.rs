@@ -17,19 +17,21 @@ use crate::run::interruptible;
 
 /// Carries a motion over to another skeleton; returns the clip and a report.
 ///
-/// `retarget(clip, target, *, bones=None, rest="auto", scale="hips", axes=None)`
+/// `retarget(clip, target, *, bones=None, rest="auto", rest_frame=None, scale="hips", axes=None)`
 ///
 /// `target`: a clip with the skeleton. Joints are paired by the parts of the body that their names mean (VRM, Mixamo,
 /// SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA), or by `bones`, a dict of names of the target's joints to those of the
 /// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to the
-/// directions of the source's, "auto" for that where they differ by more than 5 degrees. `scale`: the factor for the
+/// directions of the source's, "auto" for that where they differ by more than 5 degrees. `rest_frame`: the key of the
+/// source whose pose is its rest pose, such as a T-pose in which takes begin. `scale`: the factor for the
 /// hips' translations: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a number.
 /// `axes`: the rotation x y z w from the axes of the source to those of the target, else it is found from where hips,
 /// head and legs are.
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
 /// their rest rotations, and translations of others than the hips are lost. The report is a dict: `pairs`, `resting`,
-/// `dropped`, `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`.
+/// `dropped`, `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
+/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`.
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]
@@ -40,12 +42,13 @@ use crate::run::interruptible;
 /// >>> report["pairs"]
 /// {'root': 'a', 'tip': 'b'}
 #[pyfunction]
-#[pyo3(signature = (clip, target, *, bones=None, rest=None, scale=None, axes=None), text_signature = "(clip, target, *, bones=None, rest='auto', scale='hips', axes=None)")]
+#[pyo3(signature = (clip, target, *, bones=None, rest=None, rest_frame=None, scale=None, axes=None), text_signature = "(clip, target, *, bones=None, rest='auto', rest_frame=None, scale='hips', axes=None)")]
 pub(crate) fn retarget<'py>(
     clip: &Bound<'py, Clip>,
     target: &Bound<'py, Clip>,
     bones: Option<&Bound<'py, PyDict>>,
     rest: Option<&Bound<'py, PyAny>>,
+    rest_frame: Option<usize>,
     scale: Option<&Bound<'py, PyAny>>,
     axes: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Clip, Bound<'py, PyDict>)> {
@@ -57,6 +60,7 @@ pub(crate) fn retarget<'py>(
     let options = RetargetOptions {
         bones: pairs,
         rest: rest.map_or(Ok(RestAlignment::Auto), |rest| option_of(rest, "rest"))?,
+        rest_frame,
         scale: scale.map_or(Ok(HipsScale::Hips), scale_of)?,
         axes: axes.map(axes_of).transpose()?,
     };
@@ -119,5 +123,12 @@ fn report_of<'py>(py: Python<'py>, report: &RetargetReport) -> PyResult<Bound<'p
     found.set_item("axes", report.axes.to_array())?;
     found.set_item("axes_assumed", report.are_axes_assumed)?;
     found.set_item("dropped_translation", report.dropped_translation)?;
+    found.set_item("largest_difference", report.largest_difference)?;
+    let ends = PyDict::new(py);
+    for (joint, distance) in &report.ends {
+        ends.set_item(joint, distance)?;
+    }
+    found.set_item("ends", ends)?;
+    found.set_item("below_ground", report.below_ground)?;
     Ok(found)
 }

@@ -492,7 +492,7 @@ pub(crate) fn bodies<'py>(
     let request = BodiesRequest {
         frames,
         rotations: options.with(method),
-        vectors: method.vector_method,
+        vectors: method.scalar_method(),
         order: option_of(&text(names.body_order), "body_order")?,
         siblings: option_of(&text(names.siblings), "siblings")?,
         velocity_at: option_of(&text(names.velocity_at), "velocity_at")?,

@@ -330,6 +330,13 @@ impl Method {
         }
     }
 
+    /// The method for scalars, and for the root of a robot, if one method is requested for everything: that of the same
+    /// name, such as `c2`, or else that of vectors.
+    #[must_use]
+    pub fn scalar_method(&self) -> VectorMethod {
+        self.name.parse().unwrap_or(self.vector_method)
+    }
+
     /// The method with this name, if there is one.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {

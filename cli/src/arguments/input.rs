@@ -177,7 +177,7 @@ impl Inputs {
         })
     }
 
-    fn limits(&self) -> Limits {
+    pub(crate) fn limits(&self) -> Limits {
         Limits {
             file: self.max_size,
             memory: self.max_memory,

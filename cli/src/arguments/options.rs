@@ -236,6 +236,26 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("velocities"),
     deciding("limits"),
     deciding("describe"),
+    // Other skeletons.
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..deciding("onto")
+    },
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..deciding("bones")
+    },
+    deciding("rest"),
+    deciding("rest_frame"),
+    deciding("hips_scale"),
+    silent("report"),
+    // Features for learning.
+    deciding("sets"),
+    deciding("vertical"),
+    deciding("contact_height"),
+    deciding("contact_speed"),
+    deciding("contact_window"),
+    deciding("mirror_axis"),
     // Paths.
     deciding("seconds"),
     deciding("rate"),

@@ -68,15 +68,20 @@ impl ResultArguments {
         file: &Path,
         plan: &OutputPlan,
     ) -> Result<Option<Destination>, Failure> {
-        if plan.paths.len() + plan.refused.len() > 1 {
-            return Err(Failure::usage("--plot needs a single input"));
-        }
+        check_single("--plot", plan)?;
         let destination = Destination::of_picture(file, self.overwrite, &plan.paths)?;
-        for target in &plan.targets {
-            destination.refuse_same(target.path())?;
-        }
-        destination.check_writable()?;
-        Ok(Some(destination))
+        apart(destination, plan).map(Some)
+    }
+
+    /// The destination of a file that `option` names, which is written beside the result of one input.
+    pub(crate) fn beside(
+        &self,
+        option: &str,
+        file: &Path,
+        plan: &OutputPlan,
+    ) -> Result<Destination, Failure> {
+        check_single(option, plan)?;
+        apart(Destination::new(file, self.overwrite, &plan.paths)?, plan)
     }
 
     /// The directory of results, which the evaluation of shards needs.
@@ -282,6 +287,23 @@ impl ResultArguments {
             ),
         }
     }
+}
+
+/// Refuses an option for the result of one input.
+fn check_single(option: &str, plan: &OutputPlan) -> Result<(), Failure> {
+    match plan.paths.len() + plan.refused.len() > 1 {
+        true => Err(Failure::usage(format!("{option} needs a single input"))),
+        false => Ok(()),
+    }
+}
+
+/// A destination that is no result of the plan, and can be written.
+fn apart(destination: Destination, plan: &OutputPlan) -> Result<Destination, Failure> {
+    for target in &plan.targets {
+        destination.refuse_same(target.path())?;
+    }
+    destination.check_writable()?;
+    Ok(destination)
 }
 
 /// Refuses axes of angles for a format that has none.

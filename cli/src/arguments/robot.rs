@@ -11,7 +11,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::robot::{
     Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, Robot, VelocityPoint,
-    VelocitySource, bodies,
+    VelocitySource, bodies, clamp_scalars, scalar_excesses,
 };
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::{Code, Diagnostic};
@@ -46,7 +46,7 @@ pub(crate) struct DialectArguments {
     #[arg(long, value_name = "HOW", requires = "dialect", default_value_t, value_parser = velocities())]
     velocities: VelocitySource,
     /// What to do with joints outside the limits of --robot
-    #[arg(long, value_name = "RULE", requires = "dialect", default_value_t, value_parser = limits())]
+    #[arg(long, value_name = "RULE", requires = "robot", default_value_t, value_parser = limits())]
     limits: LimitRule,
     /// mjlab, beyondmimic: also write the names and orders of joints and bodies, and how the result was
     /// made, in arrays that the programs ignore
@@ -219,9 +219,9 @@ impl DialectArguments {
                 || {
                     methods
                         .vector_method_of(clip)
-                        .unwrap_or(method.vector_method)
+                        .unwrap_or(method.scalar_method())
                 },
-                |method| method.vector_method,
+                |method| method.scalar_method(),
             ),
             order: self.body_order.unwrap_or(dialect.order),
             siblings: self.siblings,
@@ -246,23 +246,46 @@ impl DialectArguments {
     }
 
     /// The text of the message about joints that leave their limits; `None` if none does.
-    fn limits_text(&self, bodies: &Bodies) -> Option<String> {
+    fn limits_text(&self, excesses: &[LimitExcess], times: &[f64]) -> Option<String> {
         let joint = |excess: &LimitExcess| {
-            let time = bodies.times.get(excess.sample).copied().unwrap_or(0.0);
+            let time = times.get(excess.sample).copied().unwrap_or(0.0);
             format!(
                 "`{}` by up to {:.4} (first at {time} s)",
                 excess.joint, excess.excess
             )
         };
-        let joints: Vec<String> = bodies.excesses.iter().map(joint).collect();
+        let joints: Vec<String> = excesses.iter().map(joint).collect();
         let done = match self.limits {
             LimitRule::Clamp => "they are kept inside",
-            LimitRule::Report | LimitRule::Refuse => {
-                "their values are kept (--limits clamp changes them)"
-            }
+            LimitRule::Report => "their values are kept (--limits clamp changes them)",
+            LimitRule::Refuse => "--limits report keeps their values",
         };
         let text = || format!("joints leave their limits: {}; {done}", joints.join(", "));
         (!joints.is_empty()).then(text)
+    }
+
+    /// Applies the rule for limits to the scalars of a clip at samples, `[sample][scalar]`; `rates` are how fast they change.
+    pub(crate) fn limit_scalars(
+        &self,
+        work: &ClipWork,
+        (clip, times): (&Motion, &[f64]),
+        values: &mut [f32],
+        rates: Option<&mut [f32]>,
+    ) -> Result<(), Failure> {
+        let excesses = scalar_excesses(clip, values);
+        let Some(message) = self.limits_text(&excesses, times) else {
+            return Ok(());
+        };
+        match self.limits {
+            LimitRule::Refuse => {
+                let refusal = Diagnostic::new(&work.name, Code::OutsideLimits, message);
+                return Err(Failure::input(&refusal, ""));
+            }
+            LimitRule::Clamp => clamp_scalars(clip, values, rates),
+            LimitRule::Report => {}
+        }
+        work.warn(Diagnostic::new(&work.name, Code::JointLimits, message));
+        Ok(())
     }
 
     /// Writes the motion of a robot; `notes` say how it was made.
@@ -285,7 +308,7 @@ impl DialectArguments {
                 "",
             ));
         };
-        if let Some(message) = self.limits_text(bodies) {
+        if let Some(message) = self.limits_text(&bodies.excesses, &bodies.times) {
             work.warn(Diagnostic::new(name, Code::JointLimits, message));
         }
         let order = self.body_order.unwrap_or(dialect.order);

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use sha2::{Digest as _, Sha256};
 use tumble_formats::Limits;
 use tumble_formats::beneath::open_beneath;
-use tumble_formats::referred::referred_files;
+use tumble_formats::referred::{open_referred, referred_files};
 use walkdir::WalkDir;
 
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -94,7 +94,7 @@ impl InputFile {
             let mut digest = Digest::default();
             digest.update(format!("{of_input}  \n").as_bytes());
             for (name, _) in &self.referred {
-                let file = open_beneath(folder(&self.path), name).and_then(of_file);
+                let file = open_referred(folder(&self.path), name).and_then(of_file);
                 let hash = file.unwrap_or_else(|_| "missing".to_owned());
                 digest.update(format!("{hash}  {}\n", name.display()).as_bytes());
             }

@@ -70,7 +70,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.inputs.reading.robot()?;
     let plan = arguments.results.plan_in(files, asked)?;
     match arguments.dialect.chosen() {
-        None => check_stores_keys(&plan)?,
+        None => {
+            check_stores_keys(&plan)?;
+            let on = "keys, which stay as they are";
+            let remedy = "evaluate them with `tumble eval`";
+            arguments
+                .command_line
+                .refuse(&[("limits", "--limits")], on, remedy)?;
+        }
         Some(dialect) => {
             let options = [
                 ("order", "--order"),

@@ -9,6 +9,7 @@ pub(crate) mod convert;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod explain;
+pub(crate) mod features;
 pub(crate) mod follow;
 pub(crate) mod generate;
 pub(crate) mod info;
@@ -24,6 +25,7 @@ pub(crate) mod prove;
 pub(crate) mod reduce;
 #[allow(clippy::disallowed_methods)] // pictures
 pub(crate) mod render;
+pub(crate) mod retarget;
 pub(crate) mod route;
 pub(crate) mod smooth;
 #[allow(clippy::disallowed_methods)] // pictures
@@ -39,6 +41,8 @@ use crate::messages::exit::Failure;
 pub(crate) enum Command {
     Eval(Box<eval::Arguments>),
     Convert(convert::Arguments),
+    Retarget(Box<retarget::Arguments>),
+    Features(Box<features::Arguments>),
     Route(Box<route::Arguments>),
     Follow(Box<follow::Arguments>),
     Compare(Box<compare::Arguments>),
@@ -69,6 +73,8 @@ impl Command {
         match self {
             Self::Eval(arguments) => eval::run(&arguments),
             Self::Convert(arguments) => convert::run(&arguments),
+            Self::Retarget(arguments) => retarget::run(&arguments),
+            Self::Features(arguments) => features::run(&arguments),
             Self::Route(arguments) => route::run(&arguments),
             Self::Follow(arguments) => follow::run(&arguments),
             Self::Compare(arguments) => compare::run(&arguments),

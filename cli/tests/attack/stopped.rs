@@ -31,6 +31,14 @@ const WRITERS: &[(&str, &str)] = &[
     ("plot a.dat -o out/o.svg", "out/o.svg"),
     ("plot a.dat -o out/pictures", "out/pictures"),
     ("render a.dat --size 64x48 -o out/o.png", "out/o.png"),
+    (
+        "retarget m.bvh --onto m.bvh --bones bones.json -o out/o.bvh --report out/o.json",
+        "out/o.bvh",
+    ),
+    (
+        "features m.bvh --fps 100 --sets positions,mirror -o out/o.npz",
+        "out/o.npz",
+    ),
     ("view a.dat -o out/o.html", "out/o.html"),
     ("generate --boxes 400 --keys 200 -o out/o.dat", "out/o.dat"),
     (
@@ -85,6 +93,15 @@ fn folder() -> tempfile::TempDir {
     )
     .unwrap();
     fs::write(folder.join("m.gltf"), two_animations()).unwrap();
+    let joint = "{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation";
+    let mut bvh =
+        format!("HIERARCHY ROOT a {joint} JOINT b {joint} End Site {{ OFFSET 0 1 0 }} }} }}\n");
+    bvh += &format!(
+        "MOTION\nFrames: 2000\nFrame Time: 0.01\n{}",
+        "1 2 3 4 5 6\n".repeat(2000)
+    );
+    fs::write(folder.join("m.bvh"), bvh).unwrap();
+    fs::write(folder.join("bones.json"), r#"{"a": "a", "b": "b"}"#).unwrap();
     succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
     fs::create_dir(folder.join("out")).unwrap();
     temporary

@@ -56,6 +56,7 @@ pub static FORMAT: Format = Format {
         Feature::TrackNames,
         Feature::Translations,
         Feature::Scales,
+        Feature::Scalars,
         Feature::Curves,
         Feature::World,
         Feature::UnevenTimes,

@@ -53,6 +53,13 @@ pub(crate) fn write_motion(
                 .map(|component| text_cell(&format!("{name}.{component}")).into_owned()),
         );
     }
+    let clip = sampled.clip;
+    let scalars = set.scalar_count();
+    row.extend(
+        clip.scalar_keys().enumerate().map(|(index, keys)| {
+            text_cell(&clip.scalar(index).kind.column(keys.name)).into_owned()
+        }),
+    );
     writer.write_record(&row).map_err(io_error)?;
     for (frame, time) in sampled.times.iter().enumerate() {
         row.clear();
@@ -77,6 +84,7 @@ pub(crate) fn write_motion(
                 row.extend(scale.map(|number| number.to_string()));
             }
         }
+        row.extend((0..scalars).map(|index| sampled.scalar_text(frame, index)));
         writer.write_record(&row).map_err(io_error)?;
     }
     writer.flush()?;

@@ -6,20 +6,27 @@
 
 mod gmr;
 pub(crate) mod gvhmr;
+pub mod json;
+mod kimodo;
 mod mimickit;
 mod mjlab;
 mod motion_lib;
-mod protomotions;
+pub(crate) mod protomotions;
 pub(crate) mod text;
+mod tram;
+mod wham;
 pub mod write;
 
 use tumble::Layout;
 
+use crate::array::{ArrayHeader, Element};
+use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::ScalarKind;
-use crate::npz::archive::Archive;
+use crate::npz::archive::{Archive, Member, ONLY_ARRAY};
 use crate::npz::array::Strides;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, RobotArrays, check_float};
+use crate::npz::smpl;
 use crate::quaternion::ComponentOrder;
 use crate::warnings::Warnings;
 
@@ -51,10 +58,13 @@ enum Axis {
 /// All dialects. To add one, write a module with a `DIALECT`, and add a line here.
 pub static DIALECTS: &[&Dialect] = &[
     &gmr::DIALECT,
+    &kimodo::DIALECT,
     &mjlab::DIALECT,
     &mimickit::DIALECT,
     &motion_lib::DIALECT,
     &protomotions::DIALECT,
+    &tram::DIALECT,
+    &wham::DIALECT,
 ];
 
 /// The plan of a file that is in a dialect; `None` for other files.
@@ -130,10 +140,51 @@ impl Dialect {
 
 /// The number of the member with a name that was recognised.
 fn member(archive: &Archive, name: &str) -> Result<usize, Diagnostic> {
-    archive.find(name).ok_or_else(|| {
-        let message = format!("there is no array `{name}`");
-        Diagnostic::new(&archive.file, Code::UnknownArrays, message)
-    })
+    archive.find(name).ok_or_else(|| missing(archive, name))
+}
+
+fn missing(archive: &Archive, name: &str) -> Diagnostic {
+    let message = format!("there is no array `{name}`");
+    Diagnostic::new(&archive.file, Code::UnknownArrays, message)
+}
+
+/// The plan of an SMPL body without its arrays.
+fn smpl_body(joints: usize) -> ArchivePlan {
+    let (names, parents) = smpl::joints_of_body(joints).unwrap_or_default();
+    ArchivePlan {
+        is_body: true,
+        is_part: true,
+        no_world: Some(smpl::NO_OFFSETS.to_owned()),
+        names,
+        parents,
+        ..ArchivePlan::default()
+    }
+}
+
+/// Numbers as the arrays of a file: the name, the shape and the numbers of each.
+fn archive_of(
+    file: &str,
+    budget: Budget,
+    arrays: impl IntoIterator<Item = (String, Vec<usize>, Vec<f64>)>,
+) -> Archive {
+    let (mut bytes, mut members) = (Vec::new(), Vec::new());
+    for (name, shape, numbers) in arrays {
+        let start = bytes.len();
+        bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+        let header = ArrayHeader {
+            element: Element::F64,
+            is_big_endian: false,
+            is_fortran: false,
+            shape,
+            start: 0,
+        };
+        let location = match &*name {
+            ONLY_ARRAY => String::new(),
+            name => format!("['{name}']"),
+        };
+        members.push(Member::of_value(name, location, header, start..bytes.len()));
+    }
+    Archive::of_values(file, bytes, budget, members)
 }
 
 /// The keys of the root: of an array (frames, numbers) from a column on, or of the first body of one (frames, bodies,

@@ -2,14 +2,13 @@
 
 use tumble::{FrameRate, Layout};
 
-use super::root;
-use crate::array::{ArrayHeader, Element};
+use super::{archive_of, root};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions, TimeUnit};
 use crate::motion::ScalarKind;
 use crate::npz;
-use crate::npz::archive::{Archive, Member, ONLY_ARRAY};
+use crate::npz::archive::ONLY_ARRAY;
 use crate::npz::plan::{ArchivePlan, KeyKind, RobotArrays};
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
@@ -154,20 +153,8 @@ impl TextDialect {
                 (None, message)
             });
         }
-        let header = ArrayHeader {
-            element: Element::F64,
-            is_big_endian: false,
-            is_fortran: false,
-            shape: vec![frames, width],
-            start: 0,
-        };
-        let bytes: Vec<u8> = numbers
-            .iter()
-            .flat_map(|number| number.to_le_bytes())
-            .collect();
-        let all = 0..bytes.len();
-        let member = Member::of_value(ONLY_ARRAY.to_owned(), String::new(), header, all);
-        let archive = Archive::of_values(file, bytes, budget, vec![member]);
+        let shape = vec![frames, width];
+        let archive = archive_of(file, budget, [(ONLY_ARRAY.to_owned(), shape, numbers)]);
         let mut plan = ArchivePlan {
             is_world: true,
             is_part: true,

@@ -11,17 +11,12 @@ use crate::format::WriteError;
 use crate::gltf::animation::{ReadAnimation, SampledChannel};
 use crate::gltf::edits::Edits;
 use crate::gltf::json::{Json, JsonMembers};
+use crate::gltf::key_bytes::{KeyBytes, bytes_of};
 use crate::gltf::quantized::quantized;
 use crate::gltf::schema::{Animation, Channel, TargetPath};
 use crate::gltf::write_new::{FLOAT, SHORT};
 use crate::gltf::written_keys::WrittenKeys;
 use crate::motion::{self, SampledClip};
-
-/// The bytes of numbers in a file.
-fn bytes_of(numbers: &[f32]) -> Vec<u8> {
-    let each = numbers.iter().flat_map(|number| number.to_le_bytes());
-    each.collect()
-}
 
 /// Converts f32 rotations to 16 bits for each component.
 fn shorts_of(bytes: &[u8]) -> Vec<u8> {
@@ -52,9 +47,7 @@ pub(super) struct AnimationBaker<'a> {
     is_cut: bool,
     /// Whether rotations have 16 bits for each component.
     quantize: bool,
-    /// The buffer view of the new bytes.
-    view: usize,
-    pub(super) bytes: Vec<u8>,
+    pub(super) bytes: KeyBytes,
 }
 
 /// A sampler that was changed or appended.
@@ -127,8 +120,7 @@ impl<'a> AnimationBaker<'a> {
             samplers_array,
             is_cut,
             quantize,
-            view: edits.count("bufferViews"),
-            bytes: Vec::new(),
+            bytes: KeyBytes::new(edits),
         })
     }
 
@@ -137,8 +129,7 @@ impl<'a> AnimationBaker<'a> {
     /// # Errors
     /// When f32 cannot tell times apart.
     pub(super) fn bake(&mut self, edits: &mut Edits<'_>) -> Result<(), WriteError> {
-        let mut inputs = HashMap::new();
-        let shared = self.input(self.sampled.times, &mut inputs, edits)?;
+        let shared = self.input(self.sampled.times, edits)?;
         // By the samplers whose keys the samples stand for.
         let mut made: HashMap<usize, Vec<BakedSampler>> = HashMap::new();
         let read = self.read;
@@ -150,10 +141,7 @@ impl<'a> AnimationBaker<'a> {
                 false => None,
             };
             let (input, interpolation) = match &written {
-                Some(keys) => (
-                    self.input(&keys.times, &mut inputs, edits)?,
-                    keys.sampler.name(),
-                ),
+                Some(keys) => (self.input(&keys.times, edits)?, keys.sampler.name()),
                 None => (shared, "LINEAR"),
             };
             let values =
@@ -165,23 +153,17 @@ impl<'a> AnimationBaker<'a> {
             let values = if is_short { shorts_of(&values) } else { values };
             let made = made.entry(channel.sampler).or_default();
             let same = made.iter().find(|made| {
-                self.bytes[made.values.clone()] == values
+                self.bytes.bytes()[made.values.clone()] == values
                     && (made.input, made.interpolation) == (input, interpolation)
             });
             let sampler = match same {
                 Some(made) => made.sampler,
                 None => {
-                    let start = self.bytes.len();
-                    self.bytes.extend_from_slice(&values);
-                    let kind = if channel.path == TargetPath::Rotation {
-                        "VEC4"
-                    } else {
-                        "VEC3"
-                    };
+                    let start = self.bytes.bytes().len();
                     let shorts = (SHORT, ",\"normalized\":true");
                     let (component, more) = if is_short { shorts } else { (FLOAT, "") };
-                    let accessor = self.accessor(start, (count, component, kind), more);
-                    let output = edits.append_to("accessors", accessor);
+                    let accessor = (count, component, channel.path.kind());
+                    let output = self.bytes.push(&values, accessor, more, edits);
                     let is_free = made.is_empty()
                         && !self.kept.contains(&channel.sampler)
                         && self.takes(channel.sampler, interpolation)?;
@@ -201,7 +183,7 @@ impl<'a> AnimationBaker<'a> {
                         sampler,
                         input,
                         interpolation,
-                        values: start..self.bytes.len(),
+                        values: start..self.bytes.bytes().len(),
                     });
                     sampler
                 }
@@ -214,25 +196,9 @@ impl<'a> AnimationBaker<'a> {
     }
 
     /// The accessor of times; equal lists of times share one.
-    fn input(
-        &mut self,
-        seconds: &[f64],
-        known: &mut HashMap<Vec<u32>, usize>,
-        edits: &mut Edits<'_>,
-    ) -> Result<usize, Diagnostic> {
+    fn input(&mut self, seconds: &[f64], edits: &mut Edits<'_>) -> Result<usize, Diagnostic> {
         let times = self.times(seconds)?;
-        let bits: Vec<u32> = times.iter().map(|time| time.to_bits()).collect();
-        if let Some(&input) = known.get(&bits) {
-            return Ok(input);
-        }
-        let [first, last] = [times[0], times[times.len() - 1]].map(f64::from);
-        let range = format!(",\"min\":[{first:?}],\"max\":[{last:?}]");
-        let start = self.bytes.len();
-        self.bytes.extend(bytes_of(&times));
-        let accessor = self.accessor(start, (times.len(), FLOAT, "SCALAR"), &range);
-        let input = edits.append_to("accessors", accessor);
-        known.insert(bits, input);
-        Ok(input)
+        Ok(self.bytes.input(&times, edits))
     }
 
     /// Times in f32. The first and the last key of the file keep the times that the file has.
@@ -277,19 +243,6 @@ impl<'a> AnimationBaker<'a> {
         let raw = self.samplers[sampler];
         let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
         Ok(interpolation == "LINEAR" || members.get("interpolation").is_some())
-    }
-
-    fn accessor(
-        &self,
-        offset: usize,
-        (count, component, kind): (usize, u32, &str),
-        more: &str,
-    ) -> String {
-        format!(
-            "{{\"bufferView\":{},\"byteOffset\":{offset},\"componentType\":{component},\
-             \"count\":{count},\"type\":\"{kind}\"{more}}}",
-            self.view
-        )
     }
 
     /// Replaces the keys of a sampler; returns its index.

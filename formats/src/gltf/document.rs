@@ -11,12 +11,14 @@ use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
 use crate::gltf::bake::{AnimationBaker, is_cut};
+use crate::gltf::character;
 use crate::gltf::container::{Container, check_length};
 use crate::gltf::data::BufferData;
 use crate::gltf::edits::Edits;
 use crate::gltf::gather;
 use crate::gltf::json::{Json, JsonMembers};
-use crate::gltf::prune::prune;
+use crate::gltf::nodes::Nodes;
+use crate::gltf::prune::{prune, prune_replaced};
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, Channel};
 use crate::gltf::skins;
@@ -149,6 +151,36 @@ impl Document for GltfDocument {
         for (_, sampled) in clips {
             check_times(sampled, &options.name)?;
         }
+        self.rewrite(&Change::Keys(clips), options, path, out)
+    }
+
+    fn write_instead(
+        &self,
+        clips: &[&Motion],
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        self.rewrite(&Change::Animations(clips), options, path, out)
+    }
+}
+
+/// What is written other than it was read.
+enum Change<'a> {
+    /// The keys of some animations.
+    Keys(&'a [(usize, SampledClip<'a>)]),
+    /// All animations.
+    Animations(&'a [&'a Motion]),
+}
+
+impl GltfDocument {
+    fn rewrite(
+        &self,
+        change: &Change<'_>,
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
         let json = Json::parse(&self.name, &self.container.text)?;
         let warnings = Warnings::new(&self.name);
         let folder = self.folder.as_deref();
@@ -164,57 +196,42 @@ impl Document for GltfDocument {
             (false, true) => BufferData::in_uri(&json),
             (false, false) => gather::buffers(&reader, &mut edits)?,
         };
-        let baked = |&(index, _): &(usize, _)| self.animations.get(index).and_then(Option::as_ref);
-        let clips: Vec<_> = clips
-            .iter()
-            .filter_map(|clip| Some((baked(clip)?, clip)))
-            .collect();
-        let more = clips.iter().map(|(read, (_, sampled))| {
-            let numbers = 1 + read
-                .sampled
-                .iter()
-                .map(|channel| channel.path.width())
-                .sum::<usize>();
-            4 * numbers as u64 * sampled.times.len() as u64
-        });
-        check_length(&json, data.length_with(more.sum()))?;
+        let more = match change {
+            Change::Keys(clips) => self.baked(clips).map(sample_bytes).sum(),
+            Change::Animations(clips) => character::key_bytes(clips),
+        };
+        check_length(&json, data.length_with(more))?;
         if !self.container.is_glb() && !is_text {
             gather::images(&reader, &mut edits, &mut data)?;
         }
-        let mut is_baked = false;
-        for (read, (index, sampled)) in clips {
-            let cuts = is_cut(read, sampled);
-            if cuts && read.beside > 0 {
-                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
-                    let channels = match read.beside {
-                        1 => "1 channel of weights or another property is".to_owned(),
-                        count => format!("{count} channels of weights and other properties are"),
-                    };
-                    format!(
-                        "{channels} not cut: copied whole, at the times of before, in step with the keys \
-                         that are cut; the animation lasts as long as the longest channel"
-                    )
-                });
+        let is_changed = match change {
+            Change::Keys(clips) => {
+                let quantize = options.quantize.is_some();
+                self.bake(&reader, (clips, quantize), &mut edits, &mut data)?
             }
-            if !read.sampled.is_empty() || cuts {
-                let mut baking = AnimationBaker::new(
-                    &json,
-                    *index,
-                    read,
-                    (sampled, options.quantize.is_some()),
-                    &edits,
+            Change::Animations(clips) => {
+                let nodes = Nodes::read(&json)?;
+                let bytes = character::replace_animations(
+                    &reader,
+                    &nodes,
+                    clips,
+                    &options.name,
+                    &mut edits,
                 )?;
-                baking.bake(&mut edits)?;
-                data.append(&mut edits, &baking.bytes);
-                is_baked = true;
+                data.append(&mut edits, &bytes);
+                true
             }
-        }
+        };
         let mut bin = data.finish(&json, &mut edits);
         let mut text = edits.finish();
-        if is_baked {
+        if is_changed {
             let length = |parts: &Vec<&[u8]>| parts.iter().map(|part| part.len()).sum();
+            let length = bin.as_ref().map_or(0, length);
             let cut;
-            (text, cut) = prune(&json, text, bin.as_ref().map_or(0, length));
+            (text, cut) = match change {
+                Change::Keys(_) => prune(&json, text, length),
+                Change::Animations(_) => prune_replaced(&json, text, length),
+            };
             bin = bin.map(|parts| cut.kept(&parts));
         }
         if is_text {
@@ -229,9 +246,53 @@ impl Document for GltfDocument {
         warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
         Ok(warnings)
     }
-}
 
-impl GltfDocument {
+    /// The clips whose keys are written, with their animations.
+    fn baked<'a>(
+        &'a self,
+        clips: &'a [(usize, SampledClip<'a>)],
+    ) -> impl Iterator<Item = (&'a ReadAnimation, &'a (usize, SampledClip<'a>))> {
+        let read = |index: usize| self.animations.get(index).and_then(Option::as_ref);
+        clips
+            .iter()
+            .filter_map(move |clip| Some((read(clip.0)?, clip)))
+    }
+
+    /// Writes samples or keys into animations; gives whether any was changed.
+    fn bake<'a>(
+        &'a self,
+        reader: &GltfReader<'a>,
+        (clips, quantize): (&'a [(usize, SampledClip<'a>)], bool),
+        edits: &mut Edits<'a>,
+        data: &mut BufferData<'a>,
+    ) -> Result<bool, WriteError> {
+        let mut is_baked = false;
+        for (read, (index, sampled)) in self.baked(clips) {
+            let cuts = is_cut(read, sampled);
+            if cuts && read.beside > 0 {
+                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
+                    let channels = match read.beside {
+                        1 => "1 channel of weights or another property is".to_owned(),
+                        count => format!("{count} channels of weights and other properties are"),
+                    };
+                    format!(
+                        "{channels} not cut: copied whole, at the times of before, in step with the keys \
+                         that are cut; the animation lasts as long as the longest channel"
+                    )
+                });
+            }
+            if !read.sampled.is_empty() || cuts {
+                let json = reader.json;
+                let mut baking =
+                    AnimationBaker::new(json, *index, read, (sampled, quantize), edits)?;
+                baking.bake(edits)?;
+                data.append(edits, baking.bytes.bytes());
+                is_baked = true;
+            }
+        }
+        Ok(is_baked)
+    }
+
     fn refuse(&self, animation: usize, code: Code, message: String) -> Diagnostic {
         Diagnostic::new(&self.name, code, message).inside(format!("/animations/{animation}"))
     }
@@ -289,4 +350,11 @@ fn named_file(json: &Json<'_>) -> Option<(String, String)> {
                 (!uri::is_data(&uri)).then(|| (format!("/{list}/{index}/uri"), uri))
             })
     })
+}
+
+/// How many bytes the samples of a clip take.
+fn sample_bytes((read, (_, sampled)): (&ReadAnimation, &(usize, SampledClip<'_>))) -> u64 {
+    let widths = read.sampled.iter().map(|channel| channel.path.width());
+    let numbers = 1 + widths.sum::<usize>();
+    4 * numbers as u64 * sampled.times.len() as u64
 }

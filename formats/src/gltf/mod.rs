@@ -14,6 +14,7 @@
 mod animation;
 mod bake;
 mod channel;
+mod character;
 mod compressed;
 mod container;
 mod data;
@@ -21,6 +22,7 @@ mod document;
 mod edits;
 mod gather;
 mod json;
+mod key_bytes;
 mod matrix;
 pub mod meshes;
 mod meshopt;
@@ -230,6 +232,30 @@ pub fn read_gltf(
         folder: folder.map(Path::to_owned),
         limits: options.limits,
         animations: read,
+    }));
+    Ok(loaded)
+}
+
+/// Reads the skeleton of a file: one clip of the joints at rest, whose document can be written with other animations. The
+/// file needs no animations.
+///
+/// # Errors
+/// When the file cannot be opened, is invalid or has no nodes.
+pub fn open_skeleton(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let (name, bytes, folder) = bytes_of(path, options.limits, options.pipes)?;
+    let mut warnings = Warnings::new(&name);
+    let container = Container::parse(&name, bytes, &mut warnings)?;
+    let json = Json::parse(&name, &container.text)?;
+    check_version(&json)?;
+    let reader = GltfReader::new(&json, &container, folder, options.limits, warnings)?;
+    let skeleton = character::skeleton(&reader, &Nodes::read(&json)?)?;
+    let mut loaded = Loaded::of(skeleton, reader.warnings.into_inner().into_list());
+    loaded.document = Some(Arc::new(GltfDocument {
+        name,
+        container,
+        folder: folder.map(Path::to_owned),
+        limits: options.limits,
+        animations: Vec::new(),
     }));
     Ok(loaded)
 }

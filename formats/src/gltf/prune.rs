@@ -60,15 +60,23 @@ type PrunedText = (String, Cut);
 /// text does not use, and what to leave out of its BIN chunk of `length` bytes. A file with parts that are not as in
 /// glTF, so that it is not known what they refer to, stays as it is.
 pub(super) fn prune(before: &Json<'_>, text: String, length: usize) -> PrunedText {
-    let pruned = without_unused(before, &text, length).ok().flatten();
-    pruned.unwrap_or((text, Cut::default()))
+    let pruned = without_unused(before, &text, length, |json| unused_samplers(before, json));
+    pruned.ok().flatten().unwrap_or((text, Cut::default()))
 }
 
-/// See [`prune`]; `None` if everything is used.
+/// See [`prune`]; for a text whose animations are other ones than before.
+pub(super) fn prune_replaced(before: &Json<'_>, text: String, length: usize) -> PrunedText {
+    let pruned = without_unused(before, &text, length, |_| Ok(Vec::new()));
+    pruned.ok().flatten().unwrap_or((text, Cut::default()))
+}
+
+/// See [`prune`]; `None` if everything is used. `left_samplers` has the samplers of each animation of the text that its
+/// channels used before and do not use now.
 fn without_unused(
     before: &Json<'_>,
     text: &str,
     length: usize,
+    left_samplers: impl Fn(&Json<'_>) -> Result<Vec<LeftOut>, Diagnostic>,
 ) -> Result<Option<PrunedText>, Diagnostic> {
     let mut json = Json::parse(before.name, text)?;
     for list in ["meshes", "skins"] {
@@ -76,7 +84,7 @@ fn without_unused(
     }
     let json = &json;
     let mut edits = Edits::new(json);
-    let left_samplers = unused_samplers(before, json)?;
+    let left_samplers = left_samplers(json)?;
     remove_samplers(json, &left_samplers, &mut edits)?;
     let references = References::of(json, &left_samplers)?;
     let used: BTreeSet<usize> = references.accessors.iter().map(|it| it.index).collect();

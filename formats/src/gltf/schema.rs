@@ -175,6 +175,14 @@ impl TargetPath {
         }
     }
 
+    /// The type of accessors with its values.
+    pub(super) fn kind(self) -> &'static str {
+        match self {
+            Self::Rotation => "VEC4",
+            Self::Translation | Self::Scale => "VEC3",
+        }
+    }
+
     /// How many numbers a value has.
     pub(super) fn width(self) -> usize {
         match self {

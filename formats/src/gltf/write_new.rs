@@ -21,13 +21,17 @@ use crate::gltf::write_new::binary::{AccessorData, Binary};
 use crate::gltf::write_new::json::{
     Animation, Asset, Buffer, Channel, MESHOPT, Root, Sampler, Scene, Skin, Target,
 };
-use crate::gltf::write_new::rig::{NewNodes, UniqueNames};
+use crate::gltf::write_new::rig::NewNodes;
 use crate::gltf::write_new::samples::{ClipSamples, Property};
 use crate::gltf::written_keys::WrittenKeys;
 use crate::motion::{self, SampledClip};
 use crate::warnings::Warnings;
 
-pub(super) use crate::gltf::write_new::json::{FLOAT, SHORT};
+pub(super) use crate::gltf::write_new::json::{
+    Animation as NewAnimation, Channel as NewChannel, FLOAT, SHORT, Sampler as NewSampler,
+    Target as NewTarget,
+};
+pub(super) use crate::gltf::write_new::rig::UniqueNames;
 
 /// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
 const HEADERS: u64 = 28;
@@ -181,7 +185,7 @@ fn keyed_channels(samples: ClipSamples<'_>) -> Result<Option<Vec<KeyedChannel>>,
                 channels.push(KeyedChannel {
                     track,
                     property,
-                    times: f32_times(samples, &keys.times)?,
+                    times: f32_times(samples.tracks, &keys.times)?,
                     keys,
                 });
             }
@@ -204,7 +208,7 @@ fn parts<'a>(
             Diagnostic::new(&options.name, code, message)
         };
         let samples = ClipSamples::of(clip)?;
-        let times = f32_times(samples, clip.times).map_err(refuse)?;
+        let times = f32_times(samples.tracks, clip.times).map_err(refuse)?;
         let keys = keyed_channels(samples).map_err(refuse)?;
         if samples.has_scaled_parents_in_world() {
             let why = "its poses are in the world and its joints have scales, so they cannot be \
@@ -289,15 +293,15 @@ fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
     })
 }
 
-/// The times of a clip in f32, or why they cannot be stored so.
-fn f32_times(samples: ClipSamples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
+/// The times of a clip of some tracks in f32, or why they cannot be stored so.
+pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
     // The sum makes -0 to 0.
     let times: Vec<f32> = seconds.iter().map(|&time| time as f32 + 0.0).collect();
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
         let why = "it has no samples; give a time at least";
         return Err((Code::NothingToAnimate, why.to_owned()));
     };
-    if samples.tracks == 0 {
+    if tracks == 0 {
         return Err((Code::NothingToAnimate, "it has no tracks".to_owned()));
     }
     if first < 0.0 {

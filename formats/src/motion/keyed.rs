@@ -82,7 +82,8 @@ pub fn keys_for(
     let takes_keys = match keys_per_channel {
         true => !clip.is_world,
         false => {
-            format.supports(Feature::TimesPerTrack) && (0..clip.set.track_count()).all(has_one_list)
+            let has_lists = format.supports(Feature::TimesPerTrack) && clip.set.scalar_count() == 0;
+            has_lists && (0..clip.set.track_count()).all(has_one_list)
         }
     };
     match keyed(clip) {

@@ -187,12 +187,25 @@ impl ChannelMethods {
     }
 
     pub(super) fn vector_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
+        self.method_by(sampler, |method| method.vector_method)
+    }
+
+    /// The method of a scalar, by its sampler.
+    fn scalar_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
+        self.method_by(sampler, |method| method.scalar_method())
+    }
+
+    fn method_by(
+        &self,
+        sampler: Option<ChannelInterpolation>,
+        of: impl Fn(Method) -> VectorMethod,
+    ) -> VectorMethod {
         match (sampler, self.method.0) {
             (Some(ChannelInterpolation::Step), _) => VectorMethod::Step,
             (Some(ChannelInterpolation::Linear), None) => VectorMethod::Linear,
             (Some(ChannelInterpolation::Cubic), None) => VectorMethod::GltfCubic,
             (None, None) => VectorMethod::BesselOverhauser,
-            (_, Some(method)) => method.vector_method,
+            (_, Some(method)) => of(method),
         }
     }
 
@@ -221,9 +234,9 @@ impl ChannelMethods {
             Ok(_) => frames,
             Err(_) => SampleTimes::at(timeline.times(0).collect()),
         };
-        let (how, layout) = (self.options.with(method::SLERP), Layout::FrameMajor);
+        let layout = Layout::FrameMajor;
         let methods: Vec<VectorMethod> = (0..count)
-            .map(|index| self.vector_method(clip.scalar(index).interpolation))
+            .map(|index| self.scalar_method(clip.scalar(index).interpolation))
             .collect();
         let mut all = vec![0.0; timeline.len() * count];
         for (first, &method) in methods.iter().enumerate() {
@@ -238,6 +251,13 @@ impl ChannelMethods {
             for keys in of_method.iter().filter_map(|&index| clip.set.scalar(index)) {
                 set.push_scalar("", keys.times, keys.keys, keys.tangents)?;
             }
+            // The ends of curves that are solved for are those of the method.
+            let of_ends = match method {
+                VectorMethod::C2 => method::C2,
+                VectorMethod::BSpline => method::B_SPLINE,
+                _ => method::SLERP,
+            };
+            let how = self.options.with(of_ends);
             let found = engine.scalars(&set, quantity, method, how, &frames, layout)?;
             let rows = found.as_slice().chunks_exact(of_method.len());
             for (row, found) in all.chunks_exact_mut(count).zip(rows) {

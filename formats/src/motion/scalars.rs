@@ -43,6 +43,22 @@ tumble::names! {
     Contact => "contact",
 }
 
+/// Between the name of a scalar and its kind in the names of columns.
+const OF_COLUMN: &str = ".scalar_";
+
+impl ScalarKind {
+    /// The name of the column of a table with a scalar of this kind: `knee.scalar_angle`.
+    pub(crate) fn column(self, name: &str) -> String {
+        format!("{name}{OF_COLUMN}{}", self.name())
+    }
+
+    /// The name and the kind of the scalar that a column has, by the column's name.
+    pub(crate) fn of_column(column: &str) -> Option<(&str, Self)> {
+        let (name, kind) = column.rsplit_once(OF_COLUMN)?;
+        Some((name, kind.parse().ok()?))
+    }
+}
+
 impl Scalar {
     /// A scalar of a kind; contacts are steps.
     #[must_use]

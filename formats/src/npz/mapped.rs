@@ -64,15 +64,21 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<ArchivePlan, Diagnost
     }
     let mut names = vec![String::new(); plan.tracks];
     for entry in &map.entries {
-        if ROLES.contains(&&*entry.name) {
+        if ROLES.contains(&&*entry.name) || entry.scalar.is_some() {
             continue;
         }
         let part = part(archive, entry, rotations(entry), plan.tracks, lengths)?;
         plan.add(archive, part)?;
         names.resize(plan.tracks, entry.name.clone());
     }
-    if plan.tracks == 0 {
-        let message = "the map names no rotations; give `rotations=ARRAY` or `TRACK=ARRAY`";
+    for entry in &map.entries {
+        if let Some(kind) = entry.scalar {
+            let scalars = (kind, entry.is_scalar_in_degrees);
+            plan.add_scalar_columns(archive, source(archive, entry)?, entry, scalars)?;
+        }
+    }
+    if plan.tracks == 0 && plan.scalars.is_empty() {
+        let message = "the map names no rotations; give `rotations=ARRAY`, `TRACK=ARRAY` or `NAME=ARRAY:scalar`";
         return Err(Diagnostic::new(&archive.file, Code::Map, message));
     }
     plan.names = names;

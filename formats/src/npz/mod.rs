@@ -14,7 +14,7 @@ mod linear;
 mod mapped;
 pub(crate) mod plan;
 pub mod rotation_vector;
-mod smpl;
+pub(crate) mod smpl;
 mod tumble_layout;
 mod world_bodies;
 pub mod write;

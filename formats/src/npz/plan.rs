@@ -39,6 +39,8 @@ pub(crate) struct ArchivePlan {
     pub(crate) rest: Vec<(Transform, DVec3)>,
     /// The member with the times in seconds.
     pub(crate) times: Option<TimeList>,
+    /// The member with the number of each frame, where frames may be missing.
+    pub(crate) frame_numbers: Option<usize>,
     /// The member with the rate.
     pub(crate) rate_member: Option<usize>,
     pub(crate) rate: Option<FrameRate>,
@@ -216,6 +218,45 @@ impl KeyArray {
             at,
         };
         Ok(Some((part, frames)))
+    }
+
+    /// The rotations of an array of matrices, (frames, tracks, 3, 3), and the number of frames.
+    ///
+    /// # Errors
+    /// When there is no such array, or its rows are not one after another in memory.
+    pub(crate) fn of_matrices(archive: &Archive, name: &str) -> Result<(Self, usize), Diagnostic> {
+        let Some(member) = archive.find(name) else {
+            let message = format!("there is no array `{name}`");
+            return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
+        };
+        check_float(archive, member)?;
+        let header = archive.header(member)?;
+        let (&[frames, tracks, 3, 3], &[frame, track, rows, component]) =
+            (&header.shape[..], &header.strides()[..])
+        else {
+            let shape = shape_text(&header.shape);
+            let message =
+                format!("the array has shape {shape}; (frames, joints, 3, 3) is expected");
+            return Err(archive.refuse(member, Code::Shape, message));
+        };
+        if rows != 3 * component {
+            let message =
+                "the matrices are in Fortran's order; save them with numpy.ascontiguousarray";
+            return Err(archive.refuse(member, Code::Shape, message.to_owned()));
+        }
+        let part = Self {
+            member,
+            kind: KeyKind::Form(RotationForm::Matrix),
+            tracks: 0..tracks,
+            layout: Layout::FrameMajor,
+            at: Strides {
+                first: 0,
+                track,
+                frame,
+                component,
+            },
+        };
+        Ok((part, frames))
     }
 
     /// The index of the key of a track, as in `NumPy`.

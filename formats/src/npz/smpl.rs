@@ -142,6 +142,15 @@ impl Skeleton {
     }
 }
 
+/// The names and parents of the joints of the body with this number of joints.
+pub(crate) fn joints_of_body(joints: usize) -> Option<(Vec<String>, Vec<Option<usize>>)> {
+    Skeleton::of(joints).map(|skeleton| (skeleton.names, skeleton.parents))
+}
+
+/// Why the joints of a body have no places.
+pub(crate) const NO_OFFSETS: &str = "where a body's joints are depends on its shape; give a model of it with --body-model, or their \
+                                     places with --offsets";
+
 /// The plan of a file with `poses`, or with `root_orient`, `pose_body` and perhaps others, which the models call
 /// `global_orient` and `body_pose`. `None` for other files.
 pub(crate) fn plan(
@@ -229,10 +238,7 @@ pub(crate) fn plan(
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
         plan.is_body = true;
         plan.companions = &BESIDE;
-        plan.no_world = Some(
-            "where a body's joints are depends on its shape; give a model of it with --body-model, or their places with --offsets"
-                .to_owned(),
-        );
+        plan.no_world = Some(NO_OFFSETS.to_owned());
     }
     let root = ROOTS.into_iter().find(|name| archive.find(name).is_some());
     if let Some(root) = root

@@ -59,14 +59,16 @@ pub(crate) fn plan(
 ) -> Result<Option<ArchivePlan>, Diagnostic> {
     let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::TrackMajor);
     let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
-    let Some(rotations) = array("rotations", quaternions)? else {
-        return Ok(None);
-    };
     let mut plan = ArchivePlan {
         is_tumble_layout: true,
         ..ArchivePlan::default()
     };
-    plan.add(archive, rotations)?;
+    match (array("rotations", quaternions)?, frames_of_scalars(archive)) {
+        (Some(rotations), _) => plan.add(archive, rotations)?,
+        // A clip without tracks.
+        (None, Some(frames)) => (plan.frames, plan.is_part) = (frames, true),
+        (None, None) => return Ok(None),
+    }
     for (name, values) in [
         ("translations", KeyKind::Translation),
         ("scales", KeyKind::Scale),
@@ -100,6 +102,15 @@ pub(crate) fn plan(
         }
     }
     Ok(Some(plan))
+}
+
+/// The number of frames of scalars in this layout.
+fn frames_of_scalars(archive: &Archive) -> Option<usize> {
+    let &[_, frames] = archive.shape(SCALARS)? else {
+        return None;
+    };
+    let has = |name| archive.find(name).is_some();
+    (has(SCALAR_NAMES) && has("times")).then_some(frames)
 }
 
 /// The texts of an array with `each` of them for each track; `None` if there is no such array.

@@ -160,7 +160,8 @@ pub(super) fn keys(
 pub(super) fn check(sampled: &SampledClip<'_>, name: &str) -> Result<(), WriteError> {
     let (tracks, frames) = (sampled.clip.set.track_count(), sampled.times.len());
     let count = sampled.rotations.len();
-    if tracks > 0 && frames > 0 && tracks.checked_mul(frames) == Some(count) {
+    let has_keys = tracks > 0 || sampled.clip.set.scalar_count() > 0;
+    if has_keys && frames > 0 && tracks.checked_mul(frames) == Some(count) {
         return Ok(());
     }
     let message = format!("{count} rotations for {tracks} tracks at {frames} times");
@@ -220,7 +221,7 @@ pub fn write_npz(
     let mut members = ArchiveWriter::new();
     let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
     for (path, values, is_there) in [
-        ("rotations.npy", quaternions, true),
+        ("rotations.npy", quaternions, tracks > 0),
         (
             "translations.npy",
             KeyKind::Translation,

@@ -1,6 +1,7 @@
 //! Parquet: tables in columns, compressed page by page.
 
 mod columns;
+pub(crate) mod lerobot;
 mod pages;
 mod plain;
 mod schema;
@@ -19,6 +20,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
 use crate::parquet::columns::ParquetFile;
+use crate::parquet::lerobot::Info;
 use crate::parquet::pages::check_pages;
 use crate::parquet::schema::check_schema;
 use crate::parquet::write::ParquetSink;
@@ -71,7 +73,13 @@ const TAIL: usize = 8;
 pub fn open_parquet(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let name = source.name.clone();
-    read_parquet(&name, source.into_bytes(options.limits.file)?, options)
+    let info = Info::beside(path, options.limits);
+    read(
+        &name,
+        source.into_bytes(options.limits.file)?,
+        info.as_ref(),
+        options,
+    )
 }
 
 /// Reads the bytes of a Parquet file; `name` is the input's name in messages.
@@ -83,9 +91,21 @@ pub fn read_parquet(
     bytes: Vec<u8>,
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
+    read(name, bytes, None, options)
+}
+
+fn read(
+    name: &str,
+    bytes: Vec<u8>,
+    info: Option<&Info>,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
     check_tail(name, &bytes)?;
     let bytes = Bytes::from(bytes);
-    let (table, plan) = decoded(name, "a page", || read_table(name, bytes, options))?;
+    let (table, mut plan) = decoded(name, "a page", || read_table(name, bytes, options))?;
+    if let Some(info) = info {
+        info.name(&mut plan);
+    }
     clips(&table, &plan, options)
 }
 

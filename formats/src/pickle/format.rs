@@ -83,6 +83,13 @@ fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnosti
         loaded.warnings.splice(0..0, warnings);
         return Ok(loaded);
     }
+    if options.map.is_none()
+        && let Some(library) = dialect::protomotions::library(&archive, options)
+    {
+        let mut loaded = library?;
+        loaded.warnings.splice(0..0, warnings);
+        return Ok(loaded);
+    }
     let mut loaded = match npz::of_values(&archive, options) {
         // Each entry may be a clip.
         Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {

@@ -13,6 +13,7 @@ use tumble::{
     TrackSet, VectorMethod, names,
 };
 
+use crate::motion::Motion;
 use crate::motion::signs::continue_signs;
 use crate::npz::rotation_vector;
 
@@ -365,21 +366,64 @@ pub fn mass_centres(tree: &Tree, point: VelocityPoint) -> Result<Vec<DVec3>, Bod
 
 fn note_excesses(tree: &Tree, values: &[f64], sample: usize, excesses: &mut Vec<LimitExcess>) {
     for (joint, &value) in tree.scalar_joints().zip(values) {
-        let Some([low, high]) = joint.limits else {
+        note_excess((&joint.name, joint.limits), value, sample, excesses);
+    }
+}
+
+fn note_excess(
+    (name, limits): (&str, Option<[f64; 2]>),
+    value: f64,
+    sample: usize,
+    excesses: &mut Vec<LimitExcess>,
+) {
+    let Some([low, high]) = limits else {
+        return;
+    };
+    let excess = (low - value).max(value - high);
+    // Limits and keys are rounded to f32 in most files.
+    if excess <= 1e-6 * value.abs().max(1.0) {
+        return;
+    }
+    match excesses.iter_mut().find(|known| known.joint == name) {
+        Some(known) => known.excess = known.excess.max(excess),
+        None => excesses.push(LimitExcess {
+            joint: name.to_owned(),
+            excess,
+            sample,
+        }),
+    }
+}
+
+/// The scalars of a clip that leave their limits, by their values at samples, `[sample][scalar]`, without origins.
+#[must_use]
+pub fn scalar_excesses(clip: &Motion, values: &[f32]) -> Vec<LimitExcess> {
+    let count = clip.set.scalar_count();
+    let mut excesses = Vec::new();
+    for (sample, row) in values.chunks_exact(count.max(1)).enumerate() {
+        for ((index, keys), &value) in clip.scalar_keys().enumerate().zip(row) {
+            let scalar = clip.scalar(index);
+            let value = f64::from(value) + scalar.origin;
+            note_excess((keys.name, scalar.limits), value, sample, &mut excesses);
+        }
+    }
+    excesses
+}
+
+/// Keeps the scalars of a clip inside their limits; where they are outside, what changes (`rates`) is 0.
+pub fn clamp_scalars(clip: &Motion, values: &mut [f32], mut rates: Option<&mut [f32]>) {
+    let count = clip.set.scalar_count().max(1);
+    for (at, value) in values.iter_mut().enumerate() {
+        let scalar = clip.scalar(at % count);
+        let Some([low, high]) = scalar.limits else {
             continue;
         };
-        let excess = (low - value).max(value - high);
-        // Limits and keys are rounded to f32 in most files.
-        if excess <= 1e-6 * value.abs().max(1.0) {
-            continue;
-        }
-        match excesses.iter_mut().find(|known| known.joint == joint.name) {
-            Some(known) => known.excess = known.excess.max(excess),
-            None => excesses.push(LimitExcess {
-                joint: joint.name.clone(),
-                excess,
-                sample,
-            }),
+        let stored = f64::from(*value) + scalar.origin;
+        let inside = stored.clamp(low.min(high), high.max(low));
+        if inside != stored {
+            *value = (inside - scalar.origin) as f32;
+            if let Some(rate) = rates.as_mut().and_then(|rates| rates.get_mut(at)) {
+                *rate = 0.0;
+            }
         }
     }
 }

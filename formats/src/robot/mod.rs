@@ -10,7 +10,7 @@ mod mjcf;
 mod urdf;
 mod xml;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tumble::names;
 use tumble::trees::{Configuration, Tree};
@@ -18,7 +18,7 @@ use tumble::trees::{Configuration, Tree};
 pub(crate) use assign::joints_of;
 pub use bodies::{
     Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
-    bodies, mass_centres, motions, unwrap_angles, unwrap_joint,
+    bodies, clamp_scalars, mass_centres, motions, scalar_excesses, unwrap_angles, unwrap_joint,
 };
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -67,6 +67,19 @@ const MAX_BYTES: u64 = 4 << 20;
 /// The largest number of bodies.
 const MAX_BODIES: usize = 65_536;
 
+/// How large the files of a robot may be.
+fn limits() -> Limits {
+    Limits {
+        file: MAX_BYTES,
+        ..Limits::default()
+    }
+}
+
+/// The files that an MJCF includes, relative to its folder; none where it cannot be read.
+pub(crate) fn included_files(path: &Path) -> Vec<PathBuf> {
+    Files::open(path, limits()).map_or(Vec::new(), Files::into_included)
+}
+
 /// How deep bodies and frames may be nested.
 const MAX_DEPTH: usize = 512;
 
@@ -85,11 +98,7 @@ impl Robot {
     /// # Errors
     /// When the file cannot be opened, is no robot, is larger than 4 MiB, or its bodies are no tree.
     pub fn open(path: &Path) -> Result<Self, Diagnostic> {
-        let limits = Limits {
-            file: MAX_BYTES,
-            ..Limits::default()
-        };
-        let files = Files::open(path, limits)?;
+        let files = Files::open(path, limits())?;
         let documents = files.parse()?;
         let root = documents.root();
         match documents.tag(root) {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
 use roxmltree::{Document, Node, NodeId, ParsingOptions};
@@ -14,6 +14,8 @@ use crate::source::Source;
 /// The texts of a file and of those that it includes.
 pub(super) struct Files {
     files: Vec<TextFile>,
+    /// Their paths, relative to the folder of the first.
+    paths: Vec<PathBuf>,
     /// The file that takes the place of an `include`.
     included: HashMap<Element, usize>,
 }
@@ -101,10 +103,10 @@ impl Files {
         let mut rest = limits.file.saturating_sub(first.text.len() as u64);
         let mut this = Self {
             files: vec![first],
+            // The main file's name, too: it cannot include itself.
+            paths: vec![path.file_name().map_or(path, Path::new).to_owned()],
             included: HashMap::new(),
         };
-        // The main file's name, too: it cannot include itself.
-        let mut names = vec![path.file_name().map_or(path, Path::new).to_owned()];
         let mut next = 0;
         while let Some(file) = this.files.get(next) {
             let document = parse(file)?;
@@ -129,7 +131,7 @@ impl Files {
                         format!("includes `{name}`, which leads out of the file's folder");
                     return Err(refuse(Code::RobotInclude, message));
                 };
-                if names.contains(&name) {
+                if this.paths.contains(&name) {
                     let message = format!("includes `{}` twice", name.display());
                     return Err(refuse(Code::RobotInclude, message));
                 }
@@ -140,11 +142,16 @@ impl Files {
                 rest = rest.saturating_sub(file.text.len() as u64);
                 this.included.insert(element, this.files.len());
                 this.files.push(file);
-                names.push(name);
+                this.paths.push(name);
             }
             next += 1;
         }
         Ok(this)
+    }
+
+    /// The files that the first includes, relative to its folder.
+    pub(super) fn into_included(mut self) -> Vec<PathBuf> {
+        self.paths.split_off(1)
     }
 
     pub(super) fn parse(&self) -> Result<Documents<'_>, Diagnostic> {

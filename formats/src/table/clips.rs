@@ -11,9 +11,9 @@ use glam::DVec3;
 use crate::decimal::time_text;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions};
-use crate::motion::Motion;
 use crate::motion::grid::restore;
 use crate::motion::keys::Origin;
+use crate::motion::{Motion, Scalar};
 use crate::printable::printable;
 use crate::table::clips::keys::RowKeys;
 use crate::table::columns::Table;
@@ -167,11 +167,16 @@ impl TableClip<'_> {
             self.leave_out_gaps(plan, &mut shared, warnings)?;
         }
         let mut keys = self.keys(&shared, warnings)?;
+        let (scalar_rows, scalar_list) = scalar_rows(&shared);
         let lists = &mut shared.lists;
         let rate = match self.times.precision {
             Some(precision) if !self.options.raw_times => restore(lists, precision),
             Some(_) => None,
             None => self.options.source_rate,
+        };
+        let scalar_times = match plan.scalars[..] {
+            [] => Vec::new(),
+            _ => lists[scalar_list].clone(),
         };
         self.increasing(plan, &mut shared, &mut keys, warnings)?;
         let mut motion = Motion {
@@ -204,7 +209,59 @@ impl TableClip<'_> {
         for (track, origin) in origins.into_iter().enumerate() {
             motion.set_origin(track, origin);
         }
+        self.read_scalars(plan, (&scalar_rows, &scalar_times), &mut motion, warnings)?;
         Ok(motion)
+    }
+
+    /// Adds the scalars of some rows, at these times, to a clip.
+    fn read_scalars(
+        &self,
+        plan: &TablePlan,
+        (positions, times): (&[u32], &[f64]),
+        motion: &mut Motion,
+        warnings: &mut Warnings,
+    ) -> Result<(), Diagnostic> {
+        for scalars in &plan.scalars {
+            for (name, cell) in scalars.cells(self.table, warnings) {
+                let reader = self.reader(cell)?;
+                let (mut kept, mut keys): (Vec<f64>, Vec<f32>) = (Vec::new(), Vec::new());
+                let numbers = positions.iter().map(|&position| {
+                    let row = self.row(position as usize);
+                    (row, (reader.at(row) * scalars.factor) as f32)
+                });
+                let numbers: Vec<(usize, f32)> = numbers.collect();
+                // Of a scalar that other clips of the table have, all numbers are missing.
+                if numbers.iter().all(|(_, number)| number.is_nan()) {
+                    continue;
+                }
+                for (&time, &(row, number)) in times.iter().zip(&numbers) {
+                    if !number.is_finite() && !(number.is_nan() && self.options.bridge_gaps) {
+                        let message = format!("{number} is not a finite number of f32; repair it");
+                        return Err(self.table.refuse_at(
+                            cell.column,
+                            row,
+                            Code::NotFinite,
+                            message,
+                        ));
+                    }
+                    let is_again = kept.last() == Some(&time) && keys.last() == Some(&number);
+                    if !number.is_nan() && !is_again {
+                        kept.push(time);
+                        keys.push(number);
+                    }
+                }
+                let added = motion.add_scalar(Scalar::of(scalars.kind), &name, &kept, &keys, &[]);
+                added.map_err(|error| {
+                    let message = format!("the scalar `{name}` cannot be kept: {error}");
+                    self.table
+                        .refuse_at(cell.column, self.row(0), Code::TimeNotIncreasing, message)
+                })?;
+            }
+        }
+        if let Some(message) = motion.angle_jump() {
+            warnings.warn(Code::AngleJumps, || (None, message));
+        }
+        Ok(())
     }
 
     /// Assigns every row to every track, in a wide table.
@@ -416,5 +473,14 @@ impl TableClip<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// The positions of the rows with scalars, by increasing time, and the list with their times: those of the first track, or
+/// all of a table without tracks.
+fn scalar_rows(shared: &SharedRows<'_>) -> (Vec<u32>, usize) {
+    match shared.tracks.first() {
+        Some(track) => (shared.positions(track).to_vec(), track.list),
+        None => (shared.order.clone(), 0),
     }
 }

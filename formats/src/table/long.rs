@@ -195,6 +195,14 @@ pub(crate) fn write_motion<S: RowSink>(
     };
     components.extend(translation.iter().filter(|_| moved));
     components.extend(TRANSFORM[7..].iter().filter(|_| scaled));
+    let trackless = |clip: &SampledClip<'_>| clip.clip.set.track_count() == 0;
+    if clips.iter().all(trackless) {
+        components.clear();
+    } else if clips.iter().any(trackless) {
+        let message = "a clip of scalars alone beside clips with tracks; write each to a file";
+        return Err(invalid(message).into());
+    }
+    let scalars = scalar_columns(clips);
     let named = clips.len() > 1 || clips.iter().any(|clip| clip.clip.name.is_some());
     let clip_names = clips
         .iter()
@@ -210,6 +218,11 @@ pub(crate) fn write_motion<S: RowSink>(
         let is_wide = has_origins && translation.contains(&name);
         (name.to_owned(), ComponentColumn::of_positions(is_wide))
     });
+    let columns = columns.chain(
+        scalars
+            .iter()
+            .map(|(name, is_wide)| (name.clone(), ComponentColumn::of_positions(*is_wide))),
+    );
     let mut batch = Batch::new(
         columns,
         TimeColumn::of(clips.iter().map(|clip| clip.clip.time_offset)),
@@ -231,6 +244,7 @@ pub(crate) fn write_motion<S: RowSink>(
                 is_w_first,
                 has_translations: moved,
                 has_scales: scaled,
+                scalars: scalars_of(sampled, &scalars),
             },
             &mut batch,
             &mut sink,
@@ -281,12 +295,38 @@ fn notes(clips: &[SampledClip<'_>]) -> Vec<(String, String)> {
     notes
 }
 
+/// The columns of the scalars of all clips, each once, and whether one of them has an origin.
+fn scalar_columns(clips: &[SampledClip<'_>]) -> Vec<(String, bool)> {
+    let mut all: Vec<(String, bool)> = Vec::new();
+    for sampled in clips {
+        for (index, keys) in sampled.clip.scalar_keys().enumerate() {
+            let scalar = sampled.clip.scalar(index);
+            let (name, is_wide) = (scalar.kind.column(keys.name), scalar.origin != 0.0);
+            match all.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, known)) => *known |= is_wide,
+                None => all.push((name, is_wide)),
+            }
+        }
+    }
+    all
+}
+
+/// For each column of scalars the scalar of a clip; `None` if the clip has none of this name and kind.
+fn scalars_of(sampled: &SampledClip<'_>, columns: &[(String, bool)]) -> Vec<Option<usize>> {
+    let named = sampled.clip.scalar_keys().enumerate();
+    let named = named.map(|(index, keys)| sampled.clip.scalar(index).kind.column(keys.name));
+    let named: Vec<String> = named.collect();
+    let column = |(name, _): &(String, bool)| named.iter().position(|known| known == name);
+    columns.iter().map(column).collect()
+}
+
 /// The columns that a table of clips has.
-#[derive(Clone, Copy)]
 struct ClipColumns {
     is_w_first: bool,
     has_translations: bool,
     has_scales: bool,
+    /// The clip's scalar of each column of scalars.
+    scalars: Vec<Option<usize>>,
 }
 
 /// The numbers of one row.
@@ -294,10 +334,13 @@ struct RowNumbers {
     rotation: Quat,
     translation: DVec3,
     scale: Vec3,
+    /// NaN where the clip has none.
+    scalars: Vec<f64>,
 }
 
 impl ClipColumns {
-    fn push(self, row: &RowNumbers, batch: &mut Batch) {
+    /// Appends the numbers of a row, and, in the columns after them, the scalars of a sample.
+    fn push(&self, row: &RowNumbers, batch: &mut Batch) {
         let mut numbers = row.rotation.to_array().map(f64::from).to_vec();
         if self.is_w_first {
             numbers.rotate_right(1);
@@ -308,6 +351,7 @@ impl ClipColumns {
         if self.has_scales {
             numbers.extend(row.scale.to_array().map(f64::from));
         }
+        numbers.extend(&row.scalars);
         for (column, number) in batch.numbers.iter_mut().zip(numbers) {
             column.push_number(number);
         }
@@ -329,21 +373,46 @@ fn write_clip(
         && let Some(lists) = lists.collect::<Option<Vec<&[f64]>>>()
     {
         for (track, times) in lists.into_iter().enumerate() {
-            write_track(clip, track, times, codes[track], columns, batch, sink)?;
+            write_track(clip, track, times, codes[track], &columns, batch, sink)?;
         }
         return Ok(());
     }
     sampled.checked_len()?;
+    let scalars = |frame: usize| -> Vec<f64> {
+        let value = |index: usize| sampled.scalar_value(frame, index);
+        columns
+            .scalars
+            .iter()
+            .map(|scalar| scalar.map_or(f64::NAN, value))
+            .collect()
+    };
+    if tracks == 0 {
+        for (frame, &time) in sampled.times.iter().enumerate() {
+            batch.row(frame, clip.time_offset, time, 0);
+            let numbers = batch.numbers.iter_mut().zip(scalars(frame));
+            numbers.for_each(|(column, number)| column.push_number(number));
+            if batch.is_full() {
+                batch.flush(sink)?;
+            }
+        }
+        return Ok(());
+    }
+    let mut of_frame = (usize::MAX, Vec::new());
     for (index, &rotation) in sampled.rotations.iter().enumerate() {
         let (frame, track) = (index / tracks, index % tracks);
+        if of_frame.0 != frame {
+            of_frame = (frame, scalars(frame));
+        }
         batch.row(frame, clip.time_offset, sampled.times[frame], codes[track]);
         let relative = sampled.translations.get(index).copied().unwrap_or_default();
         let row = RowNumbers {
             rotation,
             translation: clip.origin(track) + relative.as_dvec3(),
             scale: sampled.scales.get(index).copied().unwrap_or(Vec3::ONE),
+            scalars: of_frame.1,
         };
         columns.push(&row, batch);
+        of_frame.1 = row.scalars;
         if batch.is_full() {
             batch.flush(sink)?;
         }
@@ -357,7 +426,7 @@ fn write_track(
     track: usize,
     times: &[f64],
     code: usize,
-    columns: ClipColumns,
+    columns: &ClipColumns,
     batch: &mut Batch,
     sink: &mut impl RowSink,
 ) -> io::Result<()> {
@@ -374,6 +443,8 @@ fn write_track(
             rotation: at(&rotations, key).unwrap_or(Quat::IDENTITY),
             translation: clip.origin(track) + vector(Channel::Translation, key).as_dvec3(),
             scale: vector(Channel::Scale, key),
+            // Clips with scalars are written by samples.
+            scalars: vec![f64::NAN; columns.scalars.len()],
         };
         columns.push(&row, batch);
         if batch.is_full() {

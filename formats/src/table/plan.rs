@@ -8,10 +8,12 @@ use tumble::FrameRate;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
 use crate::map::{Entry, Map};
+use crate::motion::ScalarKind;
+use crate::npz::plan::scalars::RADIANS;
 use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 use crate::table::columns::{ColumnNeed, RequestedColumn, Table};
-use crate::warnings::listed;
+use crate::warnings::{Warnings, listed};
 
 /// Columns with the track of a row, in long tables.
 const TRACK: [&str; 3] = ["track", "joint", "body"];
@@ -32,6 +34,8 @@ pub(crate) struct TablePlan {
     /// The column of clips, and the prefix of its values in the names of clips.
     pub(crate) clip: Option<(usize, &'static str)>,
     pub(crate) rows: RowLayout,
+    /// The scalars of each row, beside the keys of tracks.
+    pub(crate) scalars: Vec<ScalarColumn>,
     /// The names of the columns that are not read.
     pub(crate) left_out: Vec<String>,
     /// The metadata of the file.
@@ -76,6 +80,67 @@ pub(crate) enum RowLayout {
         is_world: bool,
     },
 }
+
+/// Scalars in a column: of a number, or of a list.
+#[derive(Debug)]
+pub(crate) struct ScalarColumn {
+    pub(crate) column: usize,
+    /// Which numbers of a list; `None` for all of it.
+    pub(crate) items: Option<Range<usize>>,
+    /// What the names of several scalars begin with, and the name of one.
+    pub(crate) name: String,
+    /// The name of each of several, if they are known.
+    pub(crate) names: Vec<String>,
+    pub(crate) kind: ScalarKind,
+    /// What the numbers are multiplied by.
+    pub(crate) factor: f64,
+}
+
+impl ScalarColumn {
+    /// The name and the location of each scalar.
+    pub(crate) fn cells(
+        &self,
+        table: &Table,
+        warnings: &mut Warnings,
+    ) -> Vec<(String, CellSource)> {
+        let column = self.column;
+        let Some(length) = table.list_length(column) else {
+            let cell = CellSource {
+                column,
+                item: None,
+                whole: None,
+            };
+            return vec![(self.name.clone(), cell)];
+        };
+        let items = self.items.clone().unwrap_or(0..length);
+        let has_names = self.names.len() == items.len();
+        if !has_names {
+            warnings.warn(Code::UnnamedJoints, || {
+                let name = &self.name;
+                let message = format!(
+                    "the {length} numbers of `{name}` have no names; they are called {name}.0, {name}.1 …"
+                );
+                (None, message)
+            });
+        }
+        let named = |(index, item): (usize, usize)| {
+            let name = match has_names {
+                true => self.names[index].clone(),
+                false => format!("{}.{index}", self.name),
+            };
+            let cell = CellSource {
+                column,
+                item: Some(item),
+                whole: self.items.is_none().then_some(length),
+            };
+            (name, cell)
+        };
+        items.enumerate().map(named).collect()
+    }
+}
+
+/// The columns of robots' data sets by LeRobot that are scalars.
+const LEROBOT: [&str; 2] = ["observation.state", "action"];
 
 /// The columns of the numbers of a track's keys.
 #[derive(Debug)]
@@ -321,6 +386,10 @@ impl TablePlan {
                 continue;
             };
             let mut is_read = vec![false; length];
+            for scalars in self.scalars.iter().filter(|it| it.column == column) {
+                let items = scalars.items.clone().unwrap_or(0..length);
+                is_read[items.start.min(length)..items.end.min(length)].fill(true);
+            }
             for cell in self.cells().filter(|cell| cell.column == column) {
                 if let Some(known) = cell.item.and_then(|item| is_read.get_mut(item)) {
                     *known = true;
@@ -381,6 +450,7 @@ impl TablePlan {
                 .take("episode_index", ColumnNeed::Whole)?
                 .map(|at| (at, "episode_")),
         };
+        let scalars = scalar_columns(&mut names, &mapped)?;
         let rows = if !mapped.tracks.is_empty() {
             mapped_rows(&mut names, &mapped.tracks)?
         } else if names.find("w")?.is_some() || names.find("qw")?.is_some() {
@@ -389,6 +459,11 @@ impl TablePlan {
                 track: names.first_of(&TRACK)?,
                 parts: Box::new(parts),
                 is_world,
+            }
+        } else if !scalars.is_empty() && wide_names(&names).is_empty() {
+            RowLayout::Times {
+                tracks: Vec::new(),
+                is_world: false,
             }
         } else {
             wide_rows(&mut names)?
@@ -407,6 +482,7 @@ impl TablePlan {
             time_unit: options.time_unit,
             clip,
             rows,
+            scalars,
             #[cfg(feature = "parquet")]
             notes: Vec::new(),
         })
@@ -418,6 +494,8 @@ impl TablePlan {
 struct MappedColumns {
     /// The entries that are rotations, and translations and scales of their tracks.
     tracks: Vec<Entry>,
+    /// The entries that are scalars.
+    scalars: Vec<Entry>,
     /// The columns that got other names, and the entries of these.
     renamed: Vec<(usize, Entry)>,
 }
@@ -447,6 +525,10 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<MappedColumns, Diagn
     let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
     let mut mapped = MappedColumns::default();
     for entry in map.entries {
+        if entry.scalar.is_some() {
+            mapped.scalars.push(entry);
+            continue;
+        }
         if column_range(names, &entry.source).is_some() {
             mapped.tracks.push(entry);
             continue;
@@ -471,6 +553,70 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<MappedColumns, Diagn
         mapped.renamed.push((index, entry));
     }
     Ok(mapped)
+}
+
+/// The scalars that `--map` names, those of columns that are called so, and those of LeRobot's data sets.
+fn scalar_columns(
+    names: &mut ColumnNames<'_>,
+    mapped: &MappedColumns,
+) -> Result<Vec<ScalarColumn>, Diagnostic> {
+    let mut all = Vec::new();
+    for entry in &mapped.scalars {
+        let Some(index) = names.position(&entry.source) else {
+            let message = format!(
+                "there is no column `{}`; there are {}",
+                entry.source,
+                names.list()
+            );
+            return Err(names.refuse(Code::ColumnMissing, message));
+        };
+        let need = match entry.columns {
+            Some(_) => ColumnNeed::List,
+            None => ColumnNeed::Number,
+        };
+        let count = entry.columns.as_ref().map_or(1, Range::len);
+        all.push(ScalarColumn {
+            column: names.request(index, need),
+            items: entry.columns.clone(),
+            name: entry.name.clone(),
+            names: entry.scalar_names(count).collect(),
+            kind: entry.scalar.unwrap_or_default(),
+            factor: if entry.is_scalar_in_degrees {
+                RADIANS
+            } else {
+                1.0
+            },
+        });
+    }
+    let plain = |column, name: &str, kind| ScalarColumn {
+        column,
+        items: None,
+        name: name.to_owned(),
+        names: vec![name.to_owned()],
+        kind,
+        factor: 1.0,
+    };
+    let columns = names.file_columns;
+    for (index, column) in columns.iter().enumerate() {
+        if let Some((name, kind)) = ScalarKind::of_column(column) {
+            names.find(column)?;
+            all.push(plain(names.request(index, ColumnNeed::Number), name, kind));
+        }
+    }
+    let is_lerobot = ["episode_index", "frame_index", "timestamp"]
+        .iter()
+        .all(|name| names.position(name).is_some());
+    if is_lerobot && mapped.tracks.is_empty() && mapped.scalars.is_empty() {
+        for name in LEROBOT {
+            if let Some(column) = names.take(name, ColumnNeed::List)? {
+                all.push(ScalarColumn {
+                    names: Vec::new(),
+                    ..plain(column, name, ScalarKind::Angle)
+                });
+            }
+        }
+    }
+    Ok(all)
 }
 
 /// Whether a column may have this name; other names are tracks.

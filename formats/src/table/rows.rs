@@ -200,8 +200,11 @@ impl Batch {
         let mut fields = vec![
             Field::new("frame", DataType::Int64, false),
             Field::new("time", times.data_type(), false),
-            Field::new("track", names_type(), false),
         ];
+        // A table of scalars alone has no tracks.
+        if !track_names.is_empty() {
+            fields.push(Field::new("track", names_type(), false));
+        }
         if clip.is_some() {
             fields.push(Field::new("clip", names_type(), false));
         }
@@ -241,8 +244,11 @@ impl Batch {
         let mut columns: Vec<ArrayRef> = vec![
             Arc::new(Int64Array::from(std::mem::take(&mut self.frames))),
             self.times.take(),
-            dictionary(std::mem::take(&mut self.tracks), &self.track_names)?,
         ];
+        let tracks = std::mem::take(&mut self.tracks);
+        if !self.track_names.is_empty() {
+            columns.push(dictionary(tracks, &self.track_names)?);
+        }
         if let Some((clip, names)) = &self.clip {
             columns.push(dictionary(vec![*clip; rows], names)?);
         }

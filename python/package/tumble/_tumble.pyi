@@ -1274,6 +1274,7 @@ def retarget(
     *,
     bones: dict[str, str] | None = None,
     rest: Literal["auto", "same", "directions"] = "auto",
+    rest_frame: int | None = None,
     scale: Literal["hips", "legs"] | float = "hips",
     axes: _Array | None = None,
 ) -> tuple[Clip, dict[str, Any]]: ...

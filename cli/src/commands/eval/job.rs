@@ -275,7 +275,13 @@ impl EvaluationJob<'_> {
                 sample_to_end(&methods, engine, clip, frames, samples.end)
             })
         });
-        found.map_err(|error| Failure::evaluating(name, &error))
+        let mut found = found.map_err(|error| Failure::evaluating(name, &error))?;
+        if self.arguments.inputs.reading.robot()?.is_some() {
+            let of_clip = (clip, &*found.times);
+            let dialect = &self.arguments.dialect;
+            dialect.limit_scalars(self.work, of_clip, &mut found.scalars, None)?;
+        }
+        Ok(found)
     }
 
     /// How a result was made, for formats that store it.
@@ -697,13 +703,30 @@ impl EvaluationJob<'_> {
         room::in_memory(name, &set, &samples.frames, 1)?;
         let mut all = vec![samples.frames.clone()];
         all.extend(samples.end.map(|end| SampleTimes::at(vec![end.at])));
-        let mut numbers = Vec::new();
-        for frames in &all {
-            let device = &mut *self.device;
-            let found = device.choose(count * timeline.len()).and_then(|()| {
-                device.work(|engine| methods.scalars(engine, clip, frames, quantity))
-            });
-            numbers.extend(found.map_err(|error| Failure::evaluating(name, &error))?);
+        let mut evaluated = |quantity: ScalarQuantity| {
+            let mut numbers = Vec::new();
+            for frames in &all {
+                let device = &mut *self.device;
+                let found = device.choose(count * timeline.len()).and_then(|()| {
+                    device.work(|engine| methods.scalars(engine, clip, frames, quantity))
+                });
+                numbers.extend(found.map_err(|error| Failure::evaluating(name, &error))?);
+            }
+            Ok::<Vec<f32>, Failure>(numbers)
+        };
+        let mut numbers = evaluated(quantity)?;
+        if self.arguments.inputs.reading.robot()?.is_some() {
+            let times: Vec<f64> = timeline.times(0).collect();
+            let (dialect, of_clip) = (&self.arguments.dialect, (clip, &*times));
+            match quantity {
+                ScalarQuantity::Value => {
+                    dialect.limit_scalars(self.work, of_clip, &mut numbers, None)?;
+                }
+                _ => {
+                    let mut values = evaluated(ScalarQuantity::Value)?;
+                    dialect.limit_scalars(self.work, of_clip, &mut values, Some(&mut numbers))?;
+                }
+            }
         }
         if quantity == ScalarQuantity::Value {
             for (index, number) in numbers.iter_mut().enumerate() {

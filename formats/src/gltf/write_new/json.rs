@@ -83,33 +83,33 @@ pub(super) struct Skin {
 }
 
 #[derive(Serialize, Default)]
-pub(super) struct Animation {
+pub(in crate::gltf) struct Animation {
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) name: Option<String>,
-    pub(super) channels: Vec<Channel>,
-    pub(super) samplers: Vec<Sampler>,
+    pub(in crate::gltf) name: Option<String>,
+    pub(in crate::gltf) channels: Vec<Channel>,
+    pub(in crate::gltf) samplers: Vec<Sampler>,
     #[serde(skip_serializing_if = "Map::is_empty")]
-    pub(super) extras: Map<String, Value>,
+    pub(in crate::gltf) extras: Map<String, Value>,
 }
 
 #[derive(Serialize)]
-pub(super) struct Channel {
-    pub(super) sampler: usize,
-    pub(super) target: Target,
+pub(in crate::gltf) struct Channel {
+    pub(in crate::gltf) sampler: usize,
+    pub(in crate::gltf) target: Target,
 }
 
 #[derive(Serialize)]
-pub(super) struct Target {
-    pub(super) node: usize,
-    pub(super) path: &'static str,
+pub(in crate::gltf) struct Target {
+    pub(in crate::gltf) node: usize,
+    pub(in crate::gltf) path: &'static str,
 }
 
 #[derive(Serialize)]
-pub(super) struct Sampler {
-    pub(super) input: usize,
-    pub(super) output: usize,
+pub(in crate::gltf) struct Sampler {
+    pub(in crate::gltf) input: usize,
+    pub(in crate::gltf) output: usize,
     #[serde(skip_serializing_if = "is_linear")]
-    pub(super) interpolation: &'static str,
+    pub(in crate::gltf) interpolation: &'static str,
 }
 
 fn is_zero(translation: &[f64; 3]) -> bool {

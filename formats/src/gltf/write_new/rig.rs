@@ -278,11 +278,11 @@ fn inverse(world: DAffine3) -> [f32; 16] {
 
 /// The names that were used.
 #[derive(Default)]
-pub(super) struct UniqueNames(HashSet<String>);
+pub(in crate::gltf) struct UniqueNames(HashSet<String>);
 
 impl UniqueNames {
     /// `name`, or `name#index` if `name` was used.
-    pub(super) fn unique(&mut self, name: String, index: usize) -> String {
+    pub(in crate::gltf) fn unique(&mut self, name: String, index: usize) -> String {
         let mut unique = name;
         while !self.0.insert(unique.clone()) {
             unique = format!("{unique}#{index}");

@@ -88,6 +88,27 @@ impl ArchivePlan {
         });
     }
 
+    /// The number of each frame of the rate: from 0, unless the file has them.
+    fn numbers_of_frames(&self, archive: &Archive) -> Result<Vec<u64>, Diagnostic> {
+        let Some(member) = self.frame_numbers else {
+            return Ok((0..self.frames as u64).collect());
+        };
+        let numbers = read_numbers(archive, member)?;
+        if numbers.len() != self.frames {
+            let message = format!("{} numbers for {} frames", numbers.len(), self.frames);
+            return Err(archive.refuse(member, Code::Shape, message));
+        }
+        // Up to here every whole number is one of f64.
+        let is_number = |&number: &f64| (0.0..9e15).contains(&number) && number.fract() == 0.0;
+        match numbers.iter().find(|number| !is_number(number)) {
+            None => Ok(numbers.into_iter().map(|number| number as u64).collect()),
+            Some(number) => {
+                let message = format!("{number} is not the number of a frame, from 0");
+                Err(archive.refuse(member, Code::Time, message))
+            }
+        }
+    }
+
     /// The times of all frames in seconds. The rate of the plan becomes that of these times.
     ///
     /// # Errors
@@ -130,7 +151,9 @@ impl ArchivePlan {
                 ));
             }
             self.rate = Some(rate);
-            return Ok((0..self.frames as u64)
+            let numbers = self.numbers_of_frames(archive)?;
+            return Ok(numbers
+                .into_iter()
                 .map(|frame| rate.time_of(frame))
                 .collect());
         };

@@ -6,10 +6,14 @@ use tumble::Layout;
 
 use crate::array::shape_text;
 use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::map::Entry;
 use crate::motion::{Motion, SampledClip, Scalar, ScalarKind};
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::warnings::Warnings;
+
+/// A degree in radians.
+pub(crate) const RADIANS: f64 = std::f64::consts::PI / 180.0;
 
 /// Bytes of memory of a number while it is read and as a key.
 const NUMBER: usize = 24;
@@ -22,10 +26,53 @@ pub(crate) struct ScalarArray {
     pub(crate) layout: Layout,
     /// The first of its columns (of rows, scalars first) that is a scalar.
     first: usize,
+    /// What its numbers are multiplied by.
+    factor: f64,
     pub(crate) scalars: Vec<(String, Scalar)>,
 }
 
 impl ArchivePlan {
+    /// Adds the scalars that an entry of a map names: of an array (frames), or columns of one (frames, numbers).
+    ///
+    /// # Errors
+    /// When the shape is another.
+    pub(in crate::npz) fn add_scalar_columns(
+        &mut self,
+        archive: &Archive,
+        member: usize,
+        entry: &Entry,
+        (kind, is_degrees): (ScalarKind, bool),
+    ) -> Result<(), Diagnostic> {
+        let shape = &*archive.header(member)?.shape;
+        let (frames, width) = match *shape {
+            [frames] => (frames, 1),
+            [frames, width] => (frames, width),
+            _ => (0, 0),
+        };
+        let columns = entry.columns.clone().unwrap_or(0..width);
+        let is_first = self.parts.is_empty() && self.scalars.is_empty();
+        if columns.end > width || columns.is_empty() || !is_first && frames != self.frames {
+            let shape = shape_text(shape);
+            let message = format!(
+                "the array has shape {shape}; scalars are (frames) or (frames, numbers), of as many frames as the \
+                 others, `[3]` chooses a column"
+            );
+            return Err(archive.refuse(member, Code::Shape, message));
+        }
+        self.frames = frames;
+        self.scalars.push(ScalarArray {
+            member,
+            layout: Layout::FrameMajor,
+            first: columns.start,
+            factor: if is_degrees { RADIANS } else { 1.0 },
+            scalars: entry
+                .scalar_names(columns.len())
+                .map(|name| (name, Scalar::of(kind)))
+                .collect(),
+        });
+        Ok(())
+    }
+
     /// Adds the scalars of an array from its column `first` on. `names` has the name of each; without, they are named
     /// `joint_0`, `joint_1` …, with a warning.
     ///
@@ -76,6 +123,7 @@ impl ArchivePlan {
             member,
             layout,
             first,
+            factor: 1.0,
             scalars: names.into_iter().enumerate().map(scalar).collect(),
         });
         Ok(())
@@ -94,14 +142,15 @@ impl ScalarArray {
         let all = shape.iter().product::<usize>();
         archive.take(all, NUMBER)?;
         let numbers = read_numbers(archive, self.member)?;
+        let width = shape.get(1).copied().unwrap_or(1);
         for (index, (name, scalar)) in self.scalars.iter().enumerate() {
             let at = |frame: usize| match self.layout {
-                Layout::FrameMajor => frame * shape[1] + self.first + index,
-                Layout::TrackMajor => (self.first + index) * shape[1] + frame,
+                Layout::FrameMajor => frame * width + self.first + index,
+                Layout::TrackMajor => (self.first + index) * width + frame,
             };
             let keys: Vec<f32> = kept
                 .iter()
-                .map(|&frame| numbers[at(frame)] as f32)
+                .map(|&frame| (numbers[at(frame)] * self.factor) as f32)
                 .collect();
             if let Some(bad) = keys.iter().position(|key| !key.is_finite()) {
                 let number = numbers[at(kept[bad])];
@@ -136,13 +185,8 @@ pub(in crate::npz) fn put(
     layout: Layout,
     put: &mut dyn FnMut(f64) -> io::Result<()>,
 ) -> io::Result<()> {
-    let all = sampled.clip.set.scalar_count();
     let frames = sampled.times.len();
-    let mut number = |frame: usize, index: usize| {
-        let scalar = first + index;
-        let value = f64::from(sampled.scalars[frame * all + scalar]);
-        put(value + sampled.clip.scalar(scalar).origin)
-    };
+    let mut number = |frame: usize, index: usize| put(sampled.scalar_value(frame, first + index));
     match layout {
         Layout::FrameMajor => {
             (0..frames).try_for_each(|frame| (0..count).try_for_each(|index| number(frame, index)))

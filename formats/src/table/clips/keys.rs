@@ -323,7 +323,7 @@ impl TableClip<'_> {
         Ok(readers)
     }
 
-    fn reader(&self, cell: CellSource) -> Result<CellReader<'_>, Diagnostic> {
+    pub(in crate::table) fn reader(&self, cell: CellSource) -> Result<CellReader<'_>, Diagnostic> {
         let column = &self.table.columns[cell.column];
         match (&column.values, cell.item) {
             (ColumnValues::Numbers(numbers), None) => Ok(CellReader {

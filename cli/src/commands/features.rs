@@ -1,0 +1,352 @@
+//! `tumble features`: numbers that people train on.
+
+use clap::Args;
+use clap::builder::TypedValueParser;
+use glam::DVec3;
+use serde::Serialize;
+use tumble::trees::{BodyOrder, Siblings};
+use tumble::{Device, Engine, FrameRate, SampleTimes};
+use tumble_formats::format::Format;
+use tumble_formats::learning::{
+    ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, write_features,
+};
+use tumble_formats::motion::Motion;
+use tumble_formats::retarget::{Role, recognise};
+use tumble_formats::robot::{
+    BodiesError, BodiesRequest, LimitRule, Robot, VelocityPoint, VelocitySource, bodies,
+};
+use tumble_formats::sample::{ChannelMethods, MethodChoice};
+use tumble_formats::world::world;
+
+use crate::arguments::input::Inputs;
+use crate::arguments::interpolation::method_argument;
+use crate::arguments::options::CommandLine;
+use crate::arguments::output::one_of;
+use crate::arguments::results::ResultArguments;
+use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
+
+/// Compute features for learning: six numbers of rotations, headings, contacts, mirrors, HumanML3D
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the
+names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the
+curves; of other skeletons they are differences over a thirty-second of a frame. HumanML3D needs metres, y
+up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need
+--body-model.
+
+Examples:
+  tumble features walk.bvh --sets six-columns,heading -o walk.npz
+  tumble features walk.pkl --robot g1.xml --fps 50 --sets contacts,positions --vertical z -o walk.npz
+  tumble features amass --body-model models --up-axis y --fps 20 --sets humanml3d -o out --resume")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    command_line: CommandLine,
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    results: ResultArguments,
+    /// Which features, separated by commas
+    #[arg(long, value_name = "SETS", value_delimiter = ',', required = true, value_parser = sets())]
+    sets: Vec<FeatureSet>,
+    /// Frames per second [default: the rate of the input]
+    #[arg(long, value_name = "FPS")]
+    fps: Option<FrameRate>,
+    /// How to interpolate: `authored`, or a method (`tumble methods`)
+    #[arg(short, long, value_name = "METHOD", default_value = "authored", value_parser = method_argument())]
+    method: MethodChoice,
+    /// The axis that points up, for headings and contacts
+    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
+    vertical: Ground,
+    /// A joint that is lower touches the ground, if it is slower too; metres
+    #[arg(long, value_name = "METRES", default_value_t = ContactLimits::PROTOMOTIONS.height)]
+    contact_height: f64,
+    /// A joint that is slower touches the ground, if it is lower too; metres a second
+    #[arg(long, value_name = "SPEED", default_value_t = ContactLimits::PROTOMOTIONS.speed)]
+    contact_speed: f64,
+    /// Contacts are those of most of so many frames, an odd number
+    #[arg(long, value_name = "FRAMES", default_value_t = 1)]
+    contact_window: usize,
+    /// The axis across the mirror
+    #[arg(long, value_name = "AXIS", default_value = "x", value_parser = mirror_axis())]
+    mirror_axis: usize,
+}
+
+fn sets() -> impl TypedValueParser<Value = FeatureSet> {
+    let help = |set| match set {
+        FeatureSet::Positions => "positions and velocities",
+        FeatureSet::SixColumns => "two columns of each matrix: Zhou 2019, HumanML3D, Kimodo",
+        FeatureSet::SixRows => "two rows of each matrix: PyTorch3D",
+        FeatureSet::SixInterleaved => "two columns side by side: SPIN",
+        FeatureSet::Heading => "the twist of the first joint about the axis that points up, rad",
+        FeatureSet::Contacts => "whether each joint touches the ground",
+        FeatureSet::Mirror => "left and right exchanged",
+        FeatureSet::Humanml3d => "the 263 numbers of HumanML3D",
+    };
+    one_of(FeatureSet::ALL.map(|set| (set.name(), help(set), set)))
+}
+
+fn vertical() -> impl TypedValueParser<Value = Ground> {
+    let help = |axis| match axis {
+        Ground::Y => "as in glTF, BVH and HumanML3D",
+        Ground::Z => "as robots have it",
+    };
+    one_of(Ground::ALL.map(|axis| (axis.name(), help(axis), axis)))
+}
+
+fn mirror_axis() -> impl TypedValueParser<Value = usize> {
+    one_of([
+        ("x", "people with y up, who face z", 0),
+        ("y", "robots with z up, which face x", 1),
+        ("z", "people who face x", 2),
+    ])
+}
+
+/// What was computed, with `--json`.
+#[derive(Debug, Serialize)]
+struct FeatureReport {
+    frames: usize,
+    joints: usize,
+    arrays: Vec<&'static str>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.contact_window % 2 == 0 {
+        let message =
+            "--contact-window: give an odd number of frames, so that each is in their middle";
+        return Err(Failure::usage(message));
+    }
+    let files = arguments.inputs.gather(false)?;
+    let format = Format::named("npz");
+    if let Some(asked) = arguments
+        .results
+        .format()
+        .filter(|asked| asked.name != "npz")
+    {
+        let message = format!(
+            "features are written as npz, not {}; leave out --format",
+            asked.name
+        );
+        return Err(Failure::usage(message));
+    }
+    if let Some(out) = arguments.results.out()
+        && let Some(named) = Format::of(out).filter(|named| named.name != "npz")
+        && !out.is_dir()
+    {
+        let (out, name) = (out.display(), named.name);
+        let message =
+            format!("{out}: ends as {name}, and features are npz; end the output in .npz");
+        return Err(Failure::usage(message));
+    }
+    arguments.inputs.reading.robot()?;
+    let plan = arguments.results.plan_in(files, format)?;
+    let options = arguments.command_line.options().of_command("features");
+    let reader = arguments.inputs.clone();
+    let engine =
+        Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("features", &error))?;
+    let mut pipeline = arguments.results.start(reader, plan, options);
+    while let Some(work) = pipeline.next_work() {
+        let made = arguments.make(&work, &engine);
+        pipeline.keep(&work, made);
+    }
+    pipeline.finish()
+}
+
+impl Arguments {
+    fn make(
+        &self,
+        work: &ClipWork,
+        engine: &Engine,
+    ) -> Result<(EvaluatedResult, FeatureReport), Failure> {
+        let (name, clips) = (&*work.name, work.clips());
+        let [clip] = clips[..] else {
+            let message =
+                format!("{name}: a file has the features of one clip; choose it with --animation");
+            return Err(Failure::usage(message));
+        };
+        let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
+        let rate = self.fps.or(clip.rate).or_else(|| clip.rate_of_keys());
+        let rate = rate
+            .ok_or_else(|| Failure::usage(format!("{name}: its keys have no rate; give --fps")))?;
+        let poses = match self.inputs.reading.robot()? {
+            Some(robot) => self.of_robot(name, &clip, &robot, rate, engine)?,
+            None => self.of_skeleton(name, &clip, rate, engine)?,
+        };
+        let request = FeatureRequest {
+            sets: self.sets.clone(),
+            ground: self.vertical,
+            limits: ContactLimits {
+                height: self.contact_height,
+                speed: self.contact_speed,
+            },
+            window: self.contact_window,
+            mirror_axis: self.mirror_axis,
+            humanml3d_joints: joints_of_smpl(&clip, &poses.names),
+        };
+        let failed =
+            |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
+        let arrays = feature_arrays(&poses, &request).map_err(|error| failed(&error))?;
+        let written = work.target.write_motion(|out| {
+            write_features(&poses, &arrays, out)?;
+            Ok(Vec::new())
+        })?;
+        let report = FeatureReport {
+            frames: poses.times.len(),
+            joints: poses.names.len(),
+            arrays: arrays.iter().map(|array| array.name).collect(),
+        };
+        let done = format!(
+            "{} of {}: {}",
+            words::count(report.frames, "frame"),
+            words::count(report.joints, "joint"),
+            report.arrays.join(", ")
+        );
+        Ok((work.result(written, &done, None), report))
+    }
+
+    fn methods(&self) -> ChannelMethods {
+        ChannelMethods {
+            method: self.method,
+            ..ChannelMethods::AUTHORED
+        }
+    }
+
+    /// The bodies of a robot.
+    fn of_robot(
+        &self,
+        name: &str,
+        clip: &Motion,
+        robot: &Robot,
+        rate: FrameRate,
+        engine: &Engine,
+    ) -> Result<WorldFrames, Failure> {
+        let methods = self.methods();
+        let method = methods.moving_method_of(clip).map_err(|[first, second]| {
+            let message = format!(
+                "its channels are interpolated by {first} and {second}; name a method with -m"
+            );
+            Failure::usage(format!("{name}: {message}"))
+        })?;
+        let request = BodiesRequest {
+            frames: SampleTimes::rate(rate),
+            rotations: methods.options.with(method),
+            vectors: method.scalar_method(),
+            order: BodyOrder::DepthFirst,
+            siblings: Siblings::File,
+            velocity_at: VelocityPoint::Origin,
+            velocities: VelocitySource::Curve,
+            limits: LimitRule::Report,
+            origins: clip.origins.clone(),
+        };
+        let found =
+            bodies(engine, &robot.tree, &clip.set, &request).map_err(|error| match error {
+                BodiesError::Engine(error) => Failure::evaluating(name, &error),
+                error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
+            })?;
+        let names = found
+            .order
+            .iter()
+            .map(|&body| robot.tree.bodies()[body].name.clone());
+        Ok(WorldFrames {
+            names: names.collect(),
+            times: found.times,
+            positions: found
+                .motions
+                .iter()
+                .map(|motion| motion.pose.position)
+                .collect(),
+            rotations: found
+                .motions
+                .iter()
+                .map(|motion| motion.pose.rotation)
+                .collect(),
+            velocities: found
+                .motions
+                .iter()
+                .map(|motion| motion.velocity.linear)
+                .collect(),
+        })
+    }
+
+    /// The joints of a skeleton.
+    fn of_skeleton(
+        &self,
+        name: &str,
+        clip: &Motion,
+        rate: FrameRate,
+        engine: &Engine,
+    ) -> Result<WorldFrames, Failure> {
+        let at = |frames: &SampleTimes| {
+            let samples = self.methods().sample(engine, clip, frames);
+            let samples = samples.map_err(|error| Failure::evaluating(name, &error))?;
+            let poses = world(clip, &samples);
+            let failed = |error| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
+            Ok::<_, Failure>((samples.times, poses.map_err(failed)?))
+        };
+        let (times, poses) = at(&SampleTimes::rate(rate))?;
+        // Velocities are differences over a part of a frame, inside the clip.
+        let step = rate.time_of(1) / 64.0;
+        let (first, last) = clip.set.time_span().unwrap_or_default();
+        let beside = |side: f64| -> Vec<f64> {
+            times
+                .iter()
+                .map(|time| (time + side * step).clamp(first, last))
+                .collect()
+        };
+        let (before, from) = at(&SampleTimes::at(beside(-1.0)))?;
+        let (after, to) = at(&SampleTimes::at(beside(1.0)))?;
+        let joints = clip.set.track_count();
+        let velocity = |index: usize| {
+            let seconds = after[index / joints] - before[index / joints];
+            match seconds > 0.0 {
+                true => (to[index].position - from[index].position) / seconds,
+                false => DVec3::ZERO,
+            }
+        };
+        Ok(WorldFrames {
+            names: (0..joints)
+                .map(|track| clip.set.track_name(track))
+                .collect(),
+            velocities: (0..poses.len()).map(velocity).collect(),
+            positions: poses.iter().map(|pose| pose.position).collect(),
+            rotations: poses.iter().map(|pose| pose.rotation.as_dquat()).collect(),
+            times,
+        })
+    }
+}
+
+/// The joints of SMPL in its order, by the parts of the body that the names of a skeleton mean.
+fn joints_of_smpl(clip: &Motion, names: &[String]) -> Option<[usize; 22]> {
+    const ROLES: [Role; 22] = [
+        Role::Hips,
+        Role::LeftUpperLeg,
+        Role::RightUpperLeg,
+        Role::Spine,
+        Role::LeftLowerLeg,
+        Role::RightLowerLeg,
+        Role::Chest,
+        Role::LeftFoot,
+        Role::RightFoot,
+        Role::UpperChest,
+        Role::LeftToes,
+        Role::RightToes,
+        Role::Neck,
+        Role::LeftShoulder,
+        Role::RightShoulder,
+        Role::Head,
+        Role::LeftUpperArm,
+        Role::RightUpperArm,
+        Role::LeftLowerArm,
+        Role::RightLowerArm,
+        Role::LeftHand,
+        Role::RightHand,
+    ];
+    let parents: Vec<Option<usize>> = clip.skeleton.iter().map(|joint| joint.parent).collect();
+    let roles = recognise(names, &parents).ok()?;
+    let joints = ROLES.map(|role| roles.joint(role));
+    joints
+        .iter()
+        .all(Option::is_some)
+        .then(|| joints.map(Option::unwrap_or_default))
+}

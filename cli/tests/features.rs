@@ -1,0 +1,259 @@
+//! Features for learning through the program, against values by NumPy where the sample files are there.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use zip::write::SimpleFileOptions;
+
+use crate::program::{Run, root, run, succeed};
+
+fn line(folder: &Path, line: &str) -> Run {
+    succeed(folder, &line.split_whitespace().collect::<Vec<_>>())
+}
+
+fn shared() -> Option<PathBuf> {
+    let folder = root().join("../shared/data/robots");
+    if !folder.is_dir() {
+        eprintln!("{} is not there: nothing compared", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+/// The arrays of floats of a file, with their shapes.
+fn arrays(path: &Path) -> HashMap<String, (Vec<usize>, Vec<f64>)> {
+    let mut archive = zip::ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
+    let mut all = HashMap::new();
+    for index in 0..archive.len() {
+        let mut member = archive.by_index(index).unwrap();
+        let name = member.name().unwrap().trim_end_matches(".npy").to_owned();
+        let mut bytes = Vec::new();
+        member.read_to_end(&mut bytes).unwrap();
+        if let Ok(found) = tumble_formats::npy::read_numbers(&name, &bytes, |_| Ok(())) {
+            all.insert(name, (found.shape, found.values));
+        } else if bytes.windows(3).any(|three| three == b"<i8") {
+            let start = bytes.iter().position(|&byte| byte == b'\n').unwrap() + 1;
+            let numbers = bytes[start..].as_chunks::<8>().0.iter();
+            let numbers: Vec<f64> = numbers
+                .map(|&eight| i64::from_le_bytes(eight) as f64)
+                .collect();
+            all.insert(name, (vec![numbers.len()], numbers));
+        }
+    }
+    all
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(list) => list.iter().flat_map(numbers).collect(),
+        Value::Bool(value) => vec![f64::from(u8::from(*value))],
+        number => vec![number.as_f64().unwrap()],
+    }
+}
+
+fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, of: &str) {
+    assert_eq!(found.len(), expected.len(), "{of}");
+    for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
+        assert!(
+            (found - expected).abs() <= tolerance,
+            "{of} {index}: {found} {expected}"
+        );
+    }
+}
+
+/// The bodies of a robot: contacts, headings and mirrors of the test data.
+#[test]
+fn features_of_a_robot_are_those_of_numpy() {
+    let Some(shared) = shared() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let text = fs::read_to_string(shared.join("features/features.json")).unwrap();
+    let expected: Value = serde_json::from_str(&text).unwrap();
+    let of = |path: &str| shared.join(path).to_str().unwrap().to_owned();
+    let (take, robot) = (of("layouts/gmr_p4.pkl"), of("robots/pico.xml"));
+    let features =
+        format!("features {take} --robot {robot} -m slerp --fps 30 --vertical z --mirror-axis y");
+    line(
+        folder,
+        &format!("{features} --sets contacts,heading,mirror,positions -o a.npz"),
+    );
+    line(
+        folder,
+        &format!("{features} --sets contacts --contact-speed 1.0 --contact-height 0.2 -o b.npz"),
+    );
+    let [a, b] = ["a.npz", "b.npz"].map(|file| arrays(&folder.join(file)));
+    assert_eq!(a["contacts"].1, numbers(&expected["contacts"]["0.15/0.1"]));
+    assert_eq!(b["contacts"].1, numbers(&expected["contacts"]["1.0/0.2"]));
+    assert!(b["contacts"].1.contains(&1.0) && b["contacts"].1.contains(&0.0));
+    let headings = numbers(&expected["heading_of_root"]["values"]);
+    let twists: Vec<f64> = headings.iter().step_by(2).copied().collect();
+    assert_near(&a["heading"].1, &twists, 1e-6, "heading");
+    // The first frame, with left and right exchanged.
+    let mirror = &expected["mirror"];
+    let pairs: Vec<usize> = a["mirror_pairs"]
+        .1
+        .iter()
+        .map(|&pair| pair as usize)
+        .collect();
+    assert!(pairs.iter().enumerate().any(|(body, &pair)| body != pair));
+    assert!(
+        pairs
+            .iter()
+            .enumerate()
+            .all(|(body, &pair)| pairs[pair] == body)
+    );
+    let positions = numbers(&mirror["positions"]["after"]);
+    let rotations = numbers(&mirror["rotations_wxyz"]["after"]);
+    for (body, &pair) in pairs.iter().enumerate() {
+        let found = &a["mirrored_positions"].1[3 * body..][..3];
+        assert_near(
+            found,
+            &positions[3 * pair..][..3],
+            1e-6,
+            "mirrored positions",
+        );
+        let found = &a["mirrored_rotations"].1[4 * body..][..4];
+        let [w, x, y, z] = *rotations[4 * pair..].first_chunk::<4>().unwrap();
+        let sign = if found[3] * w < 0.0 { -1.0 } else { 1.0 };
+        assert_near(
+            found,
+            &[x, y, z, w].map(|it| sign * it),
+            1e-6,
+            "mirrored rotations",
+        );
+    }
+    assert_eq!(a["positions"].0, [31, 17, 3]);
+    assert_eq!(a["velocities"].0, [31, 17, 3]);
+}
+
+/// An array as a member of an NPZ file.
+pub(crate) fn npy(shape: &str, numbers: &[f64]) -> Vec<u8> {
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    let length = (10 + header.len() + 1).next_multiple_of(64);
+    header += &" ".repeat(length - 10 - header.len() - 1);
+    header += "\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(
+        numbers
+            .iter()
+            .flat_map(|&number| (number as f32).to_le_bytes()),
+    );
+    bytes
+}
+
+/// The 263 numbers of HumanML3D, of joints in the world.
+#[test]
+fn humanml3d_is_that_of_numpy() {
+    let Some(shared) = shared() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let expected = arrays(&shared.join("features/humanml3d.npz"));
+    let joints = &expected["joints"].1;
+    let frames = joints.len() / 66;
+    let matrices = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].repeat(frames * 22);
+    let roots: Vec<f64> = joints
+        .chunks(66)
+        .flat_map(|frame| &frame[..3])
+        .copied()
+        .collect();
+    let mut archive = zip::ZipWriter::new(fs::File::create(folder.join("people.npz")).unwrap());
+    for (name, shape, numbers) in [
+        ("posed_joints", format!("({frames}, 22, 3)"), joints),
+        (
+            "global_rot_mats",
+            format!("({frames}, 22, 3, 3)"),
+            &matrices,
+        ),
+        ("local_rot_mats", format!("({frames}, 22, 3, 3)"), &matrices),
+        ("root_positions", format!("({frames}, 3)"), &roots),
+    ] {
+        archive
+            .start_file(format!("{name}.npy"), SimpleFileOptions::default())
+            .unwrap();
+        archive.write_all(&npy(&shape, numbers)).unwrap();
+    }
+    archive.finish().unwrap();
+    let run = line(
+        folder,
+        "features people.npz --source-fps 20 -m slerp --sets humanml3d,six-rows -o f.npz --json",
+    );
+    let json: Value = serde_json::from_slice(&run.out).unwrap();
+    assert_eq!(
+        json[0]["arrays"],
+        serde_json::json!(["humanml3d", "six_rows"])
+    );
+    let found = arrays(&folder.join("f.npz"));
+    assert_eq!(found["humanml3d"].0, [frames - 1, 263]);
+    assert_near(
+        &found["humanml3d"].1,
+        &expected["features"].1,
+        2e-6,
+        "humanml3d",
+    );
+    assert_eq!(found["six_rows"].1[..6], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    assert_eq!(found["times"].1[1], 0.05);
+}
+
+/// Velocities of a skeleton are those of its motion: half a turn a second about an axis a metre away.
+#[test]
+fn velocities_of_skeletons_are_those_of_the_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let joint = "{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation";
+    let mut bvh = format!(
+        "HIERARCHY ROOT hips {joint} JOINT tip {joint} End Site {{ OFFSET 0 1 0 }} }} }}\nMOTION\nFrames: 31\n"
+    );
+    bvh += "Frame Time: 0.033333333333\n";
+    for frame in 0..31 {
+        bvh += &format!("{} 0 0 0 0 0\n", 6 * frame);
+    }
+    fs::write(folder.join("a.bvh"), bvh).unwrap();
+    line(
+        folder,
+        "features a.bvh -m slerp --fps 10 --sets positions,contacts,heading -o a.npz",
+    );
+    let found = arrays(&folder.join("a.npz"));
+    assert_eq!(found["velocities"].0, [11, 2, 3]);
+    for frame in found["velocities"].1.chunks(6) {
+        let speed = frame[3..]
+            .iter()
+            .map(|part| part * part)
+            .sum::<f64>()
+            .sqrt();
+        assert!((speed - std::f64::consts::PI).abs() < 1e-3, "{speed}");
+        assert_eq!(frame[..3], [0.0; 3]);
+    }
+    // Neither slow nor low.
+    assert!(
+        found["contacts"]
+            .1
+            .iter()
+            .skip(1)
+            .step_by(2)
+            .all(|&touches| touches == 0.0)
+    );
+    for (words, part) in [
+        ("features a.bvh -o x.npz", "--sets"),
+        (
+            "features a.bvh --sets humanml3d -o x.npz",
+            "22 joints of SMPL",
+        ),
+        ("features a.bvh --sets heading -o x.bvh", ".npz"),
+        ("features a.bvh --sets six -o x.npz", "six-columns"),
+        (
+            "features a.bvh --sets contacts --contact-window 2 -o x.npz",
+            "odd",
+        ),
+        ("features a.bvh --sets heading --to npy -o x", "npz"),
+    ] {
+        let run = run(folder, &words.split_whitespace().collect::<Vec<_>>());
+        assert_ne!(run.code, 0, "{words}");
+        assert!(run.words.contains(part), "{words}: {}", run.words);
+    }
+    assert!(!folder.join("x.npz").exists());
+}
