@@ -234,6 +234,7 @@ codes! {
     NotPerFrame = "E317" elsewhere, "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, accepts names of numeric arrays that have an entry for each frame and are not keys.";
     RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
     BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ or pickle, or a folder with one for each gender. It must belong to the kind of body in the motion.";
+    BodyAlone = "E320" elsewhere, "the shape of a body without a motion", "Beside its motions AMASS stores the shape of each subject, `shape.npz`, and what the fit of markers began with, `*_stagei.npz`. They are no clips; leave them out. In Python `MotionLibrary.load(…, on_error=\"skip\")` does so, and lists them.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
     TableClaims = "E402", "more than the file can hold", "The file states more rows or bytes than its length can contain; nothing was read.";

@@ -109,50 +109,68 @@ def shortest(work: Callable[[], Any], runs: int = 10) -> float:
     return best
 
 
-def others(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, float]:
-    """Seconds of rotations alone, as training projects find them: gathered, then slerped."""
-    counts = np.array([len(clip.times(0)) for clip in clips])
-    flat = np.concatenate(
-        [np.stack([clip.keys(joint) for joint in range(len(clip))], axis=1) for clip in clips]
-    )
-    starts = np.cumsum(counts) - counts
-    frame = np.minimum((times * 30).astype(int), counts[ids] - 2)
-    t = (times * 30 - frame).astype(np.float32)[:, None, None]
+class Tables:
+    """Five arrays as other motion libraries keep and sample them: a row for each frame of rotations relative to parents
+    and in the world, positions and both velocities. Between two rows rotations are slerped, the rest is lerped."""
 
-    def by_numpy() -> Any:
-        a, b = flat[starts[ids] + frame], flat[starts[ids] + frame + 1]
-        cosine = (a * b).sum(axis=-1, keepdims=True)
-        b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
-        half = np.arccos(np.clip(cosine, -1, 1))
-        sine = np.sin(half)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = (np.sin((1 - t) * half) * a + np.sin(t * half) * b) / sine
-        return np.where(sine < 1e-3, a * (1 - t) + b * t, found)
+    def __init__(self, library: tumble.MotionLibrary) -> None:
+        self.counts = np.round(library.lengths * library.rates).astype(int) + 1
+        ids = np.repeat(np.arange(len(library)), self.counts)
+        self.starts = np.cumsum(self.counts) - self.counts
+        state = library.sample(ids, (np.arange(len(ids)) - self.starts[ids]) / library.rates[ids])
+        self.turned = [state.rotations, state.world_rotations]
+        self.moved = [state.positions, state.velocities, state.angular_velocities]
 
-    found = {"NumPy": shortest(by_numpy)}
+    def sample(self, module: Any, turned: Any, moved: Any, first: Any, t: Any) -> list[Any]:
+        """By NumPy or torch, whose functions have the same names."""
+        s, found = t[:, None, None], []
+        for table in turned:
+            a, b = table[first], table[first + 1]
+            cosine = (a * b).sum(-1)[..., None]
+            b, half = module.where(cosine < 0, -b, b), module.arccos(module.clip(abs(cosine), None, 1.0))
+            sine = module.sin(half)
+            q = (module.sin((1 - s) * half) * a + module.sin(s * half) * b) / sine
+            found.append(module.where(sine < 1e-3, a * (1 - s) + b * s, q))
+        return found + [table[first] * (1 - s) + table[first + 1] * s for table in moved]
+
+
+def others(library: tumble.MotionLibrary, ids: Any, times: Any) -> dict[str, float]:
+    """Seconds of rotations alone and of five arrays in NumPy, and with torch and roma if they are installed."""
+    tables = Tables(library)
+    place = times * library.rates[ids]
+    frame = np.minimum(place.astype(int), tables.counts[ids] - 2)
+    first, t = tables.starts[ids] + frame, (place - frame).astype(np.float32)
+
+    def by(module: Any, turned: Any, moved: Any, first: Any, t: Any) -> dict[str, Callable[[], Any]]:
+        return {
+            "rotations": lambda: tables.sample(module, turned[:1], [], first, t),
+            "all five arrays": lambda: tables.sample(module, turned, moved, first, t),
+        }
+
+    found = {}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for name, work in by(np, tables.turned, tables.moved, first, t).items():
+            found[f"NumPy, {name}"] = shortest(work)
     try:
         import roma
         import torch
     except ImportError:
         return found
-    keys, first = torch.from_numpy(flat), torch.from_numpy(starts[ids] + frame)
-    steps = torch.from_numpy(t[:, 0, 0])
-
-    def by_torch() -> Any:
-        a, b, s = keys[first], keys[first + 1], steps[:, None, None]
-        cosine = (a * b).sum(-1, keepdim=True)
-        b, half = torch.where(cosine < 0, -b, b), torch.acos(cosine.abs().clamp(max=1))
-        sine = torch.sin(half)
-        found = (torch.sin((1 - s) * half) * a + torch.sin(s * half) * b) / sine
-        return torch.where(sine < 1e-3, a * (1 - s) + b * s, found)
+    turned, moved = ([torch.from_numpy(table) for table in of] for of in (tables.turned, tables.moved))
+    rows, steps = torch.from_numpy(first), torch.from_numpy(t)
 
     def by_roma() -> Any:
         # Each environment has a step of its clip; roma's slerp would take every step for every environment.
-        a, b = keys[first], keys[first + 1]
+        a, b = turned[0][rows], turned[0][rows + 1]
         arc = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
         return roma.quat_product(a, roma.rotvec_to_unitquat(steps[:, None, None] * arc))
 
-    return {**found, "torch": shortest(by_torch), "roma": shortest(by_roma)}
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        for name, work in by(torch, turned, moved, rows, steps).items():
+            found[f"torch, {threads} threads, {name}"] = shortest(work)
+        found[f"roma, {threads} threads, rotations"] = shortest(by_roma)
+    return found
 
 
 def main() -> None:
@@ -184,11 +202,16 @@ def main() -> None:
         times = library.sample_times(ids, rng)
         state = library.sample(ids, times, arrays=["rotations"])
         every = library.sample(ids, times)
-        figures = others(clips, ids, times)
+        figures = others(library, ids, times)
         figures["tumble, rotations"] = shortest(lambda: library.sample(ids, times, out=state))
         figures["tumble, all five arrays"] = shortest(lambda: library.sample(ids, times, out=every))
+        figures["tumble, … finite=True"] = shortest(lambda: library.sample(ids, times, out=every, finite=True))
+        windows = library.sample_windows(ids[:512], times[:512], 10, fps=30)
+        figures["tumble, 512 windows of 10"] = shortest(
+            lambda: library.sample_windows(ids[:512], times[:512], 10, fps=30, out=windows)
+        )
         for name, seconds in figures.items():
-            print(f"  {name:24} {1e3 * seconds:8.2f} ms for {options.environments} environments")
+            print(f"  {name:34} {1e3 * seconds:8.2f} ms for {options.environments} environments")
 
         devices = {"one thread": tumble.Engine("cpu", threads=1), "two threads": tumble.Engine("cpu", threads=2)}
         sums = set()

@@ -12,7 +12,7 @@ use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input, warn_of};
 use crate::motions::{
-    ChosenSkeleton, ListedClip, SharedSkeleton, of_crowd, order_assumption, push,
+    ChosenSkeleton, ListedClip, SharedSkeleton, fitted, of_crowd, of_pushed, order_assumption,
 };
 use crate::names::{one_of, option_named};
 use crate::options::method_named;
@@ -154,7 +154,9 @@ impl Crowd {
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks_per_second);
                 let mut library = made.map_err(of_crowd)?;
                 for listed in ListedClip::all(&clips) {
-                    push(&mut library, &shared, listed, method, |_| Ok(()))?;
+                    let (tracks, of_rotations, of_vectors) = fitted(&shared, listed, method)?;
+                    let pushed = library.push(&tracks, of_rotations, of_vectors);
+                    pushed.map_err(|error| of_pushed(error, listed))?;
                 }
                 for (index, mask) in masks.iter().flat_map(|masks| &masks.0).enumerate() {
                     library

@@ -495,7 +495,7 @@ impl OutputForm {
 }
 
 /// Stores the rotation vectors of quaternions.
-fn write_vectors(
+pub(crate) fn write_vectors(
     quaternions: &Bound<'_, PyArrayDyn<f32>>,
     vectors: &Bound<'_, PyArrayDyn<f32>>,
 ) -> PyResult<()> {

@@ -18,6 +18,7 @@ use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
 use crate::arrays::{ListArgument, doubles};
 use crate::clip::{Clip, Source, counted};
+use crate::clip_shape::ClipShape;
 use crate::errors::{expected, guarded, input, of_diagnostic, of_track, warn};
 use crate::names::{one_of, option_of, unknown_name};
 use crate::options::frame_rate;
@@ -274,17 +275,25 @@ type SkippedFile = (PathBuf, Option<String>, String);
 
 /// Reads files of any format, as `load` does with the same keywords, on all threads, and warns once for each code: what
 /// `MotionLibrary.load` does. `skip`: files that cannot be read are left out and returned. `progress` is called with the
-/// number of files that were read and of all, now and then and at the end.
+/// number of files that were read and of all, now and then and at the end. `fps`, `tracks` and `method`: each clip is
+/// shaped as by `shaped`.
 #[pyfunction]
-#[pyo3(signature = (paths, keywords, *, skip=false, progress=None))]
+#[pyo3(signature = (paths, keywords, *, skip=false, progress=None, fps=None, tracks=None, method="slerp"))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load_all(
     py: Python<'_>,
     paths: ListArgument<PathBuf>,
     keywords: &Bound<'_, PyDict>,
     skip: bool,
     progress: Option<&Bound<'_, PyAny>>,
+    fps: Option<&Bound<'_, PyAny>>,
+    tracks: Option<&Bound<'_, PyAny>>,
+    method: &str,
 ) -> PyResult<(Vec<File>, Vec<SkippedFile>)> {
-    let request = Arc::new(FileOptions::new(LoadKeywords::of_dict(keywords)?)?);
+    let request = Arc::new(FileOptions {
+        shape: ClipShape::new(fps, tracks, method)?,
+        ..FileOptions::new(LoadKeywords::of_dict(keywords)?)?
+    });
     let (mut files, mut skipped) = (Vec::with_capacity(paths.0.len()), Vec::new());
     let mut warnings = Vec::new();
     for (chunk, paths_read) in paths.0.chunks(FILES_AT_ONCE).enumerate() {
@@ -403,6 +412,7 @@ struct FileOptions {
     up: Option<UpAxis>,
     /// Other keys are read than the file says itself.
     is_changed: bool,
+    shape: ClipShape,
 }
 
 impl FileOptions {
@@ -495,6 +505,7 @@ impl FileOptions {
             scale,
             up,
             is_changed,
+            shape: ClipShape::default(),
         })
     }
 
@@ -544,7 +555,8 @@ impl FileOptions {
         }
         let warnings = loaded.warnings.iter().chain(&loaded.refused);
         let warnings = warnings.cloned().collect();
-        Ok((File::new(path, &mut loaded, self.is_changed), warnings))
+        let is_changed = self.is_changed || self.shape != ClipShape::default();
+        Ok((File::new(path, &mut loaded, is_changed), warnings))
     }
 
     fn loaded(&self, file: &Path) -> PyResult<Loaded> {
@@ -590,6 +602,13 @@ impl FileOptions {
                 }
             };
             adjust_all(&mut loaded, factor, self.up).map_err(|error| of_track(&error))?;
+        }
+        if self.shape != ClipShape::default() {
+            loaded.document = None;
+            for clip in &mut loaded.clips {
+                let shaped = self.shape.applied(std::mem::take(clip));
+                *clip = shaped.map_err(|error| input(format!("{name}: {error}")))?;
+            }
         }
         Ok(loaded)
     }

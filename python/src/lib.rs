@@ -8,6 +8,7 @@
 mod arrays;
 mod build;
 mod clip;
+mod clip_shape;
 mod compare;
 mod crowd;
 mod cuda;
@@ -50,6 +51,8 @@ mod _tumble {
     #[pymodule_export]
     use crate::clip::Clip;
     #[pymodule_export]
+    use crate::clip_shape::shaped;
+    #[pymodule_export]
     use crate::compare::{
         ArrayDifference, ChannelDifference, ClipDifference, JointDifference, PathErrors,
         PathStatistics, Spread, compare, path_errors,
@@ -72,7 +75,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::function::evaluate;
     #[pymodule_export]
-    use crate::motions::Motions;
+    use crate::motions::{Motions, represent};
     #[pymodule_export]
     use crate::pickle::clip_of_state;
     #[pymodule_export]

@@ -11,8 +11,11 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::crowd::{CrowdError, CrowdLibrary, MotionStates, MotionTables, MotionWords};
-use tumble::{Channel, Error, Method, Skeleton, VectorMethod};
+use tumble::crowd::{
+    CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates, MotionTables,
+    MotionWords,
+};
+use tumble::{Channel, Device, Encoding, Error, MatrixOrder, Method, Skeleton, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
@@ -22,6 +25,7 @@ use crate::build::NO_OFFSETS;
 use crate::clip::{Clip, Source};
 use crate::engine::Engine;
 use crate::errors::{guarded, in_python, input, of_engine, warn_of};
+use crate::evaluate::write_vectors;
 use crate::options::method_named;
 use crate::run::stoppable;
 use crate::samples::{joint_offsets, joint_parents};
@@ -34,6 +38,9 @@ const FINEST: f64 = 24.0;
 
 /// The longest clip, ticks.
 const LONGEST: f64 = 2.1e9;
+
+/// Clips whose joints are put in order at once: these may be copies.
+const CLIPS_AT_ONCE: usize = 1024;
 
 /// Joints of a call from which on Ctrl-C is looked for.
 const MANY: usize = 1 << 21;
@@ -245,7 +252,7 @@ pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
 }
 
 /// The tracks of a clip in the order of a library's joints, and their methods.
-fn fitted<'a>(
+pub(crate) fn fitted<'a>(
     skeleton: &SharedSkeleton,
     listed: ListedClip<'a>,
     method: MethodChoice,
@@ -265,6 +272,21 @@ fn fitted<'a>(
     Ok((skeleton.tracks(listed)?, of_rotations, of_vectors))
 }
 
+/// A clip in the order of a library's joints.
+fn motion_clip<'a>(
+    skeleton: &SharedSkeleton,
+    listed: ListedClip<'a>,
+    method: MethodChoice,
+) -> PyResult<MotionClip<'a>> {
+    let (set, of_rotations, vectors) = fitted(skeleton, listed, method)?;
+    check(&set).map_err(|error| input(format!("{listed}: {error}")))?;
+    Ok(MotionClip {
+        set,
+        interpolation: of_rotations.into(),
+        vectors,
+    })
+}
+
 /// Those of the clips that fit a library, and the indices of the others with the reasons.
 fn fitting(
     skeleton: &SharedSkeleton,
@@ -273,10 +295,7 @@ fn fitting(
 ) -> PyResult<(Vec<Clip>, Vec<SkippedClip>)> {
     let mut skipped = Vec::new();
     for listed in ListedClip::all(&clips) {
-        let found = fitted(skeleton, listed, method).and_then(|(tracks, ..)| {
-            check(&tracks).map_err(|error| input(format!("{listed}: {error}")))
-        });
-        if let Err(error) = found {
+        if let Err(error) = motion_clip(skeleton, listed, method) {
             let reason = Python::attach(|py| error.value(py).to_string());
             skipped.push((listed.index, reason));
         }
@@ -296,37 +315,32 @@ fn fitting(
     }
 }
 
-/// Adds a clip to a library. `check` refuses what the library cannot store.
-pub(crate) fn push(
-    library: &mut CrowdLibrary,
-    skeleton: &SharedSkeleton,
-    listed: ListedClip<'_>,
-    method: MethodChoice,
-    check: impl Fn(&tumble::TrackSet) -> Result<(), &'static str>,
-) -> PyResult<()> {
-    let named = |error: &str| input(format!("{listed}: {error}"));
-    let (tracks, of_rotations, of_vectors) = fitted(skeleton, listed, method)?;
-    check(&tracks).map_err(named)?;
-    let pushed = library.push(&tracks, of_rotations, of_vectors);
-    pushed.map(drop).map_err(|error| match error {
+/// The error of a clip that a library does not take.
+pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
+    match error {
         CrowdError::Stopped(_) => of_crowd(error),
-        error => named(&error.to_string()),
-    })
+        error => input(format!("{listed}: {error}")),
+    }
 }
 
 #[pymethods]
 impl Motions {
     /// Prepares clips by a method. All have the joints of `skeleton`, a clip or the arrays `(parents, offsets)`; `None`:
-    /// those of the first clip. `skip`: clips that do not fit are left out.
+    /// those of the first clip. `skip`: clips that do not fit are left out. `packed`: keys of rotations take 8 bytes.
     #[staticmethod]
-    #[pyo3(signature = (clips, skeleton, method, skip=false))]
+    #[pyo3(signature = (clips, skeleton, method, skip=false, packed=false))]
     fn of_clips(
         py: Python<'_>,
         clips: Vec<Clip>,
         skeleton: Option<&Bound<'_, PyAny>>,
         method: &str,
         skip: bool,
+        packed: bool,
     ) -> PyResult<Self> {
+        let precision = match packed {
+            true => KeyPrecision::Packed,
+            false => KeyPrecision::Exact,
+        };
         let method = method_named(method)?;
         let tracks = |clips: &[Clip]| {
             clips
@@ -369,12 +383,20 @@ impl Motions {
                     true => whole as u32 * TICKS,
                     false => (LONGEST / longest).max(1.0) as u32,
                 };
-                let made = CrowdLibrary::with_ticks(&skeleton, ticks);
-                let mut library = made.map_err(of_crowd)?;
-                for listed in ListedClip::all(&clips) {
-                    push(&mut library, &shared, listed, method, check)?;
+                let made = MotionBuilder::new(&skeleton, ticks, precision);
+                let mut builder = made.map_err(of_crowd)?;
+                let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
+                let mut listed = ListedClip::all(&clips).peekable();
+                while listed.peek().is_some() {
+                    let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
+                    let fitted: PyResult<Vec<MotionClip<'_>>> = batch
+                        .iter()
+                        .map(|&it| motion_clip(&shared, it, method))
+                        .collect();
+                    let pushed = builder.push_all(&engine, &fitted?);
+                    pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
                 }
-                Ok(library.into_tables())
+                Ok(builder.finish())
             })
         })?;
         let (tables, spans, cells) = prepared;
@@ -468,6 +490,11 @@ impl Motions {
         Ok(found)
     }
 
+    /// Number of clips.
+    fn __len__(&self) -> usize {
+        self.tables.clip_count()
+    }
+
     /// Number of joints.
     #[getter]
     fn joints(&self) -> usize {
@@ -475,8 +502,12 @@ impl Motions {
     }
 
     /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None
-    /// where it is left out.
+    /// where it is left out. `frames`: the rates and the lengths of all clips, if velocities are to be differences between
+    /// two frames.
     #[allow(clippy::too_many_arguments, reason = "five arrays")]
+    #[pyo3(signature = (
+        engine, clip_ids, times, rotations, positions, world_rotations, velocities, angular_velocities, frames=None
+    ))]
     fn sample(
         &self,
         py: Python<'_>,
@@ -488,8 +519,16 @@ impl Motions {
         world_rotations: Option<&Bound<'_, PyArrayDyn<f32>>>,
         velocities: Option<&Bound<'_, PyArrayDyn<f32>>>,
         angular_velocities: Option<&Bound<'_, PyArrayDyn<f32>>>,
+        frames: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>)>,
     ) -> PyResult<()> {
         let at = self.instances(&clip_ids, &times)?;
+        let steps = match &frames {
+            Some((rates, lengths)) => {
+                let frames = (rates.as_slice()?, lengths.as_slice()?);
+                Some(self.steps(&at, &times, frames)?)
+            }
+            None => None,
+        };
         if positions.is_some() || velocities.is_some() {
             self.check_placed(&at)?;
         }
@@ -525,7 +564,10 @@ impl Motions {
         };
         let engine = engine.get().engine_for(1)?;
         let work = || {
-            let sampled = self.tables.sample_into(&engine, tables, &at, states);
+            let sampled = match &steps {
+                Some(steps) => (self.tables).differences_into(&engine, tables, &at, steps, states),
+                None => self.tables.sample_into(&engine, tables, &at, states),
+            };
             sampled.map_err(of_crowd)
         };
         py.detach(|| match joints < MANY {
@@ -544,6 +586,30 @@ impl Motions {
             Some(reason) => Err(input(format!(
                 "{reason}; or give `skeleton`, or `arrays` without positions and velocities"
             ))),
+        }
+    }
+
+    /// The two frames around the time of each instance, for the rate of its clip.
+    fn steps(
+        &self,
+        at: &[(u32, u32)],
+        times: &PyReadonlyArray1<'_, f64>,
+        (rates, lengths): (&[f64], &[f64]),
+    ) -> PyResult<Vec<FrameStep>> {
+        let per_second = f64::from(self.tables.ticks_per_second());
+        let step = |(&(clip, _), &time): (&(u32, u32), &f64)| {
+            let (rate, length) = (rates[clip as usize], lengths[clip as usize]);
+            // A time within a millionth of a frame is at it.
+            let frame = (time.clamp(0.0, length) * rate + 1e-6).floor();
+            let first = frame.min(((length * rate).round() - 1.0).max(0.0));
+            FrameStep {
+                ticks: [first, first + 1.0].map(|frame| (frame / rate * per_second).round() as u32),
+                per_second: rate as f32,
+            }
+        };
+        match rates.len() == self.tables.clip_count() && lengths.len() == rates.len() {
+            true => Ok(at.iter().zip(times.as_array()).map(step).collect()),
+            false => Err(input("frames: give a rate and a length for each clip")),
         }
     }
 
@@ -579,6 +645,36 @@ impl Motions {
         };
         ids.iter().zip(times.iter()).enumerate().map(one).collect()
     }
+}
+
+/// Fills an array with rotations in another representation: "matrix" (…, 3, 3), "6d" (…, 6), the first two columns, or
+/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w.
+#[pyfunction]
+pub(crate) fn represent(
+    rotations: &Bound<'_, PyArrayDyn<f32>>,
+    kind: &str,
+    out: &Bound<'_, PyArrayDyn<f32>>,
+) -> PyResult<()> {
+    if kind == "rotvec" {
+        return write_vectors(rotations, out);
+    }
+    let (read, mut written) = (rotations.try_readonly()?, out.try_readwrite()?);
+    let quaternions = read.as_slice()?.as_chunks().0;
+    let numbers = written.as_slice_mut()?;
+    let encode = |numbers: &mut [f32]| {
+        let encoding = Encoding::Matrix3x3(MatrixOrder::RowMajor);
+        let encoded = encoding.encode(quaternions, bytemuck::cast_slice_mut(numbers));
+        encoded.map_err(|error| input(error.to_string()))
+    };
+    if kind == "matrix" {
+        return encode(numbers);
+    }
+    let mut matrices = vec![0.0; 9 * quaternions.len()];
+    encode(&mut matrices)?;
+    for (six, matrix) in numbers.chunks_exact_mut(6).zip(matrices.chunks_exact(9)) {
+        six.copy_from_slice(&[0, 3, 6, 1, 4, 7].map(|index| matrix[index]));
+    }
+    Ok(())
 }
 
 /// The memory of an output as rows, as many as there are joints.

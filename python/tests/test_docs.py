@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import importlib.util
 import inspect
 import os
 import pathlib
@@ -59,16 +60,24 @@ def test_everything_public_is_documented_with_an_example():
             assert ">>>" in value.__doc__ or name.split(".")[-1] in small, name
 
 
-@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md", "docs/features.md", "docs/start.md"])
+@pytest.mark.parametrize("document", ["README.md", "python/README.md", "docs/python.md", "docs/robots.md", "docs/features.md", "docs/start.md", "docs/training.md"])
 def test_examples_in_documents(document, monkeypatch, tmp_path):
-    """Their blocks of Python run one after another, in a folder with a file of each kind."""
+    """Their blocks of Python run one after another, in a folder with a file of each kind. Those for torch run where it
+    is installed."""
     text = (ROOT / document).read_text(encoding="utf-8")
-    blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    kinds = "(?: torch)?" if importlib.util.find_spec("torch") else ""
+    blocks = re.findall(rf"^```python{kinds}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert blocks
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(5)
     poses = 0.1 * rng.normal(size=(40, 3 * 22))
     np.savez("walk.npz", poses=poses, trans=np.zeros((40, 3)), mocap_framerate=np.float64(120))
+    pathlib.Path("amass").mkdir()
+    for index in range(3):
+        many = np.cumsum(0.02 * rng.normal(size=(200, 3 * 52)), axis=0)
+        np.savez(f"amass/{index}.npz", poses=many, trans=np.zeros((200, 3)), mocap_framerate=np.float64(120))
+    np.savez("amass/shape.npz", betas=np.zeros(16), gender="neutral")
+    np.save("offsets.npy", 0.1 * rng.normal(size=(52, 3)))
     pathlib.Path("robot.xml").write_text(ROBOT)
     for file in ("data/walk.bvh", "examples/arm.xml"):
         pathlib.Path(file).parent.mkdir()
@@ -158,6 +167,14 @@ try:
     ways = [way for way in surface.routes([[0, 0, 0]], [[1, 0, 0]], by="edges") if way is not None]
     walks: list[tumble.Walk | None] = tumble.walk(ways, speed=1, radius=0.25)
     tumble.load("walk.glb")["Run"].view(fps=30).save("run.html")
+    library = tumble.MotionLibrary.load("amass/*.npz", fps=30, tracks=range(22), on_error="skip", packed=True)
+    ids, at = library.draw(512, np.random.default_rng(1))
+    state = library.sample(ids, at)
+    found = state.positions[0]
+    found = library.sample(ids, at, out=state).world_rotations[..., 0, :]
+    found = library.sample(ids, at, arrays=["rotations"], rotations="6d").rotations[0]
+    found = library.sample_windows(ids, at, 10, fps=30).velocities[:, 0]
+    found = library.shard(0, 2).sample(0, 0.5, arrays=["positions", "velocities"]).velocities
 except tumble.InputError as error:
     print(error.code, error.line, error.pointer)
 '''

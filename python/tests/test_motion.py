@@ -365,3 +365,184 @@ def test_what_does_not_fit_is_left_out_and_listed(tmp_path):
         tumble.MotionLibrary.load(pattern, on_error="ignore")
     with pytest.raises(tumble.InputError, match="no file could be read"):
         tumble.MotionLibrary.load(str(tmp_path / "3.npz"), on_error="skip")
+
+
+def body(path, frames, rate=120.0, seed=0):
+    """A file as AMASS has it: 52 joints."""
+    rng = np.random.default_rng(seed)
+    poses = np.cumsum(0.02 * rng.normal(size=(frames, 3 * 52)), axis=0)
+    trans = np.cumsum(0.01 * rng.normal(size=(frames, 3)), axis=0)
+    np.savez(path, poses=poses, trans=trans, betas=np.zeros(16), gender="neutral", mocap_framerate=rate)
+    return poses.reshape(frames, 52, 3), trans
+
+
+def test_a_folder_of_amass_is_shaped_while_it_is_read(tmp_path):
+    poses, trans = body(tmp_path / "a_poses.npz", 121)
+    body(tmp_path / "b_poses.npz", 50, rate=60.0, seed=1)
+    np.savez(tmp_path / "shape.npz", betas=np.zeros(16), gender="neutral")
+    latent = {"markers_latent": np.zeros((60, 3)), "markers_latent_vids": np.array({"a": 1}, dtype=object)}
+    np.savez(tmp_path / "neutral_stagei.npz", betas=np.zeros(16), gender="neutral", **latent)
+    tracks = ["pelvis", "spine1", "left_hip", "right_hip", "left_knee"]
+    library = tumble.MotionLibrary.load(
+        tmp_path / "*.npz", fps=30, tracks=tracks, offsets=np.ones((52, 3)), on_error="skip"
+    )
+    assert library.names == ["a_poses", "b_poses"] and library.joint_names == tracks
+    assert library.rates.tolist() == [30.0, 30.0]
+    np.testing.assert_allclose(library.lengths, [1.0, 24 / 30], atol=1e-12)
+    assert [(left.path.split("/")[-1], left.code) for left in library.skipped] == [
+        ("neutral_stagei.npz", "E320"),
+        ("shape.npz", "E320"),
+    ]
+    assert "no clip" in library.skipped[0].message
+    # Every fourth frame, of the joints that were named.
+    times = np.arange(31) / 30
+    found = library.sample(0, times)
+    for joint, source in enumerate([0, 3, 1, 2, 4]):
+        expected = Rotation.from_rotvec(poses[::4, source])
+        turned = Rotation.from_quat(found.rotations[:, joint].astype(float))
+        assert (turned.inv() * expected).magnitude().max() < 1e-6
+    # The pelvis is where `trans` puts it and the body has it.
+    np.testing.assert_allclose(found.positions[:, 0], trans[::4] + 1, atol=1e-5)
+    by_index = tumble.MotionLibrary.load(
+        tmp_path / "a_poses.npz", fps=30, tracks=[0, 3, 1, 2, 4], offsets=np.ones((52, 3))
+    )
+    np.testing.assert_array_equal(by_index.sample(0, times).positions, found.positions)
+    for wrong, words in [
+        ({"tracks": ["pelvis", "left_knee"]}, "`left_knee` hangs on `left_hip`, which is left out"),
+        ({"tracks": ["pelvis", "left_hand"]}, "a_poses.npz: tracks: there is no joint `left_hand`"),
+        ({"tracks": [0, 99]}, "there is no joint 99; there are 52"),
+        ({"tracks": [0, 0]}, "the joint 0 stands twice"),
+        ({"tracks": "pelvis"}, "give a list"),
+        ({"tracks": []}, "at least one"),
+        ({"fps": 0}, "fps"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            tumble.MotionLibrary.load(tmp_path / "a_poses.npz", **wrong)
+    with pytest.raises(tumble.InputError, match="E320"):
+        tumble.MotionLibrary.load(tmp_path / "*.npz")
+    unchanged = tumble.MotionLibrary.load(tmp_path / "a_poses.npz", fps=120)
+    np.testing.assert_array_equal(
+        unchanged.sample(0, 0.51, arrays=["rotations"]).rotations,
+        tumble.MotionLibrary.load(tmp_path / "a_poses.npz").sample(0, 0.51, arrays=["rotations"]).rotations,
+    )
+
+
+class Bar:
+    """What tqdm has."""
+
+    made: list = []
+
+    def __init__(self, total=None):
+        self.total, self.steps, self.closed = total, [], False
+        Bar.made.append(self)
+
+    def update(self, count):
+        self.steps.append(count)
+
+    def close(self):
+        self.closed = True
+
+
+def test_progress_is_shown_by_bars_and_functions(tmp_path):
+    for index in range(70):
+        tumble.save(tmp_path / f"{index:02}.npz", wave(3, 30), fps=30, method="slerp")
+    pattern = tmp_path / "*.npz"
+    tumble.MotionLibrary.load(pattern, progress=Bar)
+    [bar] = Bar.made
+    assert (bar.total, bar.steps, bar.closed) == (70, [64, 6], True)
+    shown = Bar()
+    tumble.MotionLibrary.load(pattern, progress=shown)
+    assert (shown.total, sum(shown.steps), shown.closed) == (70, 70, False)
+    for index, path in enumerate(sorted(tmp_path.iterdir())):
+        if index:
+            path.unlink()
+
+
+def test_shards_share_all_clips(tmp_path):
+    library = tumble.MotionLibrary([wave(count, 30) for count in (10, 20, 30, 40, 50)], names=list("abcde"))
+    parts = [library.shard(rank, 2) for rank in range(2)]
+    assert [part.names for part in parts] == [["a", "c", "e"], ["b", "d"]]
+    again = parts[1].shard(1, 2)
+    assert again.names == ["d"]
+    np.testing.assert_array_equal(again.sample(0, 0.7).rotations, library.sample(3, 0.7).rotations)
+    np.testing.assert_array_equal(again.sample(0, 0.7, finite=True).velocities, library.sample(3, 0.7, finite=True).velocities)
+    again.save(tmp_path / "part.npz")
+    opened = tumble.MotionLibrary.open(tmp_path / "part.npz")
+    library.save(tmp_path / "whole.npz")
+    mapped = tumble.MotionLibrary.open(tmp_path / "whole.npz").shard(1, 2).shard(1, 2)
+    for copied in (opened, mapped, *(pickle.loads(pickle.dumps(part)) for part in (again, opened, mapped))):
+        assert copied.names == ["d"]
+        np.testing.assert_array_equal(copied.sample(0, 0.7).positions, library.sample(3, 0.7).positions)
+    with pytest.raises(tumble.InputError, match="there is no clip 2; there are 2"):
+        parts[1].sample([0, 2], 0.0)
+    with pytest.raises(tumble.InputError, match="rank from 0"):
+        library.shard(2, 2)
+    files = [tmp_path / f"{name}.bvh" for name in "abc"]
+    for path in files:
+        tumble.save(path, wave(9, 30), fps=30, method="slerp")
+    assert tumble.MotionLibrary.load(files, shard=(1, 2)).names == ["b"]
+
+
+def test_rotations_have_the_representation_that_is_asked_for(clips, rng):
+    library = tumble.MotionLibrary(clips)
+    ids, times = rng.integers(0, 4, (5, 6)), rng.uniform(0, 1, (5, 6))
+    plain = library.sample(ids, times)
+    matrices = library.sample(ids, times, rotations="matrix")
+    six = library.sample(ids, times, rotations="6d", arrays=["rotations", "world_rotations"])
+    vectors = library.sample(ids, times, rotations="rotvec")
+    for name in ("rotations", "world_rotations"):
+        expected = Rotation.from_quat(getattr(plain, name).reshape(-1, 4).astype(float))
+        found = getattr(matrices, name)
+        np.testing.assert_allclose(found.reshape(-1, 3, 3), expected.as_matrix(), atol=1e-6)
+        columns = found[..., :2].swapaxes(-1, -2).reshape(5, 6, JOINTS, 6)
+        np.testing.assert_array_equal(getattr(six, name), columns)
+        np.testing.assert_allclose(getattr(vectors, name).reshape(-1, 3), expected.as_rotvec(), atol=2e-6)
+    np.testing.assert_array_equal(matrices.positions, plain.positions)
+    assert six.positions is None and matrices.rotations.ctypes.data % 64 == 0
+    memory = six.rotations
+    again = library.sample(ids, times + 0.1, rotations="6d", out=six)
+    assert again.rotations is memory
+    np.testing.assert_array_equal(memory, library.sample(ids, times + 0.1, rotations="6d").rotations)
+    for keywords, words in [
+        ({"rotations": "euler"}, "there is no `euler`; there are quaternion, matrix, 6d, rotvec"),
+        ({"rotations": "6d", "order": "wxyz"}, "is of quaternions"),
+        ({"out": plain, "arrays": ["rotations"]}, "give one of the two"),
+        ({"out": six}, r"its rotations are float32 \(5, 6, 7, 6\); the result's are float32 \(5, 6, 7, 4\)"),
+        ({"out": tumble.MotionState(velocities=np.zeros((5, 6, 7, 3)))}, r"its velocities are float64 .* float32"),
+        ({"out": tumble.MotionState(positions=[[0.0]])}, "its positions are of the type list"),
+        ({"out": tumble.MotionState(positions=np.zeros((5, 6, 7, 6), np.float32)[..., ::2])}, "its positions do not lie"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            library.sample(ids, times, **keywords)
+
+
+def test_packed_libraries_are_small_and_within_their_bound(rng, tmp_path):
+    frames = 400
+    keys = np.stack([smooth(rng, frames) for _ in range(22)])
+    root = np.cumsum(0.05 * rng.normal(size=(frames, 3)), axis=0)
+    clip = tumble.Clip(
+        np.arange(frames) / 120, keys, layout="track", parents=[None, *range(21)], offsets=rng.normal(size=(22, 3)),
+        translations=[root, *[None] * 21],
+    )
+    exact, packed = tumble.MotionLibrary([clip]), tumble.MotionLibrary([clip], packed=True)
+    assert exact.nbytes <= 19 * 22 * frames and packed.nbytes <= 12 * 22 * frames
+    times = rng.uniform(0, exact.lengths[0], 500)
+    found, expected = packed.sample(0, times), exact.sample(0, times)
+    assert not np.array_equal(found.rotations, expected.rotations)
+    pairs = [Rotation.from_quat(state.rotations.reshape(-1, 4).astype(float)) for state in (found, expected)]
+    assert (pairs[0].inv() * pairs[1]).magnitude().max() < 1e-5
+    np.testing.assert_allclose(found.angular_velocities, expected.angular_velocities, atol=22 * 2e-5 * 120)
+    packed.save(tmp_path / "packed.npz")
+    again = tumble.MotionLibrary.open(tmp_path / "packed.npz")
+    np.testing.assert_array_equal(again.sample(0, times).velocities, found.velocities)
+    assert (tmp_path / "packed.npz").stat().st_size < 12 * 22 * frames
+
+
+def test_the_table_of_loaders_is_what_the_script_prints():
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "python/examples/loaders.py")], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    page = (ROOT / "docs/loaders.md").read_text(encoding="utf-8")
+    table = page.split("<!-- python/examples/loaders.py -->\n")[1].split("<!-- end -->")[0]
+    assert table == done.stdout

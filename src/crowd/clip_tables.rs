@@ -6,6 +6,9 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
+use crate::crowd::clip_keys::{
+    FORM_KEYS, FORM_LINE, FORM_PACKED, KeyPrecision, keeps_keys, keys_of, pack,
+};
 use crate::crowd_error::{CrowdError, MAX_TICKS};
 use crate::curve::options::Quantity;
 use crate::math::canonical::round_f32;
@@ -26,6 +29,7 @@ use crate::time::spans::SpanSource;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
+use crate::twin::arc_between::arc_between;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
@@ -46,23 +50,27 @@ pub(crate) struct ClipTables {
     /// Ranges of consecutive joints whose rotations have one form and one time base and are adjacent in memory,
     /// `runs[clip]`.
     pub(crate) runs: Vec<Vec<Range<u32>>>,
+    /// Whether the curves of clips keep their keys where these are enough; `None`: constants alone, as kernels read
+    /// them.
+    pub(crate) keys: Option<KeyPrecision>,
 }
 
 /// One channel before it is stored in the tables: its spans, and the constants of each.
 #[derive(Default)]
-struct ChannelCurve {
-    form: u32,
-    spans: Vec<CrowdSpan>,
+pub(crate) struct ChannelCurve {
+    pub(crate) form: u32,
+    pub(crate) spans: Vec<CrowdSpan>,
     /// The constants of each span; their number depends on the form.
-    constants: Vec<[f32; 4]>,
-    /// The key at the start of each span; used if the span says that there is one.
-    keys: Vec<[f32; 4]>,
+    pub(crate) constants: Vec<[f32; 4]>,
+    /// The key at the start of each span, 0 if there is none. Samples at a tick have its bits if the span says that it
+    /// starts there.
+    pub(crate) keys: Vec<[f32; 4]>,
 }
 
 /// The number of constants of a form in each span.
 pub(crate) fn constants_of(form: u32) -> usize {
     match form {
-        FORM_CONSTANT => 1,
+        FORM_CONSTANT | FORM_KEYS | FORM_LINE | FORM_PACKED => 1,
         FORM_ARC => 2,
         FORM_CUBIC => 4,
         _ => POWERS,
@@ -91,14 +99,24 @@ impl ChannelCurve {
     }
 
     /// Adds a span with the first of the constants, as many as the form has.
-    fn push(&mut self, mut span: CrowdSpan, constants: &[[f32; 4]; POWERS], key: Option<[f32; 4]>) {
-        if key.is_some() {
-            span.start |= ON_KEY;
-        }
+    fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]; POWERS], key: Option<[f32; 4]>) {
         self.spans.push(span);
         self.constants
             .extend_from_slice(&constants[..constants_of(self.form)]);
         self.keys.push(key.unwrap_or_default());
+    }
+
+    /// Marks the last span: its key lies on its first tick.
+    fn mark_on_key(&mut self) {
+        if let Some(span) = self.spans.last_mut() {
+            span.start |= ON_KEY;
+        }
+    }
+
+    /// The constants of a span.
+    pub(crate) fn constants_at(&self, span: usize) -> &[[f32; 4]] {
+        let each = constants_of(self.form);
+        &self.constants[span * each..][..each]
     }
 }
 
@@ -133,7 +151,8 @@ fn curve(
             }
             let first = from.first as u32;
             let key = prepared.spans.keys[index];
-            let key = (key != NONE && from.first == from.frame).then(|| constant(key));
+            let is_on_key = key != NONE && from.first == from.frame;
+            let key = (key != NONE).then(|| constant(key));
             match prepared.spans.sources[index] {
                 SpanSource::Segment(index) => {
                     let along = in_frames(from.frame, to.frame, 1.0);
@@ -163,14 +182,20 @@ fn curve(
                     });
                 }
             }
+            if is_on_key {
+                curve.mark_on_key();
+            }
         }
         let end = frames.boundary(part.end);
         if part.after != NONE && (end.first <= last_tick || curve.spans.is_empty()) {
             let at_end = part.extension.as_ref().map(|extension| extension.at_end);
-            let key = at_end.filter(|&key| key != NONE && end.first == end.frame);
+            let key = at_end.filter(|&key| key != NONE);
             let first = end.first.min(last_tick) as u32;
             let first = if curve.spans.is_empty() { 0 } else { first };
             curve.push_constant(first, constant(part.after), key.map(constant));
+            if key.is_some() && end.first == end.frame {
+                curve.mark_on_key();
+            }
         }
     }
     let is_still = curve.spans.len() == 1 && curve.spans[0].scale == 0.0;
@@ -232,19 +257,67 @@ impl ClipTables {
             });
             curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
         }
+        if let Some(precision) = self.keys {
+            for curve in &mut curves {
+                if let Some((form, keys)) = keys_of(curve, precision) {
+                    (curve.form, curve.constants) = (form, keys);
+                }
+            }
+        }
         // Every curve has its constants and keys, and may have spans of its own.
         let constants = |curve: &ChannelCurve| curve.constants.len() + curve.keys.len();
         let more: usize = curves.iter().map(constants).sum();
         let spans: usize = curves.iter().map(|curve| curve.spans.len()).sum();
-        let counts = [
-            self.cells.len() + more,
-            self.spans.len() + spans + 1,
-            self.channels.len() + curves.len(),
-        ];
-        if counts.iter().any(|&count| count > MAX_ENTRIES) || curves.len() >= 1 << 24 {
+        if curves.len() >= 1 << 24 {
             return Err(CrowdError::TooLarge);
         }
+        self.check_room([more, spans + 1, curves.len()])?;
         self.add(period, &curves);
+        Ok(())
+    }
+
+    /// Refuses more cells, spans and channels than the tables can have.
+    fn check_room(&self, [cells, spans, channels]: [usize; 3]) -> Result<(), CrowdError> {
+        let counts = [
+            self.cells.len() + cells,
+            self.spans.len() + spans,
+            self.channels.len() + channels,
+        ];
+        match counts.iter().any(|&count| count > MAX_ENTRIES) {
+            true => Err(CrowdError::TooLarge),
+            false => Ok(()),
+        }
+    }
+
+    /// Adds the clips of other tables.
+    pub(crate) fn append(&mut self, other: Self) -> Result<(), CrowdError> {
+        self.check_room([other.cells.len(), other.spans.len(), other.channels.len()])?;
+        let (cells, spans, bases) = (self.cells.len(), self.spans.len(), self.bases.len());
+        self.cells.extend(other.cells);
+        self.spans.extend(other.spans);
+        self.bases
+            .extend(other.bases.into_iter().map(|base| CrowdBase {
+                first: base.first + spans as u32,
+                ..base
+            }));
+        self.channels
+            .extend(other.channels.into_iter().map(|channel| {
+                let moved = match channel.form_and_base >> 24 {
+                    FORM_PACKED => cells * 2,
+                    _ => cells,
+                };
+                CrowdChannel {
+                    first: channel.first + moved as u32,
+                    keys: channel.keys + moved as u32,
+                    ..channel
+                }
+            }));
+        self.clips
+            .extend(other.clips.into_iter().map(|clip| CrowdClip {
+                first_base: clip.first_base + bases as u32,
+                ..clip
+            }));
+        self.runs.extend(other.runs);
         Ok(())
     }
 
@@ -255,16 +328,22 @@ impl ClipTables {
             self.cells.push([0.0; 4]); // kernels use the first cell as 0
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
+        let mut last: Option<(&[CrowdSpan], u32)> = None;
         // Channels of one kind, one form and one time base lie side by side.
         let mut sides = BTreeMap::<_, Vec<(usize, &ChannelCurve)>>::new();
         for (index, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {
-                let bytes = bytemuck::cast_slice(&curve.spans).to_vec();
-                base = *known.entry(bytes).or_insert_with(|| {
-                    self.push_base(&curve.spans);
-                    (self.bases.len() - 1 - first_base) as u32
-                });
+                let bytes: &[u8] = bytemuck::cast_slice(&curve.spans);
+                base = match last {
+                    // Mostly all curves have the same spans.
+                    Some((spans, base)) if bytes == bytemuck::cast_slice::<_, u8>(spans) => base,
+                    _ => *known.entry(bytes.to_vec()).or_insert_with(|| {
+                        self.push_base(&curve.spans);
+                        (self.bases.len() - 1 - first_base) as u32
+                    }),
+                };
+                last = Some((&curve.spans, base));
             }
             let side = (index as u32 % CHANNELS, curve.form, base);
             sides.entry(side).or_default().push((index, curve));
@@ -285,12 +364,15 @@ impl ClipTables {
                 }
                 first
             };
-            let first = lay_out(|curve| &curve.constants);
+            let mut first = lay_out(|curve| &curve.constants);
             let mut spans = members[0].1.spans.iter();
-            let keys = match spans.any(|span| span.start & ON_KEY != 0) {
+            let keys = match spans.any(|span| span.start & ON_KEY != 0) && !keeps_keys(form) {
                 true => lay_out(|curve| &curve.keys),
                 false => first,
             };
+            if form == FORM_PACKED {
+                first = pack(&mut self.cells, first);
+            }
             let count = match form {
                 FORM_CONSTANT => 0,
                 _ => members.len() as u32,
@@ -395,6 +477,46 @@ fn arc_block<L: Lanes>(
         square,
         L::all(parameter),
     )))
+}
+
+/// As many arcs between keys as the vector has lanes: their middles and tangents.
+#[inline(always)]
+fn block_between<L: Lanes>(
+    starts: &[[f32; 4]],
+    ends: &[[f32; 4]],
+    [middles, tangents]: [&mut [[f32; 4]]; 2],
+) {
+    let (middle, tangent) = arc_between(L::load_rotations(starts), L::load_rotations(ends));
+    L::store_rotations(middle, middles);
+    L::store_rotations(tangent, tangents);
+}
+
+/// The middles and tangents of arcs between keys of neighbouring joints.
+#[inline(always)]
+pub(crate) fn arcs_between<L: Lanes>(
+    starts: &[[f32; 4]],
+    ends: &[[f32; 4]],
+    [middles, tangents]: [&mut [[f32; 4]]; 2],
+) {
+    let whole = middles.len() / L::COUNT * L::COUNT;
+    for first in (0..whole).step_by(L::COUNT) {
+        let joints = first..first + L::COUNT;
+        let found = [&mut middles[joints.clone()], &mut tangents[joints.clone()]];
+        block_between::<L>(&starts[joints.clone()], &ends[joints], found);
+    }
+    let rest = middles.len() - whole;
+    if rest > 0 {
+        // The last vector is filled up with arcs that are left out.
+        let mut keys = [[[0.0; 4]; MAX_LANES]; 2];
+        keys[0][..rest].copy_from_slice(&starts[whole..][..rest]);
+        keys[1][..rest].copy_from_slice(&ends[whole..][..rest]);
+        let mut found = [[[0.0; 4]; MAX_LANES]; 2];
+        let [of_middles, of_tangents] = &mut found;
+        let arcs = [&mut of_middles[..L::COUNT], &mut of_tangents[..L::COUNT]];
+        block_between::<L>(&keys[0][..L::COUNT], &keys[1][..L::COUNT], arcs);
+        middles[whole..].copy_from_slice(&of_middles[..rest]);
+        tangents[whole..].copy_from_slice(&of_tangents[..rest]);
+    }
 }
 
 /// Evaluates arcs of neighbouring joints at one parameter.

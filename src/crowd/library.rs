@@ -1,17 +1,23 @@
 //! A library of clips for one skeleton, prepared for crowds.
 
+use std::borrow::Cow;
+
 use bytemuck::Zeroable as _;
 use glam::{Affine3A, Vec3};
+use rayon::prelude::*;
 
+use crate::crowd::clip_keys::KeyPrecision;
 use crate::crowd::clip_tables::{ClipTables, MAX_ENTRIES};
 use crate::crowd::states::MotionTables;
 use crate::crowd_error::{CrowdError, MAX_CLIPS, MAX_MASKS, MAX_TICKS};
+use crate::engine::Engine;
 use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
 use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
+use crate::threads::stop;
 use crate::tracks::joints::Joints;
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
@@ -178,6 +184,44 @@ impl CrowdLibrary {
         interpolation: impl Into<Interpolation>,
         vectors: VectorMethod,
     ) -> Result<usize, CrowdError> {
+        if self.clip_count() == MAX_CLIPS {
+            return Err(CrowdError::TooManyClips);
+        }
+        let clip = self.push_tables(set, interpolation.into(), vectors)?;
+        let reference = self.tables.reference(self.joint_count(), clip, 0);
+        self.references.extend(reference);
+        Ok(clip)
+    }
+
+    fn push_clip(&mut self, clip: &MotionClip<'_>) -> Result<usize, CrowdError> {
+        self.push_tables(&clip.set, clip.interpolation, clip.vectors)
+    }
+
+    /// The same skeleton without clips.
+    fn clone_without_tables(&self) -> Self {
+        Self {
+            tables: ClipTables {
+                keys: self.tables.keys,
+                ..ClipTables::default()
+            },
+            offsets: self.offsets.clone(),
+            links: self.links.clone(),
+            levels: self.levels.clone(),
+            masks: self.masks.clone(),
+            bind: self.bind.clone(),
+            references: Vec::new(),
+            ticks_per_second: self.ticks_per_second,
+            joints: self.joints.clone(),
+        }
+    }
+
+    /// Adds the tables of a clip, which has no reference pose yet.
+    fn push_tables(
+        &mut self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        vectors: VectorMethod,
+    ) -> Result<usize, CrowdError> {
         let (tracks, joints) = (set.track_count(), self.joint_count());
         let named = Joints::of(set);
         let order = match &self.joints {
@@ -194,14 +238,9 @@ impl CrowdLibrary {
         let selected = selected.map_err(|_| CrowdError::Tracks { tracks, joints })?;
         let set = selected.as_ref().unwrap_or(set);
         let clip = self.clip_count();
-        if clip == MAX_CLIPS {
-            return Err(CrowdError::TooManyClips);
-        }
         let (ticks, offsets) = (self.ticks_per_second, &self.offsets);
         self.tables
-            .push(set, interpolation.into(), vectors, ticks, offsets)?;
-        self.references
-            .extend(self.tables.reference(joints, clip, 0));
+            .push(set, interpolation, vectors, ticks, offsets)?;
         self.joints.get_or_insert(named);
         Ok(clip)
     }
@@ -316,5 +355,112 @@ impl CrowdLibrary {
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let (ticks_per_second, joints) = (self.ticks_per_second(), self.joint_count());
         MotionTables::of_library(self.tables, self.links, joints, ticks_per_second)
+    }
+}
+
+/// Collects clips of one skeleton for [`MotionTables`]. Rotations on arcs (slerp) and translations on lines are kept as
+/// their keys, which takes a third of the memory of a [`CrowdLibrary`] or less, with the same bits.
+///
+/// ```
+/// use tumble::glam::{Quat, Vec3};
+/// use tumble::crowd::{KeyPrecision, MotionBuilder};
+/// use tumble::{Skeleton, TrackSet, VectorMethod, method};
+/// let mut door = TrackSet::new();
+/// door.push("door", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
+/// let skeleton = Skeleton::new(vec![None], vec![Vec3::X])?;
+/// let mut builder = MotionBuilder::new(&skeleton, 705_600, KeyPrecision::Packed)?;
+/// builder.push(&door, method::SLERP, VectorMethod::Linear)?;
+/// let (tables, spans, cells) = builder.finish();
+/// assert_eq!(tables.clip_count(), 1);
+/// # let _ = (spans, cells);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct MotionBuilder(CrowdLibrary);
+
+/// A clip for [`MotionBuilder::push_all`].
+#[derive(Debug, Clone)]
+pub struct MotionClip<'a> {
+    /// The tracks, one for each joint of the skeleton.
+    pub set: Cow<'a, TrackSet>,
+    /// How rotations are interpolated.
+    pub interpolation: Interpolation,
+    /// How translations are interpolated.
+    pub vectors: VectorMethod,
+}
+
+/// The number of clips that are prepared together. Their tables exist twice for a moment.
+const CLIPS_AT_ONCE: usize = 128;
+
+impl MotionBuilder {
+    /// No clips yet, with a number of ticks in a second.
+    ///
+    /// # Errors
+    /// As [`CrowdLibrary::with_ticks`].
+    pub fn new(
+        skeleton: &Skeleton,
+        ticks_per_second: u32,
+        precision: KeyPrecision,
+    ) -> Result<Self, CrowdError> {
+        let mut library = CrowdLibrary::with_ticks(skeleton, ticks_per_second)?;
+        library.tables.keys = Some(precision);
+        Ok(Self(library))
+    }
+
+    /// Adds a clip and returns its index.
+    ///
+    /// # Errors
+    /// As [`CrowdLibrary::push`]; there may be any number of clips.
+    pub fn push(
+        &mut self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        vectors: VectorMethod,
+    ) -> Result<usize, CrowdError> {
+        self.0.push_tables(set, interpolation.into(), vectors)
+    }
+
+    /// Adds clips in this order, which are prepared on the threads of `engine`.
+    ///
+    /// # Errors
+    /// The index of a clip and why it is not added, as [`MotionBuilder::push`]; clips before it are added. When the
+    /// system refuses threads or the work is stopped, the index is that of the next clip.
+    pub fn push_all(
+        &mut self,
+        engine: &Engine,
+        clips: &[MotionClip<'_>],
+    ) -> Result<(), (usize, CrowdError)> {
+        // The first clip may name the joints.
+        if let Some(first) = clips.first() {
+            (self.0.push_clip(first)).map_err(|error| (0, error))?;
+        }
+        let stop = stop::current();
+        let mut next = 1;
+        while next < clips.len() {
+            let batch = next..clips.len().min(next + CLIPS_AT_ONCE);
+            let prepared = |index: usize| -> Result<ClipTables, CrowdError> {
+                stop::check_of(stop.as_ref())?;
+                let mut part = self.0.clone_without_tables();
+                part.push_clip(&clips[index])?;
+                Ok(part.tables)
+            };
+            let work = || -> Vec<Result<ClipTables, CrowdError>> {
+                batch.clone().into_par_iter().map(prepared).collect()
+            };
+            let parts = engine.machine.threads().run(work);
+            let parts = parts.map_err(|error| (next, error.into()))?;
+            for part in parts {
+                let added = part.and_then(|part| self.0.tables.append(part));
+                added.map_err(|error| (next, error))?;
+                next += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// The tables of the clips, with their spans and cells.
+    #[must_use]
+    pub fn finish(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
+        self.0.into_tables()
     }
 }

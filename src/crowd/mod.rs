@@ -12,8 +12,8 @@
 //!   [`Engine::crowd`](crate::Engine::crowd) makes one.
 //! * [`CrowdFade`]: a layer's weight as a function of the clock.
 //! * [`CrowdOutput`]: which values an evaluation stores for each joint ([`CrowdValues`]), in 32 or 16 bits.
-//! * [`MotionTables`] and [`MotionStates`]: a library's clips without instances, for the training of models of
-//!   motion.
+//! * [`MotionTables`] and [`MotionStates`]: clips without instances, for the training of models of motion.
+//!   [`MotionBuilder`] collects them.
 //!
 //! # Steps
 //!
@@ -37,9 +37,11 @@
 // runs the kernels, `on_cpu` their twins.
 //
 // Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
-// joints are neighbouring lanes. On a device the tables stay; entries that changed are written with the next
+// joints are neighbouring lanes. Motion tables keep the keys of arcs and lines instead (`clip_keys`). On a device the
+// tables stay; entries that changed are written with the next
 // evaluation; positions live for a window alone.
 
+pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
 pub(crate) mod fade;
 pub(crate) mod instances;
@@ -50,10 +52,11 @@ pub(crate) mod on_cpu;
 pub(crate) mod player;
 pub(crate) mod states;
 
+pub use crate::crowd::clip_keys::KeyPrecision;
 pub use crate::crowd::fade::CrowdFade;
 pub use crate::crowd::layer::CrowdLayer;
-pub use crate::crowd::library::CrowdLibrary;
+pub use crate::crowd::library::{CrowdLibrary, MotionBuilder, MotionClip};
 pub use crate::crowd::player::Crowd;
-pub use crate::crowd::states::{MotionStates, MotionTables, MotionWords};
+pub use crate::crowd::states::{FrameStep, MotionStates, MotionTables, MotionWords};
 pub use crate::crowd_error::CrowdError;
 pub use crate::output::crowd::{CrowdOutput, CrowdValues};

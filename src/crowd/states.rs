@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::crowd::clip_keys::{FORM_KEYS, FORM_LINE, FORM_PACKED, KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, arcs, constants_of, runs_of};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
@@ -18,12 +19,16 @@ use crate::shader::{
 use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::threads::stop;
+use crate::twin::arc_tangent::arc_tangent;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
 
 /// The number of instances in a task.
 const TASK: usize = 64;
+
+/// The number of spans that are tried before they are searched.
+const GUESSES: usize = 6;
 
 /// Output arrays for the poses and velocities of all joints, `[instance][joint]`. Arrays that are empty are not
 /// computed. Units are seconds, radians, and the unit of length of the clips.
@@ -172,7 +177,8 @@ impl MotionTables {
             let Some(bases) = self.bases.get(first..first + clip.bases as usize) else {
                 return false;
             };
-            let is_sound_channel = |channel: &CrowdChannel| {
+            let is_sound_channel = |(index, channel): (usize, &CrowdChannel)| {
+                let index_of_kind = index % CHANNELS as usize;
                 let form = channel.form_and_base >> 24;
                 let Some(base) = bases.get((channel.form_and_base & 0x00ff_ffff) as usize) else {
                     return false;
@@ -181,21 +187,28 @@ impl MotionTables {
                 let constants = constants_of(form);
                 let end = match form {
                     FORM_CONSTANT => channel.first as usize,
+                    FORM_PACKED => (channel.first as usize + last) / 2,
                     _ => {
                         let behind = (constants - 1) * channel.count as usize;
                         channel.first as usize + last * constants + behind
                     }
                 };
                 let base_spans = &spans[base.first as usize..][..base.count as usize];
-                let has_keys =
-                    form != FORM_CONSTANT && base_spans.iter().any(|span| span.start & ON_KEY != 0);
+                let has_keys = form != FORM_CONSTANT
+                    && !keeps_keys(form)
+                    && base_spans.iter().any(|span| span.start & ON_KEY != 0);
                 let keys = channel.keys as usize + last;
-                [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL].contains(&form)
-                    && end < cells
-                    && (!has_keys || keys < cells)
+                let is_of_kernels =
+                    [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL].contains(&form);
+                // Rotations are on arcs, translations and scales on lines.
+                let is_of_keys = match index_of_kind {
+                    0 => form == FORM_KEYS || form == FORM_PACKED,
+                    _ => form == FORM_LINE,
+                };
+                (is_of_kernels || is_of_keys) && end < cells && (!has_keys || keys < cells)
             };
             let channels = &self.channels[index * each..][..each];
-            clip.bases > 0 && clip.period > 0 && channels.iter().all(is_sound_channel)
+            clip.bases > 0 && clip.period > 0 && channels.iter().enumerate().all(is_sound_channel)
         };
         each > 0
             && self.ticks_per_second > 0
@@ -253,8 +266,40 @@ impl MotionTables {
     pub fn sample_into(
         &self,
         engine: &Engine,
-        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+        parts: (&[[u32; 4]], &[[f32; 4]]),
         at: &[(u32, u32)],
+        states: MotionStates<'_>,
+    ) -> Result<(), CrowdError> {
+        self.states_into(engine, parts, (at, None), states)
+    }
+
+    /// As [`MotionTables::sample_into`], with velocities that are differences between two ticks. There is a step for
+    /// each instance.
+    ///
+    /// # Errors
+    /// As [`MotionTables::sample_into`], and when there are more or fewer steps than instances.
+    pub fn differences_into(
+        &self,
+        engine: &Engine,
+        parts: (&[[u32; 4]], &[[f32; 4]]),
+        at: &[(u32, u32)],
+        steps: &[FrameStep],
+        states: MotionStates<'_>,
+    ) -> Result<(), CrowdError> {
+        match steps.len() == at.len() {
+            true => self.states_into(engine, parts, (at, Some(steps)), states),
+            false => Err(CrowdError::OutputLength {
+                length: steps.len(),
+                needed: at.len(),
+            }),
+        }
+    }
+
+    fn states_into(
+        &self,
+        engine: &Engine,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+        (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),
         states: MotionStates<'_>,
     ) -> Result<(), CrowdError> {
         if (spans.len(), cells.len()) != self.sizes {
@@ -286,17 +331,17 @@ impl MotionTables {
         let width = engine.machine.width();
         let stop = stop::current();
         let each = TASK * self.joints;
-        let task = |memory: &mut StateScratch, (at, states): (&[(u32, u32)], MotionStates<'_>)| {
+        let task = |memory: &mut StateScratch, (first, states): (usize, MotionStates<'_>)| {
             stop::check_of(stop.as_ref())?;
-            let spans = bytemuck::cast_slice(spans);
-            let tables = self;
+            let instances = first..at.len().min(first + TASK);
             in_lanes_of(
                 width,
                 &mut StatesTask {
-                    tables,
-                    spans,
+                    tables: self,
+                    spans: bytemuck::cast_slice(spans),
                     cells,
-                    at,
+                    at: &at[instances.clone()],
+                    steps: steps.map(|steps| &steps[instances]),
                     states,
                     memory,
                 },
@@ -304,16 +349,25 @@ impl MotionTables {
             Ok(())
         };
         if at.len() <= TASK {
-            return task(&mut StateScratch::default(), (at, states));
+            return task(&mut StateScratch::default(), (0, states));
         }
         let mut left = states;
-        let tasks: Vec<_> = at
-            .chunks(TASK)
-            .map(|at| (at, left.split_off(each)))
+        let tasks: Vec<_> = (0..at.len())
+            .step_by(TASK)
+            .map(|first| (first, left.split_off(each)))
             .collect();
         let work = || (tasks.into_par_iter()).try_for_each_init(StateScratch::default, task);
         engine.machine.threads().run(work)?
     }
+}
+
+/// The two ticks between which an instance's velocities are differences, and one divided by the seconds between them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameStep {
+    /// The ticks of the clip.
+    pub ticks: [u32; 2],
+    /// Steps of this length in a second.
+    pub per_second: f32,
 }
 
 impl<'a> MotionStates<'a> {
@@ -335,9 +389,21 @@ impl<'a> MotionStates<'a> {
 /// Scratch memory of one thread.
 #[derive(Default)]
 struct StateScratch {
-    positions: Vec<CrowdPosition>,
+    pose: PoseScratch,
     rotations: Vec<[f32; 4]>,
     joints: Vec<Joint>,
+    /// The joints at both ends of a step.
+    ends: [Vec<Joint>; 2],
+}
+
+/// Scratch memory for one pose.
+#[derive(Default)]
+struct PoseScratch {
+    positions: Vec<CrowdPosition>,
+    /// The keys at the start and at the end of the span of each joint.
+    keys: [Vec<[f32; 4]>; 2],
+    /// The middles and tangents of the arcs between these.
+    arcs: [Vec<[f32; 4]>; 2],
 }
 
 /// A joint in the world.
@@ -355,8 +421,21 @@ struct StatesTask<'a, 'b> {
     spans: &'a [CrowdSpan],
     cells: &'a [[f32; 4]],
     at: &'a [(u32, u32)],
+    /// Between which ticks velocities are differences; `None` if they are derivatives.
+    steps: Option<&'a [FrameStep]>,
     states: MotionStates<'a>,
     memory: &'b mut StateScratch,
+}
+
+/// Which values of a pose are computed.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+enum PoseValues {
+    /// Rotations in the parents' frames.
+    Rotations,
+    /// Rotations and positions in the world, too.
+    World,
+    /// Velocities, too.
+    Velocities,
 }
 
 impl InLanes for StatesTask<'_, '_> {
@@ -365,67 +444,50 @@ impl InLanes for StatesTask<'_, '_> {
         let (tables, joints) = (self.tables, self.tables.joints);
         let states = &mut self.states;
         let moves = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
-        let in_world = moves || !(states.positions.is_empty() && states.world_rotations.is_empty());
+        let in_world = !(states.positions.is_empty() && states.world_rotations.is_empty());
+        let values_of_pose = match (moves && self.steps.is_none(), in_world) {
+            (true, _) => PoseValues::Velocities,
+            (false, true) => PoseValues::World,
+            (false, false) => PoseValues::Rotations,
+        };
+        let poses = Poses {
+            tables,
+            spans: self.spans,
+            cells: self.cells,
+        };
         let StateScratch {
-            positions,
+            pose,
             rotations,
             joints: world,
+            ends,
         } = &mut *self.memory;
         rotations.resize(joints, [0.0; 4]);
-        world.resize(joints, Joint::default());
+        for joints_of in [&mut *world].into_iter().chain(&mut *ends) {
+            joints_of.resize(joints, Joint::default());
+        }
+        for memory in pose.keys.iter_mut().chain(&mut pose.arcs) {
+            memory.resize(joints, [0.0; 4]);
+        }
         for (instance, &(clip, tick)) in self.at.iter().enumerate() {
-            let clip_entry = &tables.clips[clip as usize];
-            let tick = tick.min(clip_entry.period);
-            let bases =
-                &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
-            positions.clear();
-            let position = |base| guessed_position(base, self.spans, tick, clip_entry.period);
-            positions.extend(bases.iter().map(position));
-            let each = joints * CHANNELS as usize;
-            let channels = &tables.channels[clip as usize * each..][..each];
             let at = instance * joints..(instance + 1) * joints;
+            let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
             let local = match states.rotations.get_mut(at.clone()) {
                 Some(rotations) => rotations,
                 None => &mut rotations[..],
             };
-            local_rotations::<L>(
-                &tables.runs[clip as usize],
-                channels,
-                self.cells,
-                positions,
-                local,
-            );
-            if !in_world {
-                continue;
+            if is_posed {
+                poses.compute::<L>((clip, tick), values_of_pose, pose, local, world);
             }
-            let moment = ClipMoment {
-                bases,
-                spans: self.spans,
-                cells: self.cells,
-                positions,
-                tick,
-                per_second: tables.ticks_per_second as f32,
-            };
-            for (joint, state) in world.iter_mut().enumerate() {
-                let [rotation, moved] = [
-                    &channels[joint * 3],
-                    &channels[joint * 3 + TRANSLATION as usize],
-                ];
-                let [x, y, z, _] = moment.value(moved);
-                *state = Joint {
-                    rotation: local[joint],
-                    position: [x, y, z],
-                    ..Joint::default()
-                };
-                if moves {
-                    state.angular_velocity = moment.angular_velocity(rotation);
-                    state.velocity = moment.velocity(moved);
+            if let (Some(steps), true) = (self.steps, moves) {
+                let step = steps[instance];
+                for (end, tick) in ends.iter_mut().zip(step.ticks) {
+                    poses.compute::<L>((clip, tick), PoseValues::World, pose, rotations, end);
                 }
-            }
-            for link in &tables.links {
-                let parent = world[link.parent as usize];
-                let child = &mut world[link.joint as usize];
-                child.hang_on(&parent, moves);
+                let [before, after] = &*ends;
+                let steps = before.iter().zip(after);
+                for (state, (before, after)) in world.iter_mut().zip(steps) {
+                    state.differ(before, after, step.per_second);
+                }
             }
             fn put<T: Copy>(to: &mut [T], at: Range<usize>, world: &[Joint], of: fn(&Joint) -> T) {
                 for (value, joint) in to.get_mut(at).into_iter().flatten().zip(world) {
@@ -440,6 +502,91 @@ impl InLanes for StatesTask<'_, '_> {
             put(states.angular_velocities, at, world, |joint| {
                 joint.angular_velocity
             });
+        }
+    }
+}
+
+/// The poses of a library's clips.
+#[derive(Clone, Copy)]
+struct Poses<'a> {
+    tables: &'a MotionTables,
+    spans: &'a [CrowdSpan],
+    cells: &'a [[f32; 4]],
+}
+
+impl Poses<'_> {
+    /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, the rest to `world`.
+    #[inline(always)]
+    fn compute<L: Lanes>(
+        &self,
+        (clip, tick): (u32, u32),
+        values_of_pose: PoseValues,
+        scratch: &mut PoseScratch,
+        local: &mut [[f32; 4]],
+        world: &mut [Joint],
+    ) {
+        let Self {
+            tables,
+            spans,
+            cells,
+        } = *self;
+        let clip_entry = &tables.clips[clip as usize];
+        let tick = tick.min(clip_entry.period);
+        let bases = &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
+        let positions = &mut scratch.positions;
+        positions.clear();
+        let position = |base| guessed_position(base, spans, tick, clip_entry.period);
+        positions.extend(bases.iter().map(position));
+        let each = tables.joints * CHANNELS as usize;
+        let channels = &tables.channels[clip as usize * each..][..each];
+        let moment = ClipMoment {
+            bases,
+            spans,
+            cells,
+            positions,
+            tick,
+            per_second: tables.ticks_per_second as f32,
+        };
+        let moves = values_of_pose == PoseValues::Velocities;
+        for run in &tables.runs[clip as usize] {
+            let joints = run.start as usize..run.end as usize;
+            let values = &mut local[joints.clone()];
+            let channel = &channels[joints.start * CHANNELS as usize];
+            if !keeps_keys(channel.form_and_base >> 24) {
+                moment.rotations::<L>(channels, run.clone(), values);
+                continue;
+            }
+            let keys = scratch
+                .keys
+                .each_mut()
+                .map(|keys| &mut keys[joints.clone()]);
+            let arcs = (scratch.arcs.each_mut()).map(|arcs| &mut arcs[joints.clone()]);
+            moment.rotations_of_keys::<L>(channel, moves, keys, arcs, values);
+        }
+        if values_of_pose == PoseValues::Rotations {
+            return;
+        }
+        for (joint, state) in world.iter_mut().enumerate() {
+            let [rotation, moved] = [
+                &channels[joint * 3],
+                &channels[joint * 3 + TRANSLATION as usize],
+            ];
+            let [x, y, z, _] = moment.value(moved);
+            *state = Joint {
+                rotation: local[joint],
+                position: [x, y, z],
+                ..Joint::default()
+            };
+            if moves {
+                let arc = [0, 1].map(|part: usize| scratch.arcs[part][joint]);
+                state.angular_velocity = moment.angular_velocity(rotation, arc);
+                state.velocity = moment.velocity(moved);
+            }
+        }
+        for link in &tables.links {
+            let parent = world[link.parent as usize];
+            let child = &mut world[link.joint as usize];
+            child.hang_on(&parent, moves);
         }
     }
 }
@@ -463,11 +610,26 @@ impl Joint {
         let relative = rotated(parent.rotation, self.angular_velocity);
         self.angular_velocity = sum(parent.angular_velocity, relative).map(canonical);
     }
+
+    /// Sets the velocities to differences between two states, so many of which are in a second.
+    #[inline(always)]
+    fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
+        let [x, y, z] = before.position.map(|coordinate| -coordinate);
+        self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
+        let [x, y, z, w] = before.rotation;
+        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]);
+        let sine = (x * x + y * y + z * z).sqrt();
+        // The shorter way round; at an angle of 0 the limit.
+        let angle = 2.0 * arc_tangent(sine, w.abs());
+        let scale = if sine > 0.0 { angle / sine } else { 2.0 };
+        let scale = if w < 0.0 { -scale } else { scale };
+        self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
+    }
 }
 
-/// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times. Therefore the
-/// span that would contain the tick at even times is tried first, without a search, each step of which waits for
-/// memory.
+/// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times, or intervals are
+/// divided about evenly. Therefore the span that would contain the tick at even times is tried first, and then those to
+/// which the distance from it points. A search from the ends would wait for memory at each step.
 #[inline(always)]
 fn guessed_position(
     base: &CrowdBase,
@@ -475,15 +637,21 @@ fn guessed_position(
     tick: u32,
     period: u32,
 ) -> CrowdPosition {
-    let count = base.count as usize;
-    let base_spans = &spans[base.first as usize..][..count];
-    let even = (u64::from(tick) * (count as u64 - 1)).checked_div(u64::from(period));
-    let guess = (even.unwrap_or(0) as usize).min(count - 1);
-    let start = |index: usize| base_spans[index].start & TICKS;
-    // Rounding may have put the key on the other side of the tick.
-    for index in [guess, guess + 1, guess.saturating_sub(1)] {
-        if index < count && start(index) <= tick && (index + 1 == count || tick < start(index + 1))
-        {
+    let count = i64::from(base.count);
+    let base_spans = &spans[base.first as usize..][..base.count as usize];
+    let start = |index: i64| i64::from(base_spans[index as usize].start & TICKS);
+    // Spans in so many ticks, rounded away from 0.
+    let spans_in = |ticks: i64| {
+        let product = ticks * (count - 1);
+        let period = i64::from(period).max(1);
+        (product + product.signum() * (period - 1)) / period
+    };
+    let tick_number = i64::from(tick);
+    let mut index = (tick_number * (count - 1) / i64::from(period).max(1)).min(count - 1);
+    for _ in 0..GUESSES {
+        let distance = tick_number - start(index);
+        let is_before_next = index + 1 == count || tick_number < start(index + 1);
+        if distance >= 0 && is_before_next {
             let only = CrowdBase {
                 first: base.first + index as u32,
                 count: 1,
@@ -493,35 +661,12 @@ fn guessed_position(
             let span = position.span + index as u32;
             return CrowdPosition { span, ..position };
         }
+        index = match distance < 0 {
+            true => (index + spans_in(distance)).max(0),
+            false => (index + spans_in(distance)).min(count - 1),
+        };
     }
     position_at(base, spans, tick)
-}
-
-/// The rotations of an instance, as in a crowd with one layer.
-#[inline(always)]
-fn local_rotations<L: Lanes>(
-    runs: &[Range<u32>],
-    channels: &[CrowdChannel],
-    cells: &[[f32; 4]],
-    positions: &[CrowdPosition],
-    output: &mut [[f32; 4]],
-) {
-    for run in runs {
-        let values = &mut output[run.start as usize..run.end as usize];
-        let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
-        let channel = of(run.start);
-        let stands = positions[(channel.form_and_base & 0x00ff_ffff) as usize];
-        if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
-            let middle = (channel.first + stands.span * channel.count * 2) as usize;
-            let tangent = middle + channel.count as usize;
-            let cells = |first: usize| &cells[first..first + values.len()];
-            arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
-            continue;
-        }
-        for (joint, value) in run.clone().zip(values) {
-            *value = sampled(cells, of(joint), stands);
-        }
-    }
 }
 
 /// A moment of a clip.
@@ -535,10 +680,73 @@ struct ClipMoment<'a> {
 }
 
 impl ClipMoment<'_> {
+    /// The rotations of neighbouring joints, as in a crowd with one layer.
+    #[inline(always)]
+    fn rotations<L: Lanes>(
+        &self,
+        channels: &[CrowdChannel],
+        run: Range<u32>,
+        values: &mut [[f32; 4]],
+    ) {
+        let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
+        let channel = of(run.start);
+        let stands = self.positions[(channel.form_and_base & 0x00ff_ffff) as usize];
+        if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
+            let middle = (channel.first + stands.span * channel.count * 2) as usize;
+            let tangent = middle + channel.count as usize;
+            let cells = |first: usize| &self.cells[first..first + values.len()];
+            arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
+            return;
+        }
+        for (joint, value) in run.zip(values) {
+            *value = sampled(self.cells, of(joint), stands);
+        }
+    }
+
+    /// The rotations of neighbouring joints whose channels have keys, from `channel` on. If the joints move, `arcs`
+    /// are those along which they do.
+    #[inline(always)]
+    fn rotations_of_keys<L: Lanes>(
+        &self,
+        channel: &CrowdChannel,
+        moves: bool,
+        [starts, ends]: [&mut [[f32; 4]]; 2],
+        [middles, tangents]: [&mut [[f32; 4]]; 2],
+        values: &mut [[f32; 4]],
+    ) {
+        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+        let stands = self.positions[base];
+        let is_on_key = stands.span & ON_KEY != 0;
+        let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
+        let span = stands.span & TICKS;
+        let (along, ..) = self.along(channel);
+        if moves || !is_on_key {
+            let arcs = [&mut *middles, &mut *tangents];
+            rows.arcs::<L>(along, [starts, ends], arcs);
+        }
+        if is_on_key || along != span {
+            rows.copy(span, values);
+        } else {
+            arcs::<L>(middles, tangents, stands.parameter, values);
+        }
+    }
+
+    /// A translation.
     #[inline(always)]
     fn value(&self, channel: &CrowdChannel) -> [f32; 4] {
-        let position = self.positions[(channel.form_and_base & 0x00ff_ffff) as usize];
-        sampled(self.cells, channel, position)
+        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+        let position = self.positions[base];
+        if channel.form_and_base >> 24 != FORM_LINE {
+            return sampled(self.cells, channel, position);
+        }
+        let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
+        let span = position.span & TICKS;
+        if position.span & ON_KEY != 0 {
+            let mut key = [[0.0; 4]];
+            rows.copy(span, &mut key);
+            return key[0];
+        }
+        rows.point(span, position.parameter)
     }
 
     /// The span of a channel, the parameter in it and the parameter's rate per second. At the last key these are of
@@ -561,9 +769,9 @@ impl ClipMoment<'_> {
         (index, parameter, span.scale * self.per_second)
     }
 
-    /// The angular velocity of a rotation, about the parent's axes.
+    /// The angular velocity of a rotation, about the parent's axes. `arc` is that of a channel with keys.
     #[inline(always)]
-    fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 3] {
+    fn angular_velocity(&self, channel: &CrowdChannel, arc: [[f32; 4]; 2]) -> [f32; 3] {
         let form = channel.form_and_base >> 24;
         if form == FORM_CONSTANT {
             return [0.0; 3];
@@ -577,6 +785,7 @@ impl ClipMoment<'_> {
                     [first, first + channel.count].map(|cell| self.cells[cell as usize]);
                 (middle, tangent)
             }
+            FORM_KEYS | FORM_PACKED => (arc[0], arc[1]),
             _ => self.polynomial::<POWERS>(channel, span, s),
         };
         let [x, y, z, w] = rotation;
@@ -593,6 +802,12 @@ impl ClipMoment<'_> {
         let (span, s, rate) = self.along(channel);
         let (_, [x, y, z, _]) = match channel.form_and_base >> 24 {
             FORM_CUBIC => self.polynomial::<4>(channel, span, s),
+            FORM_LINE => {
+                let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+                let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
+                let [middle, rise] = rows.line(span);
+                (middle, rise)
+            }
             _ => self.polynomial::<POWERS>(channel, span, s),
         };
         scaled([x, y, z], rate).map(canonical)

@@ -1,10 +1,13 @@
 //! States of a library's clips: a crowd's rotations, and rates that agree with their differences.
 
+use std::borrow::Cow;
+
 use super::{clip, skeleton};
 use crate::support::{Random, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::crowd::{
-    CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, MotionStates, MotionTables,
+    CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, FrameStep, KeyPrecision, MotionBuilder,
+    MotionClip, MotionStates, MotionTables,
 };
 use tumble::{
     Device, Engine, EngineOptions, Method, TrackSet, VectorMethod, VectorWidth, WrapMode, method,
@@ -15,6 +18,16 @@ const TICKS: u32 = 705_600;
 /// Clips without scales, of which states say nothing.
 fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
     let mut library = CrowdLibrary::with_ticks(&skeleton(random, joints), TICKS).unwrap();
+    for set in sets(random, joints) {
+        library
+            .push(&set, method, VectorMethod::BesselOverhauser)
+            .unwrap();
+    }
+    library
+}
+
+fn sets(random: &mut Random, joints: usize) -> Vec<TrackSet> {
+    let mut sets = Vec::new();
     for keys in [1, 2, 40] {
         let tracks = clip(random, joints, keys);
         let mut set = TrackSet::new();
@@ -31,11 +44,9 @@ fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
             })
             .collect();
         set.set_translations(0, &times, &points, &[]).unwrap();
-        library
-            .push(&set, method, VectorMethod::BesselOverhauser)
-            .unwrap();
+        sets.push(set);
     }
-    library
+    sets
 }
 
 struct StateResults {
@@ -260,4 +271,137 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
     let states = MotionStates::default();
     let others = tables.sample_into(&engine, (&spans[1..], &cells), &[(0, 0)], states);
     assert_eq!(others, Err(CrowdError::BrokenTables));
+}
+
+/// The angle between two rotations.
+fn angle(a: [f32; 4], b: [f32; 4]) -> f64 {
+    let [a, b] = [a, b].map(|q| Quat::from_array(q).as_dquat().normalize());
+    let chord = (a - b).length().min((a + b).length());
+    4.0 * (chord / 2.0).asin()
+}
+
+#[test]
+fn tables_of_keys_have_the_bits_of_tables_of_segments_and_packed_ones_are_within_their_bound() {
+    let mut random = Random(19);
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let joints = 11;
+    let skeleton = skeleton(&mut random, joints);
+    let mut sets = sets(&mut random, joints);
+    // Keys at common times, as most files have them, which turn by up to 180°, with signs of both kinds.
+    let times: Vec<f64> = (0..50).map(|frame| f64::from(frame) / 30.0).collect();
+    let mut even = TrackSet::new();
+    for _ in 0..joints {
+        let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+        even.push("", &times, &keys).unwrap();
+    }
+    let points: Vec<Vec3> = times.iter().map(|_| random.direction().as_vec3()).collect();
+    even.set_translations(0, &times, &points, &[]).unwrap();
+    sets.push(even);
+    // Frames that lie on no tick, and keys that turn little: their signs stay.
+    let times: Vec<f64> = (0..50).map(|frame| f64::from(frame) / 59.94).collect();
+    let mut slow = TrackSet::new();
+    for _ in 0..joints {
+        let mut key = random.rotation();
+        let keys = times.iter().map(|_| {
+            key = (key * DQuat::from_scaled_axis(random.direction() * 0.05)).normalize();
+            key.as_quat()
+        });
+        let keys: Vec<Quat> = keys.collect();
+        slow.push("", &times, &keys).unwrap();
+    }
+    sets.push(slow);
+    let mut whole = CrowdLibrary::with_ticks(&skeleton, TICKS).unwrap();
+    let new = |precision| MotionBuilder::new(&skeleton, TICKS, precision).unwrap();
+    let (mut exact, mut packed) = (new(KeyPrecision::Exact), new(KeyPrecision::Packed));
+    let (method, vectors) = (method::SLERP, VectorMethod::Linear);
+    for set in &sets {
+        whole.push(set, method, vectors).unwrap();
+        exact.push(set, method, vectors).unwrap();
+    }
+    let clip = |set| MotionClip {
+        set: Cow::Borrowed(set),
+        interpolation: method.into(),
+        vectors,
+    };
+    let clips: Vec<MotionClip<'_>> = sets.iter().map(clip).collect();
+    packed.push_all(&engine, &clips).unwrap();
+    let (tables, spans, cells) = whole.into_tables();
+    let at = instances(&mut random, &tables, 2000);
+    let expected = states(&engine, &tables, (&spans, &cells), &at);
+    let mut sizes = vec![cells.len()];
+    for (builder, bound) in [(exact, 0.0), (packed, 1e-5)] {
+        let (tables, spans, cells) = builder.finish();
+        sizes.push(cells.len());
+        let again = MotionTables::new(tables.words(), (&spans, &cells)).unwrap();
+        for width in VectorWidth::available() {
+            let mut options = EngineOptions::default();
+            options.vector_width = Some(width);
+            let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+            let found = states(&engine, &again, (&spans, &cells), &at);
+            if bound == 0.0 {
+                assert_eq!(found.rotations, expected.rotations);
+                assert_eq!(found.positions, expected.positions);
+                assert_eq!(found.world_rotations, expected.world_rotations);
+                assert_eq!(found.velocities, expected.velocities);
+                assert_eq!(found.angular_velocities, expected.angular_velocities);
+            }
+            let pairs = found.rotations.iter().zip(&expected.rotations);
+            let largest = pairs.map(|(&a, &b)| angle(a, b)).fold(0.0, f64::max);
+            assert!(largest <= bound, "{largest}");
+        }
+    }
+    // Tracks whose times differ, and keys of changing signs, are stored as segments where bits are to be the same.
+    assert!(
+        sizes[1] * 3 < sizes[0] * 2 && sizes[2] * 2 < sizes[1],
+        "{sizes:?}"
+    );
+}
+
+#[test]
+fn differences_are_those_of_the_two_ticks() {
+    let mut random = Random(31);
+    let (tables, spans, cells) = library(&mut random, 9, method::SLERP).into_tables();
+    let parts = (&spans[..], &cells[..]);
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let at = instances(&mut random, &tables, 130);
+    let frame = TICKS / 30;
+    let steps: Vec<FrameStep> = at
+        .iter()
+        .map(|&(_, tick)| FrameStep {
+            ticks: [tick / frame * frame, (tick / frame + 1) * frame],
+            per_second: 30.0,
+        })
+        .collect();
+    let count = at.len() * 9;
+    let (mut velocities, mut angular) = (vec![[0.0f32; 3]; count], vec![[0.0f32; 3]; count]);
+    let arrays = MotionStates {
+        velocities: &mut velocities,
+        angular_velocities: &mut angular,
+        ..MotionStates::default()
+    };
+    tables
+        .differences_into(&engine, parts, &at, &steps, arrays)
+        .unwrap();
+    let of = |end: usize| -> StateResults {
+        let at: Vec<(u32, u32)> = (at.iter().zip(&steps))
+            .map(|(&(clip, _), step)| (clip, step.ticks[end]))
+            .collect();
+        states(&engine, &tables, parts, &at)
+    };
+    let (before, after) = (of(0), of(1));
+    for index in 0..count {
+        let [a, b] = [before.positions[index], after.positions[index]].map(Vec3::from_array);
+        let velocity = Vec3::from_array(velocities[index]);
+        assert!(((b - a) * 30.0).distance(velocity) < 1e-4);
+        let [a, b] = [before.world_rotations[index], after.world_rotations[index]]
+            .map(|q| Quat::from_array(q).as_dquat().normalize());
+        let step = b * a.inverse();
+        let step = if step.w < 0.0 { -step } else { step };
+        let expected = step.to_scaled_axis() * 30.0;
+        let found = Vec3::from_array(angular[index]).as_dvec3();
+        assert!(expected.distance(found) < 2e-4, "{expected} {found}");
+    }
+    let refused =
+        tables.differences_into(&engine, parts, &at, &steps[1..], MotionStates::default());
+    assert!(matches!(refused, Err(CrowdError::OutputLength { .. })));
 }

@@ -169,6 +169,13 @@ fn read_known(
         if let Some(message) = dialect::misfit(archive) {
             return Diagnostic::new(&archive.file, Code::Shape, message);
         }
+        if smpl::is_body_alone(archive) {
+            let message = format!(
+                "has the shape of a body and no motion, so it is no clip; there are {}",
+                archive.listing()
+            );
+            return Diagnostic::new(&archive.file, Code::BodyAlone, message);
+        }
         let message = format!(
             "no array has a known name (poses, rotations, body_rotations); say what they \
              are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",

@@ -151,6 +151,14 @@ pub(crate) fn joints_of_body(joints: usize) -> Option<(Vec<String>, Vec<Option<u
 pub(crate) const NO_OFFSETS: &str = "where a body's joints are depends on its shape; give a model of it with --body-model, or their \
                                      places with --offsets";
 
+/// Whether the archive has the shape of a body and nothing that may be a motion, which has at least two axes. AMASS
+/// stores the shapes of its subjects so.
+pub(crate) fn is_body_alone(archive: &Archive) -> bool {
+    let is_small = |name: &str| archive.shape(name).is_some_and(|shape| shape.len() < 2);
+    let mut members = archive.members.iter().map(|member| &*member.name);
+    archive.find("betas").is_some() && members.all(|name| BESIDE.contains(&name) || is_small(name))
+}
+
 /// The plan of a file with `poses`, or with `root_orient`, `pose_body` and perhaps others, which the models call
 /// `global_orient` and `body_pose`. `None` for other files.
 pub(crate) fn plan(

@@ -5,16 +5,18 @@ from __future__ import annotations
 import glob as _glob
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tumble._errors import InputError
 from tumble._files import whole
-from tumble._tumble import Clip, Engine, File, Motions, load, load_all
+from tumble._tumble import Clip, Engine, File, Motions, load, load_all, represent, shaped
 
 if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
@@ -30,10 +32,11 @@ _NAMES: tuple[_Name, ...] = (
     "velocities",
     "angular_velocities",
 )
-_WIDTHS = {name: 4 if name.endswith("rotations") else 3 for name in _NAMES}
+# The shape of a rotation in each representation.
+_SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
 _ALIGNED = 64
-_VERSION = 1
+_VERSION = 2
 # Members that every file has, besides those that the extension module looks for.
 _STORED = ("version", "method", "names", "lengths", "rates")
 
@@ -75,6 +78,47 @@ class MotionState(_WithWeakReferences):
         )
 
 
+if TYPE_CHECKING:
+    _S = TypeVar("_S", bound=MotionState)
+    _Array: TypeAlias = NDArray[np.float32]
+    _Representation: TypeAlias = Literal["quaternion", "matrix", "6d", "rotvec"]
+    _Order: TypeAlias = Literal["xyzw", "wxyz"]
+    _Progress: TypeAlias = Callable[[int, int], object] | Any
+
+    class _Whole(MotionState):
+        """A state of which no array was left out."""
+
+        rotations: _Array
+        positions: _Array
+        world_rotations: _Array
+        velocities: _Array
+        angular_velocities: _Array
+
+    class _Some(MotionState):
+        """A state with the arrays that were asked for; which, types do not say."""
+
+        rotations: Any
+        positions: Any
+        world_rotations: Any
+        velocities: Any
+        angular_velocities: Any
+
+    class _Rotations(_Some):
+        rotations: _Array
+
+    class _Positions(_Some):
+        positions: _Array
+
+    class _WorldRotations(_Some):
+        world_rotations: _Array
+
+    class _Velocities(_Some):
+        velocities: _Array
+
+    class _AngularVelocities(_Some):
+        angular_velocities: _Array
+
+
 @dataclass(frozen=True, slots=True)
 class Skipped:
     """A file or a clip that a `MotionLibrary` left out.
@@ -105,6 +149,8 @@ class MotionLibrary:
     keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`).
     `names`: of the clips; else their own, or their files'. `engine`: whose threads work, else one that all calls share.
     `on_error`: "refuse", or "skip": clips that do not fit the skeleton are left out, and `skipped` lists them.
+    `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations are then within 1e-5 rad of the exact
+    ones, each relative to its parent.
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
@@ -138,6 +184,7 @@ class MotionLibrary:
         names: Sequence[str] | None = None,
         engine: Engine | None = None,
         on_error: _OnError = "refuse",
+        packed: bool = False,
     ) -> None:
         clips = list(clips)
         skip = _skips(on_error)
@@ -146,7 +193,7 @@ class MotionLibrary:
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
         all_names = list(names) if names is not None else [_name(clip) for clip in clips]
-        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method, skip)
+        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method, skip, packed)
         left_out = dict(self._motions.skipped)
         self.skipped = [
             Skipped(os.fspath(clips[index].path or ""), all_names[index], None, message)
@@ -159,6 +206,7 @@ class MotionLibrary:
         self._engine = engine if engine is not None else Engine()
         self._method = method
         self._file: str | None = None
+        self._only: NDArray[np.int64] | None = None
 
     @classmethod
     def load(
@@ -169,23 +217,32 @@ class MotionLibrary:
         method: str = "slerp",
         engine: Engine | None = None,
         on_error: _OnError = "refuse",
-        progress: Callable[[int, int], object] | None = None,
+        packed: bool = False,
+        fps: float | str | Fraction | None = None,
+        tracks: Sequence[str] | Sequence[int] | None = None,
+        progress: _Progress | None = None,
+        shard: tuple[int, int] | None = None,
         **options: Any,
     ) -> MotionLibrary:
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
         of every file belongs to the library, in the order of the names.
 
-        `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets` and
-        `body_model`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such files, and
-        clips that do not fit the skeleton, and lists them in `skipped`. `progress(done, total)` is called now and then
-        while files are read, for example to update a bar.
+        `fps`: clips are sampled at this rate by `method`; what is left of a frame at the end is left out. `tracks`: the
+        names or the indices of joints, in the order of the results; joints on which these hang are needed, too.
+        `shard`: of the files only those that are the share of one of several processes, as (rank, processes).
+
+        `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
+        `body_model` and `map`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
+        files, and clips that do not fit the skeleton, and lists them in `skipped`. So it does with the files of AMASS
+        that are no clips (`shape.npz`, `*_stagei.npz`). `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
+        function, which is called with the number of files read so far and of all. `packed`: as of the class.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
         >>> tumble.save(os.path.join(folder, "door.npz"), tumble.Clip(
         ...     [0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]], names=["door"], parents=[None]), fps=30)
-        >>> tumble.MotionLibrary.load(os.path.join(folder, "*.npz")).names
-        ['door']
+        >>> tumble.MotionLibrary.load(os.path.join(folder, "*.npz"), fps=10).rates
+        array([10.])
         """
         patterns = [files] if isinstance(files, str | os.PathLike) else list(files)
         paths: list[str] = []
@@ -194,64 +251,228 @@ class MotionLibrary:
             if not found:
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
-        read, faults = load_all(paths, options, skip=_skips(on_error), progress=progress)
+        if shard is not None:
+            paths = [paths[index] for index in _share(len(paths), *shard)]
+        with _bar(progress, len(paths)) as step:
+            read, faults = load_all(
+                paths, options, skip=_skips(on_error), progress=step, fps=fps, tracks=tracks, method=method
+            )
         skipped = [Skipped(os.fspath(path), None, code, message) for path, code, message in faults]
         clips = [clip for file in read for clip in file.clips]
         if not clips and skipped:
             raise InputError(f"no file could be read; the first: {skipped[0].message}")
-        made = cls(clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error)
+        if skeleton is not None and not isinstance(skeleton, tuple):
+            skeleton = shaped(_clip_of(skeleton), tracks=tracks)
+        made = cls(clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error, packed=packed)
         made.skipped = skipped + made.skipped
         return made
+
+    def shard(self, rank: int, processes: int) -> MotionLibrary:
+        """The clips that are the share of one of several processes: every clip belongs to one. They lie in the same
+        memory.
+
+        >>> import tumble
+        >>> doors = [tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None], name=name) for name in "abc"]
+        >>> tumble.MotionLibrary(doors).shard(0, 2).names
+        ['a', 'c']
+        """
+        share = _share(len(self), rank, processes)
+        part = MotionLibrary.__new__(MotionLibrary)
+        part.__dict__.update(self.__dict__)
+        part.names = [self.names[index] for index in share]
+        part.lengths, part.rates = self.lengths[share], self.rates[share]
+        part._only = self._ids(np.array(share, np.int64))
+        return part
+
+    def _ids(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The indices among all clips in memory."""
+        if self._only is None:
+            return ids
+        unknown = ids[(ids < 0) | (ids >= len(self._only))]
+        if unknown.size:
+            raise InputError(f"clip_ids: there is no clip {unknown[0]}; there are {len(self._only)}, from 0")
+        return self._only[ids]
+
+    def _each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A number for each clip in memory, of those of this library."""
+        if self._only is None:
+            return values
+        every = np.full(len(self._motions), np.nan)
+        every[self._only] = values
+        return every
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: None = ...,
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Whole: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[Literal["rotations"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Rotations: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[Literal["positions"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Positions: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[Literal["world_rotations"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _WorldRotations: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[Literal["velocities"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Velocities: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[Literal["angular_velocities"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _AngularVelocities: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[_Name],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Some: ...
+
+    @overload
+    def sample(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: None = ...,
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: _S,
+    ) -> _S: ...
 
     def sample(
         self,
         clip_ids: ArrayLike,
         times: ArrayLike,
         *,
-        arrays: Sequence[_Name] = _NAMES,
+        arrays: Sequence[_Name] | None = None,
         finite: bool = False,
-        order: Literal["xyzw", "wxyz"] = "xyzw",
+        order: _Order = "xyzw",
+        rotations: _Representation = "quaternion",
         out: MotionState | None = None,
     ) -> MotionState:
         """The states of instances: `clip_ids` and `times` say which clip each plays and how many seconds after the
         clip's first key it stands. (`Clip` and `Engine` take the times of the keys.) Both have the shape of the result,
         (N,) for example, or shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
 
-        `arrays`: the names of those to compute; rotations alone take a third of the time. `out`: a state
+        `arrays`: the names of those to compute, by default all; rotations alone take a third of the time. `out`: a state
         whose arrays are filled again, those that it has. `finite`: velocities as differences of the two
         frames of the clip's rate around a time, as other motion libraries have them, instead of the exact
-        derivatives. `order`: of quaternions.
+        derivatives. `order`: of quaternions. `rotations`: how both arrays of rotations are stored: "quaternion" (…, 4),
+        "matrix" (…, 3, 3) for column vectors, "6d" (…, 6), the matrix's first two columns, or "rotvec" (…, 3), axis
+        times angle.
 
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
         >>> library = tumble.MotionLibrary([door])
         >>> library.sample([0], [0.5], arrays=["positions"]).positions.shape
         (1, 1, 3)
+        >>> library.sample(0, [0.5, 1.0], rotations="6d").rotations.shape
+        (2, 1, 6)
         """
-        ids = np.ascontiguousarray(clip_ids)
+        ids = np.asarray(clip_ids)
         if ids.dtype.kind not in "iu" and ids.size:
             raise InputError(f"clip_ids: their type is {ids.dtype}; give whole numbers")
-        ids = np.ascontiguousarray(ids, np.int64)
-        moments = np.ascontiguousarray(times, np.float64)
+        moments = np.asarray(times, np.float64)
         try:
-            shape = np.broadcast_shapes(np.shape(clip_ids), np.shape(times))
+            shape = np.broadcast_shapes(ids.shape, moments.shape)
         except ValueError:
-            shapes = f"{np.shape(clip_ids)} and {np.shape(times)}"
+            shapes = f"{ids.shape} and {moments.shape}"
             raise InputError(f"clip_ids and times: their shapes are {shapes}; give shapes that broadcast") from None
-        ids = np.ascontiguousarray(np.broadcast_to(np.reshape(ids, np.shape(clip_ids)), shape)).reshape(-1)
-        moments = np.ascontiguousarray(np.broadcast_to(np.reshape(moments, np.shape(times)), shape)).reshape(-1)
-        if order not in ("xyzw", "wxyz"):
-            raise InputError(f"order: there is no `{order}`; there are xyzw, wxyz")
+        ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
+        moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
+        each = _shapes_of(order, rotations)
         if out is None:
-            for name in arrays:
+            for name in arrays if arrays is not None else ():
                 if name not in _NAMES:
                     raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
             joints = self._motions.joints
-            made = {name: _aligned((*shape, joints, _WIDTHS[name])) for name in arrays}
-            out = MotionState(**made)
+            asked = _NAMES if arrays is None else arrays
+            out = MotionState(**{name: _aligned((*shape, joints, *each[name])) for name in asked})
+        elif arrays is not None:
+            raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
-            _check_out(out, shape, self._motions.joints)
-        self._fill(ids, moments, finite, _flat(out, len(shape)))
+            _check_out(out, shape, self._motions.joints, each)
+        filled = _flat(out, len(shape))
+        if rotations == "quaternion":
+            self._fill(ids, moments, finite, filled)
+        else:
+            found = MotionState(
+                **{
+                    name: _aligned((ids.size, self._motions.joints, 4)) if name.endswith("rotations") else array
+                    for name in _NAMES
+                    if (array := getattr(filled, name)) is not None
+                }
+            )
+            self._fill(ids, moments, finite, found)
+            for of, array in ((found.rotations, filled.rotations), (found.world_rotations, filled.world_rotations)):
+                if of is not None and array is not None:
+                    represent(of, rotations, array)
         if order == "wxyz":
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
@@ -262,8 +483,13 @@ class MotionLibrary:
         self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
     ) -> None:
         """Fills the arrays of instances, (N,)."""
-        velocities, angular = out.velocities, out.angular_velocities
-        is_finite = finite and not (velocities is None and angular is None)
+        frames = None
+        if finite and not (out.velocities is None and out.angular_velocities is None):
+            rates = self._each(self.rates)
+            known = np.isnan(rates[ids[(ids >= 0) & (ids < len(rates))]])
+            if known.any():
+                raise InputError("finite: a clip has no rate; load it with `fps`")
+            frames = (rates, self._each(self.lengths))
         self._motions.sample(
             self._engine,
             ids,
@@ -271,11 +497,130 @@ class MotionLibrary:
             out.rotations,
             out.positions,
             out.world_rotations,
-            None if is_finite else velocities,
-            None if is_finite else angular,
+            out.velocities,
+            out.angular_velocities,
+            frames,
         )
-        if is_finite:
-            self._differences(ids, moments, out)
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: None = ...,
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Whole: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[Literal["rotations"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Rotations: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[Literal["positions"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Positions: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[Literal["world_rotations"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _WorldRotations: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[Literal["velocities"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Velocities: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[Literal["angular_velocities"]],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _AngularVelocities: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: Sequence[_Name],
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: None = ...,
+    ) -> _Some: ...
+
+    @overload
+    def sample_windows(
+        self,
+        clip_ids: ArrayLike,
+        starts: ArrayLike,
+        count: int,
+        fps: float,
+        *,
+        arrays: None = ...,
+        finite: bool = ...,
+        order: _Order = ...,
+        rotations: _Representation = ...,
+        out: _S,
+    ) -> _S: ...
 
     def sample_windows(
         self,
@@ -284,9 +629,10 @@ class MotionLibrary:
         count: int,
         fps: float,
         *,
-        arrays: Sequence[_Name] = _NAMES,
+        arrays: Sequence[_Name] | None = None,
         finite: bool = False,
-        order: Literal["xyzw", "wxyz"] = "xyzw",
+        order: _Order = "xyzw",
+        rotations: _Representation = "quaternion",
         out: MotionState | None = None,
     ) -> MotionState:
         """`count` states of each instance, from the time `starts` on, `fps` a second: arrays (…, count, joints, …) for
@@ -302,7 +648,13 @@ class MotionLibrary:
             raise InputError(f"count and fps: {count} and {fps}; give a number of states, and a rate greater than 0")
         ids, first = np.asarray(clip_ids)[..., None], np.asarray(starts, np.float64)[..., None]
         times = first + np.arange(count) / fps
-        return self.sample(ids, times, arrays=arrays, finite=finite, order=order, out=out)
+        keywords: dict[str, Any] = {"finite": finite, "order": order, "rotations": rotations}
+        if arrays is not None:
+            keywords["arrays"] = arrays
+        if out is not None:
+            keywords["out"] = out
+        found: MotionState = self.sample(ids, times, **keywords)
+        return found
 
     def draw(
         self, count: int, rng: np.random.Generator, *, weights: ArrayLike | None = None
@@ -328,30 +680,16 @@ class MotionLibrary:
 
     @property
     def nbytes(self) -> int:
-        """The bytes of the prepared clips: 48 a key of a joint with slerp, 192 with smooth methods."""
-        return sum(array.nbytes for array in self._motions.arrays().values())
+        """The bytes of the prepared clips: with slerp 16 a key of a joint and 16 to 48 a key of the root's position, or
+        8 a key of a joint if `packed`; 192 a key with smooth methods.
 
-    def _differences(
-        self, ids: NDArray[np.int64], times: NDArray[np.float64], out: MotionState
-    ) -> None:
-        rates, lengths = self.rates[ids], self.lengths[ids]
-        if np.isnan(rates).any():
-            name = self.names[int(ids[np.isnan(rates)][0])]
-            raise InputError(f"finite: the clip {name} has no rate")
-        first = np.floor(np.clip(times, 0.0, lengths) * rates + 1e-6)
-        last = np.maximum(np.round(lengths * rates) - 1, 0)
-        first = np.minimum(first, last)
-        names: list[_Name] = ["positions", "world_rotations"]
-        if out.velocities is None:
-            names.remove("positions")
-        before = self.sample(ids, first / rates, arrays=names)
-        after = self.sample(ids, (first + 1) / rates, arrays=names)
-        each = rates[:, None, None].astype(np.float32)
-        if out.velocities is not None:
-            assert before.positions is not None and after.positions is not None
-            out.velocities[...] = (after.positions - before.positions) * each
-        if out.angular_velocities is not None and after.world_rotations is not None:
-            out.angular_velocities[...] = each * _rotation_vectors(before.world_rotations, after.world_rotations)
+        >>> import numpy as np, tumble
+        >>> keys = np.tile([0.0, 0.0, 0.0, 1.0], (22, 3000, 1))
+        >>> long = tumble.Clip(np.arange(3000) / 30, keys, layout="track", parents=[None] + list(range(21)))
+        >>> [tumble.MotionLibrary([long], packed=packed).nbytes // (22 * 3000) for packed in (False, True)]
+        [16, 8]
+        """
+        return sum(array.nbytes for array in self._motions.arrays().values())
 
     def sample_times(self, clip_ids: ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
         """A time within each of these clips, uniformly, in seconds after its first key.
@@ -406,7 +744,7 @@ class MotionLibrary:
         cls, arrays: dict[str, Any], engine: Engine | None, file: str | None = None
     ) -> MotionLibrary:
         missing = [name for name in _STORED if name not in arrays]
-        if missing or int(arrays["version"]) != _VERSION:
+        if missing or int(arrays["version"]) not in range(1, _VERSION + 1):
             raise InputError(f"{file or 'arrays'}: not a motion library of this version of tumble")
         self = cls.__new__(cls)
         self.names = [str(name) for name in arrays["names"]]
@@ -417,6 +755,7 @@ class MotionLibrary:
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
+        self._only = np.asarray(arrays["only"]) if "only" in arrays else None
         return self
 
     def _arrays(self) -> dict[str, Any]:
@@ -429,11 +768,13 @@ class MotionLibrary:
             "joint_names": np.array(self.joint_names, dtype=np.str_),
             "unplaced": np.array(self._motions.unplaced, dtype=np.str_),
         }
+        if self._only is not None:
+            about["only"] = self._only
         return {**about, **self._motions.arrays()}
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine)
+            return _opened, (self._file, self._engine, self._only)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine)
 
     def __len__(self) -> int:
@@ -473,17 +814,34 @@ def _aligned(shape: tuple[int, ...]) -> NDArray[np.float32]:
     return memory[first : first + size].view(np.float32).reshape(shape)
 
 
-def _check_out(out: MotionState, shape: tuple[int, ...], joints: int) -> None:
+def _shapes_of(order: str, rotations: str) -> dict[str, tuple[int, ...]]:
+    """The shape of a joint's numbers in each array."""
+    if order not in ("xyzw", "wxyz"):
+        raise InputError(f"order: there is no `{order}`; there are xyzw, wxyz")
+    if rotations not in _SHAPES:
+        raise InputError(f"rotations: there is no `{rotations}`; there are {', '.join(_SHAPES)}")
+    if order == "wxyz" and rotations != "quaternion":
+        raise InputError(f'order="wxyz" is of quaternions; leave it out with rotations="{rotations}"')
+    return {name: _SHAPES[rotations] if name.endswith("rotations") else (3,) for name in _NAMES}
+
+
+def _check_out(
+    out: MotionState, shape: tuple[int, ...], joints: int, each: dict[str, tuple[int, ...]]
+) -> None:
     """Refuses arrays of another shape, type or order in memory than results have."""
     for name in _NAMES:
         array = getattr(out, name)
-        expected = (*shape, joints, _WIDTHS[name])
+        expected = (*shape, joints, *each[name])
         if array is None:
             continue
+        if not isinstance(array, np.ndarray):
+            raise InputError(f"out: its {name} are of the type {type(array).__name__}; give an array of NumPy")
         if array.dtype != np.float32 or array.shape != expected:
             raise InputError(f"out: its {name} are {array.dtype} {array.shape}; the result's are float32 {expected}")
         if not array.flags.c_contiguous:
             raise InputError(f"out: the numbers of its {name} do not lie one behind the other (C order)")
+        if not array.flags.writeable:
+            raise InputError(f"out: its {name} are read-only")
 
 
 def _flat(state: MotionState, axes: int) -> MotionState:
@@ -495,17 +853,59 @@ def _flat(state: MotionState, axes: int) -> MotionState:
     )
 
 
-def _opened(file: str, engine: Engine) -> MotionLibrary:
-    return MotionLibrary.open(file, engine=engine)
+def _opened(
+    file: str, engine: Engine, only: NDArray[np.int64] | None = None
+) -> MotionLibrary:
+    library = MotionLibrary.open(file, engine=engine)
+    if only is None or library._only is not None:
+        return library
+    library.names = [library.names[index] for index in only]
+    library.lengths, library.rates, library._only = library.lengths[only], library.rates[only], only
+    return library
+
+
+def _share(count: int, rank: int, processes: int) -> range:
+    """The indices that are the share of a process."""
+    if not 0 <= rank < processes:
+        raise InputError(f"shard: {rank} of {processes}; give a rank from 0 and below the number of processes")
+    return range(rank, count, processes)
+
+
+@contextmanager
+def _bar(progress: Any, total: int) -> Iterator[Callable[[int, int], object] | None]:
+    """What is called with the number of files that were read, and of all. A class is one of bars: an instance of it is
+    made, and closed at the end."""
+    if progress is None or not hasattr(progress, "update"):
+        yield progress
+        return
+    bar = progress(total=total) if isinstance(progress, type) else progress
+    if bar is progress and getattr(bar, "total", total) is None:
+        bar.total = total
+    last = 0
+
+    def step(done: int, _: int) -> None:
+        nonlocal last
+        bar.update(done - last)
+        last = done
+
+    try:
+        yield step
+    finally:
+        if bar is not progress:
+            bar.close()
 
 
 def _skeleton_of(
     skeleton: _Skeleton | None,
 ) -> Clip | tuple[Sequence[int | None], ArrayLike] | None:
     """A clip, or the parents and offsets of joints."""
-    if skeleton is None or isinstance(skeleton, Clip | tuple):
+    if skeleton is None or isinstance(skeleton, tuple):
         return skeleton
-    return load(skeleton)[0]
+    return _clip_of(skeleton)
+
+
+def _clip_of(skeleton: Clip | _Path) -> Clip:
+    return skeleton if isinstance(skeleton, Clip) else load(skeleton)[0]
 
 
 def _name(clip: Clip) -> str:
@@ -521,23 +921,6 @@ def _rate(clip: Clip) -> float:
     steps = np.diff(times)
     is_even = len(steps) > 0 and np.ptp(steps) <= 1e-6 * steps.mean()
     return float((len(times) - 1) / (times[-1] - times[0])) if is_even else float("nan")
-
-
-def _rotation_vectors(
-    before: NDArray[np.float32] | None, after: NDArray[np.float32] | None
-) -> NDArray[np.float64]:
-    """The rotation vectors, about the world's axes, from one rotation to the next."""
-    assert before is not None and after is not None
-    a, b = before.astype(np.float64), after.astype(np.float64)
-    axis = b[..., 3:] * -a[..., :3] + a[..., 3:] * b[..., :3] - np.cross(b[..., :3], a[..., :3])
-    cosine = (a * b).sum(axis=-1, keepdims=True)
-    axis = np.where(cosine < 0, -axis, axis)
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)
-    angle = 2 * np.arctan2(sine, np.abs(cosine))
-    vectors: NDArray[np.float64] = axis * np.where(
-        sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0
-    )
-    return vectors
 
 
 def _write(archive: zipfile.ZipFile, name: str, array: Any) -> None:

@@ -65,11 +65,13 @@ __all__ = [
     "positions_of_humanml3d",
     "reduce",
     "referred_files",
+    "represent",
     "retarget",
     "rotations_of_six",
     "run",
     "save",
     "set_probe",
+    "shaped",
     "six",
     "value_of_state",
     "walk",
@@ -1204,7 +1206,18 @@ def load_all(
     *,
     skip: bool = False,
     progress: Callable[[int, int], object] | None = None,
+    fps: float | str | Fraction | None = None,
+    tracks: Sequence[str] | Sequence[int] | None = None,
+    method: str = "slerp",
 ) -> tuple[list[File], list[tuple[str, str | None, str]]]: ...
+def shaped(
+    clip: Clip,
+    *,
+    fps: float | str | Fraction | None = None,
+    tracks: Sequence[str] | Sequence[int] | None = None,
+    method: str = "slerp",
+) -> Clip: ...
+def represent(rotations: _Single, kind: str, out: _Single) -> None: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
     path: _Path, clips: Sequence[Clip], refused: Sequence[str]
@@ -1218,7 +1231,9 @@ class Motions:
         skeleton: Clip | tuple[Sequence[int | None], ArrayLike] | None,
         method: str,
         skip: bool = False,
+        packed: bool = False,
     ) -> Motions: ...
+    def __len__(self) -> int: ...
     @staticmethod
     def of_arrays(arrays: dict[str, Any]) -> Motions: ...
     def arrays(self) -> dict[str, Any]: ...
@@ -1240,6 +1255,7 @@ class Motions:
         world_rotations: _Single | None,
         velocities: _Single | None,
         angular_velocities: _Single | None,
+        frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None: ...
 
 _Six: TypeAlias = Literal["six-columns", "six-rows", "six-interleaved"]
