@@ -17,7 +17,7 @@ use crate::robot::{self, Robot};
 /// exist is not checked. There are none for standard input, for what is not a regular file, and for a file that is
 /// invalid, which opening it reports.
 ///
-/// glTF refers to its buffers, the MJCF of a robot to the files that it includes, and a table of LeRobot's to the description
+/// glTF refers to its buffers, the MJCF of a robot to the files that it includes, and a table of `LeRobot` to the description
 /// of its data set. Of FBX, nothing outside the file is
 /// read, and images of glTF do not change motion. Files that options name (`source_times`, body models) are not listed.
 #[must_use]

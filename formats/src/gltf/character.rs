@@ -82,8 +82,10 @@ pub(super) fn replace_animations(
         let refuse = |(code, why): (Code, String)| {
             Diagnostic::new(output, code, format!("clip {}: {why}", index + 1))
         };
-        let mut animation = NewAnimation::default();
-        animation.name = clip.name.clone().map(|name| names.unique(name, index));
+        let mut animation = NewAnimation {
+            name: clip.name.clone().map(|name| names.unique(name, index)),
+            ..NewAnimation::default()
+        };
         for track in 0..clip.set.track_count() {
             let name = clip.set.track_name(track);
             let Some(&node) = named.get(&*name) else {

@@ -126,7 +126,7 @@ pub fn feature_arrays(
     };
     let points = |list: &[DVec3]| {
         list.iter()
-            .flat_map(|point| point.to_array())
+            .flat_map(DVec3::to_array)
             .collect::<Vec<f64>>()
     };
     let mut all = Vec::new();

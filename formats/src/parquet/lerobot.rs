@@ -1,4 +1,4 @@
-//! Data sets of robots by LeRobot: `data/chunk-000/….parquet`, and `meta/info.json` beside `data`, which names the numbers of
+//! Data sets of robots by `LeRobot`: `data/chunk-000/….parquet`, and `meta/info.json` beside `data`, which names the numbers of
 //! the lists in the columns `observation.state` and `action`.
 
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub(crate) const INFO: &str = "../../meta/info.json";
 /// What a data set says of itself.
 #[derive(Deserialize)]
 pub(super) struct Info {
-    /// That the file is of LeRobot.
+    /// That the file is of `LeRobot`.
     #[serde(rename = "codebase_version")]
     _version: String,
     features: Map<String, Value>,

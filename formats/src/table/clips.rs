@@ -235,7 +235,7 @@ impl TableClip<'_> {
                     continue;
                 }
                 for (&time, &(row, number)) in times.iter().zip(&numbers) {
-                    if !number.is_finite() && !(number.is_nan() && self.options.bridge_gaps) {
+                    if !(number.is_finite() || number.is_nan() && self.options.bridge_gaps) {
                         let message = format!("{number} is not a finite number of f32; repair it");
                         return Err(self.table.refuse_at(
                             cell.column,

@@ -139,7 +139,7 @@ impl ScalarColumn {
     }
 }
 
-/// The columns of robots' data sets by LeRobot that are scalars.
+/// The columns of robots' data sets by `LeRobot` that are scalars.
 const LEROBOT: [&str; 2] = ["observation.state", "action"];
 
 /// The columns of the numbers of a track's keys.
@@ -555,7 +555,7 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<MappedColumns, Diagn
     Ok(mapped)
 }
 
-/// The scalars that `--map` names, those of columns that are called so, and those of LeRobot's data sets.
+/// The scalars that `--map` names, those of columns that are called so, and those of data sets by `LeRobot`.
 fn scalar_columns(
     names: &mut ColumnNames<'_>,
     mapped: &MappedColumns,
