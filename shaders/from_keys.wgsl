@@ -44,7 +44,7 @@ var<immediate> rows: RowShape;
 @compute @workgroup_size(FROM_KEYS_WORKGROUP)
 fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let row = invocation.y * rows.each;
-    // What lies before the row wraps to a large number.
+    // An index before the row wraps to a large number.
     let sample_index = invocation.x - ((row * rows.samples) & rows.line);
     if sample_index >= rows.samples {
         return;

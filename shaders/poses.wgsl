@@ -5,7 +5,7 @@
 struct PoseDispatch {
     /// The number of values, each of which has an invocation.
     count: u32,
-    /// What else the kernel needs: the number of layers, or of tracks.
+    /// Another number that the kernel needs: that of the layers, or of the tracks.
     detail: u32,
 }
 

@@ -9,7 +9,7 @@ struct Probe {
     n: i32,
 }
 
-/// What the expressions gave.
+/// The results of the expressions.
 struct Reply {
     contraction: f32,
     reassociation: f32,

@@ -213,7 +213,7 @@ fn motion_set(seed: u64) -> TrackSet {
                     0 => random.between(0.2, 3.1),
                     _ => random.between(0.0, 0.07),
                 };
-                let sign = if track % 5 == 4 && random.next() % 8 == 0 {
+                let sign = if track % 5 == 4 && random.next().is_multiple_of(8) {
                     -1.0
                 } else {
                     1.0

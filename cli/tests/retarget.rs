@@ -465,6 +465,13 @@ fn lost_translations_are_said() {
     );
     fs::write(folder.join("take.bvh"), take).unwrap();
     fs::write(folder.join("bones.json"), r#"{"a": "a", "b": "b"}"#).unwrap();
-    let run = line(folder, "retarget take.bvh --onto take.bvh --bones bones.json -o out.bvh");
-    assert!(run.words.contains("W910") && run.words.contains("0.5000"), "{}", run.words);
+    let run = line(
+        folder,
+        "retarget take.bvh --onto take.bvh --bones bones.json -o out.bvh",
+    );
+    assert!(
+        run.words.contains("W910") && run.words.contains("0.5000"),
+        "{}",
+        run.words
+    );
 }

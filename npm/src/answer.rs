@@ -1,4 +1,4 @@
-//! What a call comes to: JSON and arrays of numbers, or why it was not done.
+//! The answer to a call: JSON and arrays of numbers, or why it was not done.
 
 use std::error::Error;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 #[cfg(feature = "files")]
 use tumble_formats::Diagnostic;
 
-/// What a call comes to.
+/// The answer to a call.
 #[derive(Default)]
 pub(crate) struct Answer {
     pub(crate) json: String,

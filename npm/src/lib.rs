@@ -21,7 +21,7 @@ use std::cell::RefCell;
 use crate::answer::Answer;
 use crate::calls::Calls;
 
-/// What lies between the two sides.
+/// The memory that JavaScript and the engine share: the input and the answer of a call.
 #[derive(Default)]
 struct Border {
     input: Vec<u8>,

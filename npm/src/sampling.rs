@@ -1,4 +1,4 @@
-//! What clips are at times: the samples that JavaScript asks for.
+//! The samples of clips that JavaScript asks for.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -36,7 +36,7 @@ pub(crate) struct SampleCall {
     options: BTreeMap<String, Option<String>>,
 }
 
-/// What is sampled.
+/// The quantity that is sampled.
 #[derive(Deserialize, Clone, Copy, PartialEq)]
 #[serde(rename_all = "kebab-case")]
 enum Sampled {
@@ -128,7 +128,7 @@ impl SampleCall {
 /// becomes of them, in both orders.
 const SAMPLE: f64 = 200.0;
 
-/// What a clip is at the times of a call.
+/// Samples a clip at the times of a call.
 pub(crate) fn sample(
     engine: &Engine,
     clip: &Motion,

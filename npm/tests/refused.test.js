@@ -1,4 +1,4 @@
-// What is wrong is refused in words, and the engine goes on.
+// Wrong arguments are refused in words, and the engine goes on.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";

@@ -1,4 +1,4 @@
-// What the tests share: the package, the program, and arrays that NumPy's files hold.
+// Code that the tests share: the package, the program, and the arrays of NumPy's files.
 
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";

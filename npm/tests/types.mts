@@ -1,4 +1,4 @@
-// What the types allow: compiled by scripts/npm.sh, not run.
+// Calls that the types allow: compiled by scripts/npm.sh, not run.
 
 import { load, sample, TumbleError, type Clip, type Pose } from "tumble";
 const engine = await load();

@@ -103,7 +103,7 @@ impl ListedClip<'_> {
     }
 }
 
-/// What the clip is called in messages: the path of its file, else its place in the list.
+/// The clip's name in messages: the path of its file, else its place in the list.
 impl fmt::Display for ListedClip<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.clip.source {
@@ -121,7 +121,7 @@ pub(crate) struct SharedSkeleton {
     file: Option<Arc<Source>>,
 }
 
-/// What the skeleton is called in messages.
+/// The name of the skeleton in messages.
 const SKELETON: &str = "the skeleton";
 
 impl SharedSkeleton {
@@ -413,7 +413,7 @@ impl Motions {
         })
     }
 
-    /// What `arrays` gave; `spans` and `cells` stay where they are.
+    /// The library with the arrays of `arrays`; `spans` and `cells` are not copied.
     #[staticmethod]
     fn of_arrays(arrays: &Bound<'_, PyDict>) -> PyResult<Self> {
         fn words<const N: usize>(

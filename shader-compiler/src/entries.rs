@@ -41,7 +41,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// What kernels call by one name and with one signature.
+/// A function that kernels call by one name and with one signature.
 #[derive(Default)]
 struct Called {
     /// Each text that it has, and where: the name of the file, and the kernels' indices.
@@ -258,7 +258,7 @@ fn globals(kernels: &[Source<'_>]) -> String {
          pub(crate) const GLOBALS: usize = {};\n\n\
          /// Variables of which each invocation has its own.\n\
          pub(crate) const PRIVATE: [Global; {}] = [{}];\n\n\
-         /// What kernels bind, in the order of the bindings.\n\
+         /// The variables that kernels bind, in the order of the bindings.\n\
          const BOUND: [&[Global]; {}] = [{}];\n\n\
          const fn entry(bound: usize, pushed: Option<Global>, workgroup: u32, texels: Option<usize>) -> Entry {{\n\
          Entry {{ bound: BOUND[bound], pushed, workgroup, texels }}\n}}\n\n\

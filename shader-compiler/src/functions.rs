@@ -78,7 +78,7 @@ const CHOOSING: [&str; 1] = ["small_angle_cubic"];
 /// Why a function cannot be written in a form.
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
-/// What numbers a function takes.
+/// The types of numbers that a function takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Numbers {
     /// Any `N: Number`.
@@ -96,7 +96,7 @@ enum Vectors {
     Apart,
 }
 
-/// What a function is written for.
+/// The numbers and vectors for which a function is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Shape {
     numbers: Numbers,

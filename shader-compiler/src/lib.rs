@@ -3,7 +3,7 @@
 //! shader is an error. Rust gets the constants and structs that the shaders declare, and their arithmetic, so that
 //! none is written twice.
 //!
-//! What it makes is checked in, in `shaders/compiled/`: who builds the engine needs no naga, and gets
+//! Its output is checked in, in `shaders/compiled/`: builds of the engine need no naga, and have
 //! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
 
 mod entries;
@@ -60,7 +60,7 @@ pub fn write() {
 /// The files that are checked in: their paths from the engine's root, and what belongs into them.
 type Files = Vec<(&'static str, Vec<u8>)>;
 
-/// What the shaders compile to.
+/// Compiles the shaders.
 fn compile() -> Files {
     let mut declared = Declared::default();
     let (mut compiled, mut code) = (Vec::new(), Vec::new());

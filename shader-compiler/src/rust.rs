@@ -1,4 +1,4 @@
-//! What Rust gets of the shaders: their constants, the structs that buffers hold, and the
+//! The shaders' declarations in Rust: their constants, the structs that buffers hold, and the
 //! kernels by name.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -246,7 +246,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
             ("List", LISTS.map(|list| list.0).to_vec()),
         ),
         (
-            "What a kernel stores a rotation as.",
+            "The representation in which a kernel stores rotations.",
             ("Store", stores().iter().map(|store| store.name).collect()),
         ),
     ] {

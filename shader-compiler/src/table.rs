@@ -140,7 +140,7 @@ fn folder_for_cards(list: &str) -> Option<&'static str> {
         .find(|folder| list.ends_with(&format!("_{folder}")))
 }
 
-/// What a rotation is stored as.
+/// A representation in which rotations are stored.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Store {
     /// The name of a file of `shaders/stores` that has a function `store`.
@@ -225,7 +225,7 @@ const PREPARE_ARCS: [&str; 5] = [
     "prepare_arcs",
 ];
 
-/// What it reads. Keys are the constants of a clip.
+/// The buffers that it reads. Keys are the constants of a clip.
 static INTERVALS: [Read; 2] = [
     read("keys", "vec4u", "key_at"),
     read("intervals", "u32", "interval_at"),
@@ -241,7 +241,7 @@ const POSES: [&str; 6] = [
     "poses/world",
 ];
 
-/// What evaluates the channels of a crowd's joints.
+/// The files that evaluate the channels of a crowd's joints.
 const CHANNELS: [&str; 9] = [
     "math/canonical",
     "math/sine_cosine",
@@ -264,7 +264,7 @@ const PLAIN_CHANNELS: [&str; 6] = [
     "crowd/plain",
 ];
 
-/// What they read. Cells are constants of segments, keys, masks and reference poses.
+/// The buffers that they read. Cells are constants of segments, keys, masks and reference poses.
 static CROWD_READS: [Read; 4] = [
     read("entries", "CrowdEntry", "entry_at"),
     read("channels", "CrowdChannel", "channel_at"),
@@ -294,7 +294,7 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
     ),
 ];
 
-/// What comes with the dispatches of most kernels over a crowd.
+/// The files with the arguments of the dispatches of most kernels over a crowd.
 const CROWD_ARGUMENTS: [&str; 2] = ["crowd/workgroup", "crowd/dispatch"];
 
 /// Other kernels over a crowd.
@@ -350,7 +350,7 @@ const CROWD: [(&str, &[&str]); 7] = [
     ),
 ];
 
-/// What the kernels over whole instances share: they find positions, and store in either precision.
+/// The files that kernels over whole instances share: they find positions, and store in either precision.
 const WHOLE: [&str; 7] = [
     "crowd/workgroup",
     "lists/frame_distance",

@@ -80,7 +80,7 @@ fn a_struct_of_two_layouts_is_an_error() {
     }
 }
 
-/// What a function is written as, in a kernel that has only it.
+/// The text of a function in a kernel that has only it.
 fn function(name: &str, source: &str) -> String {
     let mut functions = Functions::new(BTreeSet::new());
     add(&mut functions, source);
@@ -140,7 +140,7 @@ fn functions_are_written_for_as_many_numbers_as_their_operations_allow() {
     }
 }
 
-/// What is computed before the cut is not computed behind it.
+/// Values that are computed before the cut are not computed again behind it.
 #[test]
 fn functions_with_a_cut_are_written_in_two_parts() {
     let source = "fn polynomial(c: array<vec4f, 11>, s: f32) -> vec4f {

@@ -115,7 +115,7 @@ pub(crate) const GLOBALS: usize = 48;
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
-/// What kernels bind, in the order of the bindings.
+/// The variables that kernels bind, in the order of the bindings.
 const BOUND: [&[Global]; 24] = [
     &[Global::Probes, Global::Replies],
     &[
@@ -5339,7 +5339,7 @@ pub(crate) fn sample_count<M: Machine>(machine: &M, item: SpreadRun<M::F>) -> u3
     item.count & 0x3fffffffu32
 }
 
-/// What any run has at its `j`th sample.
+/// The value of any run at its `j`th sample.
 pub(crate) fn sample_of_arc_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
@@ -5368,7 +5368,7 @@ pub(crate) fn sample_of_arc_segment<M: Machine>(
     rotation
 }
 
-/// What any run has at its `j`th sample.
+/// The value of any run at its `j`th sample.
 pub(crate) fn sample_of_polynomial_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,

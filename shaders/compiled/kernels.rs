@@ -426,7 +426,7 @@ pub(crate) struct Dispatch {
     pub(crate) item_count: u32,
 /// Distance in the result between neighbouring samples of a track, in rotations.
     pub(crate) stride: u32,
-/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+/// The option of the store: the order of a matrix, the axes of angles.
     pub(crate) detail: u32,
 /// Where the first listed sample is stored; the others follow. For items, what is added to their
 /// `output`.
@@ -447,7 +447,7 @@ const _: () = {
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Grid {
-/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+/// The option of the store: the order of a matrix, the axes of angles.
     pub(crate) detail: u32,
 /// Distance in the result between neighbouring samples of a track, in rotations.
     pub(crate) stride: u32,
@@ -555,7 +555,7 @@ const _: () = {
 pub(crate) struct PoseDispatch {
 /// The number of values, each of which has an invocation.
     pub(crate) count: u32,
-/// What else the kernel needs: the number of layers, or of tracks.
+/// Another number that the kernel needs: that of the layers, or of the tracks.
     pub(crate) detail: u32,
 }
 const _: () = {
@@ -578,7 +578,7 @@ const _: () = {
     assert!(std::mem::offset_of!(Probe, c) == 8);
     assert!(std::mem::offset_of!(Probe, n) == 12);
 };
-/// What the expressions gave.
+/// The results of the expressions.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Reply {
@@ -635,13 +635,13 @@ const _: () = {
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Spread {
-/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+/// The option of the store: the order of a matrix, the axes of angles.
     pub(crate) detail: u32,
 /// The first run of this dispatch.
     pub(crate) first_item: u32,
 /// How many runs it evaluates.
     pub(crate) item_count: u32,
-/// What is added to their `output`.
+/// The number that is added to their `output`.
     pub(crate) first_output: u32,
 /// The invocations of a run, as a power of two.
     pub(crate) lanes_log2: u32,
@@ -873,7 +873,7 @@ pub(crate) enum List {
     FramesSpread,
     TimesSpread,
 }
-/// What a kernel stores a rotation as.
+/// The representation in which a kernel stores rotations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Store {
     AxisAngle,

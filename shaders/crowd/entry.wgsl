@@ -1,7 +1,7 @@
-// What the kernels over a crowd share: the entries of layers, and where in a clip each stands.
+// Structs that the kernels over a crowd share: the entries of layers, and where in a clip each stands.
 // Twin: src/twin/crowd_times.rs.
 
-/// What one layer of an instance plays, and since when: all that the host writes when it changes.
+/// The clip that one layer of an instance plays, and since when: all that the host writes when it changes.
 struct CrowdEntry {
     /// The clip, 16 bits, and above it the weight in units of 2^-15; 0 leaves the layer out.
     clip_and_weight: u32,

@@ -1,4 +1,4 @@
-// What the kernel that finds positions reads, and where it leaves them.
+// The buffers that the kernel of positions reads, and those into which it writes the positions.
 
 @group(0) @binding(0) var<storage, read> entries: array<CrowdEntry>;
 @group(0) @binding(1) var<storage, read> clips: array<CrowdClip>;

@@ -1,4 +1,4 @@
-// What a clip says of time: how long it is, and the spans of its time bases.
+// The times of a clip: its length, and the spans of its time bases.
 
 /// A clip as `crowd_work` reads it.
 struct CrowdClip {

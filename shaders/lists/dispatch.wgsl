@@ -8,7 +8,7 @@ struct Dispatch {
     item_count: u32,
     /// Distance in the result between neighbouring samples of a track, in rotations.
     stride: u32,
-    /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    /// The option of the store: the order of a matrix, the axes of angles.
     detail: u32,
     /// Where the first listed sample is stored; the others follow. For items, what is added to their
     /// `output`.

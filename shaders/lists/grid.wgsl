@@ -4,7 +4,7 @@
 /// The arguments of one dispatch over a grid of samples, frame by frame: each track is a row, and a
 /// position is a sample's number.
 struct Grid {
-    /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    /// The option of the store: the order of a matrix, the axes of angles.
     detail: u32,
     /// Distance in the result between neighbouring samples of a track, in rotations.
     stride: u32,
@@ -80,7 +80,7 @@ fn cell_of(corner: Corner, iteration: u32) -> Cell {
     let sample = corner.first + iteration;
     let row = sample * dispatch.stride + dispatch.first_output;
     let output = (row & ~(LINE - 1u)) + corner.column;
-    // What lies before the row wraps to a large number.
+    // A position before the row wraps to a large number.
     let track = output - row;
     let is_inside = (sample < dispatch.samples) & (track < dispatch.rows);
     return Cell(output, track, sample, corner.block + track, is_inside);

@@ -2,13 +2,13 @@
 
 /// The arguments of one dispatch over spread runs.
 struct Spread {
-    /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    /// The option of the store: the order of a matrix, the axes of angles.
     detail: u32,
     /// The first run of this dispatch.
     first_item: u32,
     /// How many runs it evaluates.
     item_count: u32,
-    /// What is added to their `output`.
+    /// The number that is added to their `output`.
     first_output: u32,
     /// The invocations of a run, as a power of two.
     lanes_log2: u32,
@@ -73,7 +73,7 @@ fn sample_count(item: SpreadRun) -> u32 {
     return item.count & ~(IS_CONSTANT | NEEDS_CARE);
 }
 
-// What any run has at its `j`th sample.
+// The value of any run at its `j`th sample.
 fn sample_of(item: SpreadRun, segment: Segment, j: u32, repetition: u32) -> vec4f {
     if ((item.count & IS_CONSTANT) != 0u) | ((j == 0u) & (item.key != NO_KEY)) {
         let index = select(item.key, item.source, (item.count & IS_CONSTANT) != 0u);

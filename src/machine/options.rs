@@ -114,8 +114,8 @@ pub struct EngineOptions {
     /// set. By default there is none. Larger sets are prepared piece by piece.
     pub memory: Option<u64>,
     /// The segments, bytes, that a clip of the CPU keeps although its samples can be computed from its keys, which take an
-    /// eighth of the memory or less; by default 1 MiB. With few samples at once, and more than eight for a key, segments
-    /// are faster; from memory rather than the caches they are not.
+    /// eighth of the memory or less. By default there is no limit but `memory`, because segments are faster in bulk: a
+    /// program with many clips in memory gives one, such as 1 MiB.
     pub kept_segments: Option<u64>,
     /// The number of worker threads of the CPU. By default all engines of the process share a pool of as many threads
     /// as the environment variable `RAYON_NUM_THREADS` says, or one for each core.

@@ -65,7 +65,7 @@ export class Set {
     this.results = new Map();
     // Clips of other inputs that are shown with it.
     this.ghosts = [];
-    // What its keys are evaluated by, where the page can; frames a second, where not those that were written.
+    // The engine's clip, if the page can evaluate the keys; the frames a second, if not those that were written.
     this.live = null;
     this.rate = null;
   }

@@ -1,4 +1,4 @@
-// What is shown, and what people do to it.
+// The state of the page, and the handlers of its controls.
 
 import { Set as Input, decimals, mesh, placeInWords, rotation, skin } from "./data.js";
 import { Ghost } from "./ghosts.js";

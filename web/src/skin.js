@@ -1,4 +1,4 @@
-// What joints carry: triangles that follow them, drawn by three.js around the bones.
+// Meshes that follow the joints, drawn by three.js around the bones.
 
 import {
   Bone, BufferAttribute, BufferGeometry, DoubleSide, Matrix4, MeshLambertMaterial, Quaternion, Skeleton, SkinnedMesh,

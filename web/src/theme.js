@@ -5,7 +5,7 @@ export function colours(methods) {
   const style = getComputedStyle(document.documentElement);
   const probe = document.createElement("i");
   document.body.append(probe);
-  // What light-dark() comes to.
+  // The colour that light-dark() chooses.
   const value = (name) => {
     probe.style.color = style.getPropertyValue(`--${name}`);
     return getComputedStyle(probe).color;

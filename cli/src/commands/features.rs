@@ -112,7 +112,7 @@ struct FeatureReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.contact_window % 2 == 0 {
+    if arguments.contact_window.is_multiple_of(2) {
         let message =
             "--contact-window: give an odd number of frames, so that each is in their middle";
         return Err(Failure::usage(message));

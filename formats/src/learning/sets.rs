@@ -124,11 +124,7 @@ pub fn feature_arrays(
         is_whole: true,
         ..array
     };
-    let points = |list: &[DVec3]| {
-        list.iter()
-            .flat_map(DVec3::to_array)
-            .collect::<Vec<f64>>()
-    };
+    let points = |list: &[DVec3]| list.iter().flat_map(DVec3::to_array).collect::<Vec<f64>>();
     let mut all = Vec::new();
     for set in &request.sets {
         match set {

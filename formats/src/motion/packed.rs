@@ -27,7 +27,7 @@ pub enum PackedError {
     Short {
         /// The track.
         track: usize,
-        /// What is missing.
+        /// The missing part of the track.
         missing: &'static str,
     },
     /// There are more numbers than the header says.
@@ -121,7 +121,7 @@ pub fn to_bytes(clip: &Motion) -> Vec<u8> {
     bytes
 }
 
-/// What is written of a track.
+/// The parts of a track that are written.
 struct PackedTrack<'a> {
     track: Track<'a>,
     shares_times: bool,

@@ -381,7 +381,7 @@ impl Samples {
     }
 }
 
-/// What most of the rotations are keyed for.
+/// The method for which most of the rotations are keyed.
 fn most_common_method(clip: &Motion) -> Method {
     let count = |sampler| {
         let keyed = clip

@@ -22,7 +22,7 @@ pub enum HierarchyError {
     /// The file says something that rotations, translations and scales cannot.
     #[error("{reason}")]
     Refused {
-        /// What it is.
+        /// The reason, as a sentence.
         reason: String,
     },
     /// A joint is its own ancestor.
@@ -65,7 +65,7 @@ pub fn world_matrices(clip: &Motion, samples: &Samples) -> Result<Vec<DAffine3>,
     })
 }
 
-/// What is made of the transforms of all joints at all samples, `[sample][joint]`.
+/// The results of `make` for the transforms of all joints at all samples, `[sample][joint]`.
 fn along_hierarchy<T>(
     clip: &Motion,
     samples: &Samples,

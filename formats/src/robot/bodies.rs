@@ -17,7 +17,7 @@ use crate::motion::Motion;
 use crate::motion::signs::continue_signs;
 use crate::npz::rotation_vector;
 
-/// What is computed of a robot's motion.
+/// The options of computing a robot's bodies from its motion.
 #[derive(Debug, Clone)]
 pub struct BodiesRequest {
     /// The samples.
@@ -34,7 +34,7 @@ pub struct BodiesRequest {
     pub velocity_at: VelocityPoint,
     /// How velocities follow from the curves.
     pub velocities: VelocitySource,
-    /// What is done with values outside the limits of joints.
+    /// How values outside the limits of joints are treated.
     pub limits: LimitRule,
     /// The vector to add to the translations of each track; empty if all are 0.
     pub origins: Vec<DVec3>,
@@ -56,7 +56,7 @@ names! {
     Differences => "differences",
 }
 
-/// What is done with values outside the limits of joints.
+/// How values outside the limits of joints are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum LimitRule {
     /// They are reported, and kept.
@@ -140,7 +140,7 @@ pub enum BodiesError {
         if known.is_empty() { "none".to_owned() } else { known.join(", ") }
     )]
     NotAJoint {
-        /// What was looked for.
+        /// The kind of the joint that was expected.
         kind: &'static str,
         /// Its name.
         name: String,

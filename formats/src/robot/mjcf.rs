@@ -89,7 +89,7 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
 impl<'a> Reader<'a> {
     fn new(documents: &'a Documents<'a>) -> Result<Self, Diagnostic> {
         let root = documents.root();
-        // Of several elements, later attributes count.
+        // If there are several elements, later attributes replace earlier ones.
         let mut options: Attributes<'a> = HashMap::new();
         for compiler in documents.tagged(root, "compiler") {
             options.extend(

@@ -28,9 +28,6 @@ use crate::time::frames::Timeline;
 /// among all threads.
 pub(crate) const TASK: usize = 16 * 1024;
 
-/// Half of the caches of a core or more: segments beyond it come from memory for every pose.
-const KEPT_SEGMENTS: usize = 1 << 20;
-
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
@@ -63,7 +60,7 @@ impl CpuEngine {
             streaming_stores,
             private_threads,
             memory: memory.map(size),
-            kept_segments: kept_segments.map_or(KEPT_SEGMENTS, size),
+            kept_segments: kept_segments.map_or(usize::MAX, size),
             ..Self::on_shared_threads(width)
         })
     }
@@ -76,7 +73,7 @@ impl CpuEngine {
             private_threads: None,
             scratch_pool: ScratchPool::default(),
             memory: None,
-            kept_segments: KEPT_SEGMENTS,
+            kept_segments: usize::MAX,
         }
     }
 

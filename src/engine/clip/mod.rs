@@ -86,8 +86,8 @@ impl Clip {
 
     /// The memory that the clip takes on the host for each key, bytes; 0 for no keys.
     ///
-    /// On the CPU, a clip of more than [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) keeps its keys
-    /// (16 bytes each, with their times once for tracks that share them) where samples can be computed from these: arcs,
+    /// On the CPU, a clip of more segments than [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments), or than
+    /// the engine's memory, keeps its keys (16 bytes each, with their times once for tracks that share them) where samples can be computed from these: arcs,
     /// and cubics that mostly rotate little between keys, with segments for the others. Other clips keep a segment for
     /// each key (68 bytes of an arc, 212 of a polynomial).
     #[must_use]

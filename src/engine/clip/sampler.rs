@@ -66,7 +66,7 @@ pub struct Sampler {
     cursors: Vec<Cursor>,
 }
 
-/// What the clones of a sampler share.
+/// The data of a sampler that its clones share.
 struct SampledClip {
     groups: Vec<SampledGroup>,
     parts: Vec<SampledPart>,

@@ -1,4 +1,4 @@
-//! What the lab compares and measures, on a device.
+//! The comparisons and measurements of the lab, on a device.
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -25,7 +25,7 @@ pub struct LabOptions {
     pub budget: Duration,
 }
 
-/// What was compared and measured.
+/// The comparisons and measurements of a lab.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LabReport {
     /// The number of variants that were compared with the twins of their kernels.
@@ -42,7 +42,7 @@ pub struct LabReport {
     pub ceilings: Vec<Ceiling>,
     /// Each kernel over runs of each length.
     pub rows: Vec<LabRow>,
-    /// What follows from the times.
+    /// The decisions that follow from the times.
     pub decisions: Vec<Decision>,
     /// The lanes of runs of each class that follow; `None` if nothing was timed.
     pub run_lanes: Option<RunLanes>,
@@ -115,7 +115,7 @@ pub struct Decision {
     pub microseconds: Vec<f64>,
     /// Whether it applies.
     pub applies: bool,
-    /// What follows.
+    /// The decision, in words.
     pub result: String,
 }
 

@@ -52,7 +52,7 @@ pub struct KernelVariant {
 }
 
 impl KernelVariant {
-    /// What distinguishes pipelines: all but the lanes and the list, which come with a dispatch.
+    /// The variant of the pipeline: without the lanes and the list, which come with a dispatch.
     pub(super) fn code(self) -> Self {
         Self {
             lanes: 0,

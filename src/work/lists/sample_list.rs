@@ -151,7 +151,7 @@ impl<'a> SampleList<'a> {
                 chunk.result.map(|()| chunk.patches)
             })
             .collect();
-        // Of several errors the first counts.
+        // If several chunks fail, the error of the first is returned.
         let patches = chunks.into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(Work {
             list: List::Samples,

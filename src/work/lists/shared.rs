@@ -354,7 +354,7 @@ mod tests {
         ClipData::new(set, interpolation, request).unwrap()
     }
 
-    /// What gives a sample: a constant; or a segment, the distance from its middle, scale and offset.
+    /// The source of a sample: a constant; or a segment, the distance from its middle, scale and offset.
     type Source = (bool, u32, i32, [u32; 2]);
 
     /// The source of every sample, and whether it needs care.

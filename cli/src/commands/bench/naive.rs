@@ -1,4 +1,4 @@
-//! What a user would write today: glam, f32, a cursor for each track, rayon over
+//! The loop that a user would write today: glam, f32, a cursor for each track, rayon over
 //! tracks. The measure that ratios are taken against.
 
 use glam::{Quat, Vec3};

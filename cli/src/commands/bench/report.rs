@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The measurements, as a table and as JSON.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -225,7 +225,7 @@ impl Section {
     }
 }
 
-/// What Linux says of this process; unknown elsewhere.
+/// The most memory that this process has had, bytes; `None` on other systems than Linux.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mut lines = status.lines();

@@ -14,7 +14,7 @@ use crate::messages::exit::{Failure, OUTPUT};
 /// Rotations of a chunk: 16 MB.
 const CHUNK: usize = 1 << 20;
 
-/// What a stream can end with.
+/// The errors that can end a stream.
 #[derive(Debug)]
 enum StreamError {
     Writing(std::io::Error),

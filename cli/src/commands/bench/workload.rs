@@ -1,4 +1,4 @@
-//! What is measured: sets of keys and the samples asked of them, the same in every
+//! The workloads that are measured: sets of keys and their sample times, the same in every
 //! run.
 
 use fastrand::Rng;

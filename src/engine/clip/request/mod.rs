@@ -115,7 +115,7 @@ impl RequestSource<'_> {
         }
     }
 
-    /// What is evaluated for a part of the result.
+    /// The work that evaluates a part of the result.
     fn work<'r>(&'r self, part: &'r RequestPart) -> Result<RequestWork<'r>, Error> {
         let (engine, set, interpolation) = match self {
             Self::Clip(clip) => match &clip.tracks {
@@ -148,7 +148,7 @@ impl RequestSource<'_> {
     }
 }
 
-/// What a request evaluates.
+/// The clip or the set that a request evaluates.
 #[allow(clippy::large_enum_variant)] // it lives on the stack of one call
 enum RequestWork<'r> {
     /// A clip whose segments are prepared.
