@@ -75,7 +75,7 @@
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-// What only is faster is not called there (build/main.rs).
+// Code that is only faster is not called there (build/main.rs).
 #![cfg_attr(smallest, allow(dead_code, unused_imports))]
 
 mod checks;

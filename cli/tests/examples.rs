@@ -144,6 +144,8 @@ fn write_inputs(folder: &Path) {
         generate(&format!("convert walk.bvh -o {name}"));
     }
     generate("reduce walk.bvh --tolerance 0.1deg -o reduced.glb");
+    generate("convert walk.bvh -o character.glb");
+    write("bones.json", br#"{"Hips": "Hips", "LeftLeg": "LeftLeg"}"#);
     for name in ["one.npy", "other.npy"] {
         generate(&format!("eval a.dat -o {name}"));
     }

@@ -47,7 +47,7 @@ fn points(value: &Value) -> Vec<DVec3> {
 }
 
 /// Writes a clip of joints as GLB: their rest poses, and for each sample a rotation of each and a position of the first.
-fn write(path: &Path, skeleton: &Value, rest: &[(DQuat, DVec3)], keys: &[DQuat], way: &[DVec3]) {
+fn write(path: &Path, skeleton: &Value, rest: &[(DQuat, DVec3)], keys: &[DQuat], hips: &[DVec3]) {
     let mut clip = Motion::default();
     let joints = skeleton["names"].as_array().unwrap();
     let samples = keys.len() / joints.len();
@@ -68,13 +68,13 @@ fn write(path: &Path, skeleton: &Value, rest: &[(DQuat, DVec3)], keys: &[DQuat],
             },
         });
     }
-    if !way.is_empty() {
-        clip.set_positions(0, &times, way).unwrap();
+    if !hips.is_empty() {
+        clip.set_positions(0, &times, hips).unwrap();
     }
     let rotations: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
     let translations: Vec<Vec3> = (0..samples)
         .flat_map(|sample| {
-            let moved = way.get(sample).map_or(rest[0].1, |at| *at).as_vec3();
+            let moved = hips.get(sample).map_or(rest[0].1, |at| *at).as_vec3();
             std::iter::once(moved)
                 .chain(rest[1..].iter().map(|rest| rest.1.as_vec3()))
                 .collect::<Vec<_>>()
@@ -115,13 +115,13 @@ fn rotations_are_those_of_the_formulas() {
         .into_iter()
         .zip(points(&source["offsets"]))
         .collect();
-    let way = points(&source["root"]);
+    let hips = points(&source["root"]);
     write(
         &folder.join("take.glb"),
         source,
         &rest,
         &rotations(&source["local_wxyz"]),
-        &way,
+        &hips,
     );
     let rest_rotations = rotations(&target["rest_local_wxyz"]);
     let rest: Vec<_> = rest_rotations
@@ -164,7 +164,7 @@ fn rotations_are_those_of_the_formulas() {
             }
         }
         // Times are those of the source, and none is added or lost.
-        assert_eq!(clip.set.track(0).times.len(), way.len());
+        assert_eq!(clip.set.track(0).times.len(), hips.len());
         let root = clip.set.vector_keys(Channel::Translation, 0).unwrap();
         for (key, expected) in root.keys.iter().zip(points(&expected["root"])) {
             assert!((key.as_dvec3() - expected).length() < 1e-6, "{name}");
@@ -174,7 +174,7 @@ fn rotations_are_those_of_the_formulas() {
         assert_eq!(report[0]["dropped"], serde_json::json!(["Spine2"]));
         assert_eq!(report[0]["pairs"]["head"], "Head");
         assert!(report[0]["largest_difference"].as_f64().unwrap() < 2e-6);
-        assert_eq!(report[0]["frames"], way.len());
+        assert_eq!(report[0]["frames"], hips.len());
         assert_eq!(
             report[0]["aligned"].as_object().unwrap().is_empty(),
             rest == "same"

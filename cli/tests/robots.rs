@@ -390,8 +390,8 @@ fn limits_hold_in_every_result() {
     let eval = "eval take.csv --fps 60 -m slerp --robot robot.xml";
     for (result, of) in [
         ("clip.npz", ""),
-        ("joints.npy", "--output scalars"),
-        ("rates.npy", "--output scalar-velocities"),
+        ("joints.npy", "--quantity scalars"),
+        ("rates.npy", "--quantity scalar-velocities"),
     ] {
         let reported = line(folder, &format!("{eval} {of} -o report_{result}"));
         assert!(
@@ -582,6 +582,12 @@ fn scalars_are_evaluated_alone() {
         "eval take.csv --fps 10 --quantity scalar-accelerations -o a.csv",
     );
     assert!(run.words.contains("4 scalars"), "{}", run.words);
+    assert!(
+        run.words
+            .contains("left out: the rotations, the translations"),
+        "{}",
+        run.words
+    );
     fs::write(folder.join("a.tum"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").unwrap();
     for words in [
         "eval a.tum --quantity scalars --fps 30 -o x.npy",
@@ -594,6 +600,26 @@ fn scalars_are_evaluated_alone() {
         assert_ne!(run.code, 0, "{words}: {}", run.words);
     }
     assert!(!folder.join("x.npy").exists());
+}
+
+/// Joints stay within the tolerance at all samples, as the file is read again.
+#[test]
+fn reduced_joints_stay_within_the_tolerance() {
+    let folder = folder();
+    let folder = folder.path();
+    let scalars = |file: &str| {
+        let eval = format!("eval {file} --fps 30 --quantity scalars --overwrite -o s.npy");
+        line(folder, &eval);
+        let bytes = fs::read(folder.join("s.npy")).unwrap();
+        let found = tumble_formats::npy::read_numbers(file, &bytes, |_| Ok(()));
+        found.unwrap().values
+    };
+    let reduce = "reduce take.csv --robot robot.xml --tolerance 4deg --distance 10 -o few.npz";
+    let run = line(folder, reduce);
+    assert!(run.words.contains(" times fewer"), "{}", run.words);
+    let error = largest_difference(&scalars("few.npz"), &scalars("take.csv"));
+    let bound = 4f64.to_radians();
+    assert!(error > 0.1 * bound && error <= bound * 1.0001, "{error}");
 }
 
 /// Batches in the layout of another program are resumed, and made again where the robot is another.

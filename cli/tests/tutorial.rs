@@ -26,9 +26,7 @@ fn without_durations(text: &str) -> String {
 
 /// Copies the files of a clone that the pages use.
 fn copy_data(folder: &Path) {
-    for name in ["data", "examples"] {
-        fs::create_dir(folder.join(name)).unwrap();
-    }
+    fs::create_dir(folder.join("data")).unwrap();
     let files = fs::read_dir(root().join("data")).unwrap();
     let mut files: Vec<_> = files.map(|entry| entry.unwrap().file_name()).collect();
     files.sort();
@@ -36,8 +34,6 @@ fn copy_data(folder: &Path) {
         let file = Path::new("data").join(name);
         fs::copy(root().join(&file), folder.join(&file)).unwrap();
     }
-    let robot = "examples/arm.xml";
-    fs::copy(root().join(robot), folder.join(robot)).unwrap();
 }
 
 /// Runs the commands of a page, of which there are at least so many.

@@ -238,7 +238,12 @@ mod tests {
             ("x.vrma", b"\0\0\0\0", "VRM", "export it again"),
             ("x.gif", b"GIF89a\xc9\0", "a picture", "no keyframes"),
             ("x.mp4", b"\0\0\0\x20ftypisom", "a film", "estimate poses"),
-            ("README.md", b"# Tumble\n", "a document", "no keyframes"),
+            (
+                "guide.html",
+                b"<!DOCTYPE html>\n",
+                "a document",
+                "no keyframes",
+            ),
         ] {
             let options = crate::ReadOptions::default();
             let read = crate::Format::read_detected(name, bytes.to_vec(), &options);

@@ -142,7 +142,7 @@ fn what_bvh_cannot_hold_is_refused() {
     assert!(two.contains("2 clips"), "{two}");
     let mut bad = good.clone();
     bad.rate = None;
-    assert!(refusal(&[bad], &options).contains("one rate"));
+    assert!(refusal(&[bad], &options).contains("constant rate"));
     let mut bad = good.clone();
     bad.times = &[0.0, 0.1];
     assert!(refusal(&[bad], &options).contains("0.1 s is not on the next frame"));

@@ -190,7 +190,7 @@ fn positions(clip: &Motion, track: usize) -> Vec<f32> {
     keys.unwrap()
         .keys
         .iter()
-        .flat_map(|key| key.to_array())
+        .flat_map(tumble::glam::Vec3::to_array)
         .collect()
 }
 
@@ -261,7 +261,7 @@ fn files_of_people_hold_the_stored_numbers() {
     assert_eq!((clip.set.track_count(), clip.set.scalar_count()), (17, 4));
     assert_eq!(clip.scalar(0).kind, ScalarKind::Contact);
     // z up, x forward, became y up, z forward.
-    let turn = tumble::glam::DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
+    let to_y_up = tumble::glam::DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
     for body in 0..17 {
         let found = positions(clip, body);
         for frame in 0..31 {
@@ -269,7 +269,7 @@ fn files_of_people_hold_the_stored_numbers() {
             assert_eq!(found[3 * frame..][..3], [y, z, x], "{body} {frame}");
             let [w, x, y, z] = [0, 1, 2, 3].map(|i| rotations[(frame * 17 + body) * 4 + i]);
             let rotation = tumble::glam::DQuat::from_xyzw(x, y, z, w);
-            let expected = turn * rotation * turn.inverse();
+            let expected = to_y_up * rotation * to_y_up.inverse();
             let key = clip.set.track(body).keys[frame].as_dquat().normalize();
             assert!(
                 key.dot(expected).abs() > 1.0 - 1e-12,
@@ -279,7 +279,7 @@ fn files_of_people_hold_the_stored_numbers() {
     }
 }
 
-/// Robots in JSON and in the tables of LeRobot, and libraries of clips.
+/// Robots in JSON and in the tables of `LeRobot`, and libraries of clips.
 #[test]
 fn files_of_joints_hold_the_stored_numbers() {
     if layouts().is_none() {

@@ -88,7 +88,7 @@ fn our_npz_keeps_scalars_with_names_kinds_and_limits() {
     assert_eq!(again.set, clip.set);
     let kinds = |clip: &Motion| {
         let all = clip.scalars.iter();
-        all.map(|scalar| (scalar.kind, scalar.limits))
+        all.map(|scalar| (scalar.kind, scalar.limits, scalar.interpolation))
             .collect::<Vec<_>>()
     };
     assert_eq!(kinds(again), kinds(&clip));
@@ -101,6 +101,25 @@ fn our_npz_keeps_scalars_with_names_kinds_and_limits() {
         let message = &left_out.unwrap().message;
         assert!(message.contains("the scalars"), "{name}: {message}");
     }
+}
+
+/// Two joints of one name are two joints: the second is told apart, with a warning.
+#[test]
+fn equal_names_of_scalars_are_told_apart() {
+    let mut clip = clip();
+    let keys = [0.5, 0.25, 0.0, 0.125];
+    clip.set.push_scalar("knee", &TIMES, &keys, &[]).unwrap();
+    clip.scalars.push(Scalar::of(ScalarKind::Angle));
+    let samples = keyed(&clip).unwrap();
+    let sampled = [samples.of(&clip, Some("2".parse().unwrap()), &[])];
+    let mut bytes = Vec::new();
+    let format = Format::named("npz").unwrap();
+    format
+        .write_clips(&sampled, &MotionOptions::default(), &mut bytes)
+        .unwrap();
+    let again = read_npz("a.npz", bytes, &ReadOptions::default()).unwrap();
+    assert_eq!(again.warnings[0].code, Code::SameName);
+    assert_eq!(self::keys(&again.clips[0], "knee#3").1, keys);
 }
 
 /// An angle without limits that goes from one end of a turn to the other is probably a wrapped one.

@@ -1,4 +1,4 @@
-//! What a motion library does with each clip that it reads: it chooses joints, and samples them at a rate.
+//! The work of a motion library on each clip that it reads: it chooses joints, and samples them at a rate.
 
 use std::fmt;
 
@@ -60,7 +60,7 @@ impl ClipShape {
     /// The clip in this shape.
     ///
     /// # Errors
-    /// What is wrong, to follow the name of the clip.
+    /// The fault, to follow the name of the clip.
     pub(crate) fn applied(&self, clip: Motion) -> Result<Motion, String> {
         let clip = match &self.joints {
             Some(joints) => selected(&clip, joints)?,

@@ -79,8 +79,8 @@ def test_examples_in_documents(document, monkeypatch, tmp_path):
     np.savez("amass/shape.npz", betas=np.zeros(16), gender="neutral")
     np.save("offsets.npy", 0.1 * rng.normal(size=(52, 3)))
     pathlib.Path("robot.xml").write_text(ROBOT)
-    for file in ("data/walk.bvh", "examples/arm.xml"):
-        pathlib.Path(file).parent.mkdir()
+    for file in ("data/walk.bvh", "data/arm.xml"):
+        pathlib.Path(file).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / file, file)
     still = np.tile([1.0, 0, 0, 0], (31, 1))
     np.savez("keys.npz", joint_pos=rng.normal(size=(31, 1)), root_pos=np.zeros((31, 3)), root_quat=still)

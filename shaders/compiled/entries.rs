@@ -2443,6 +2443,26 @@ pub(crate) fn layered_of_plain<M: Machine>(
     result_3
 }
 
+/// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
+pub(crate) fn location_of<M: Machine>(
+    machine: &M,
+    item: SpreadRun<M::F>,
+    repetition: u32,
+) -> [u32; 3] {
+    let _block = machine.block(line!(), 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let steps = [loaded, loaded_2, loaded_3];
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+    let listed = [item.source, item.output.wrapping_add(loaded_4), item.key];
+    both(
+        listed,
+        both([repetition; 3], steps, |x, y| x.wrapping_mul(y)),
+        |x, y| x.wrapping_add(y),
+    )
+}
+
 pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 3);
     M::F::of_bits(x.bits() & 0x7fffffffu32)
@@ -2678,8 +2698,8 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     let invocation = machine.ids().local_invocation_index;
     let mut rotation: [M::F; 4] = Default::default();
     let mut j: u32 = Default::default();
-    let mut pair_end: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut pairs: u32 = Default::default();
+    let _block = machine.block(line!(), 38);
     let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << lanes_log2;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -2693,18 +2713,18 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     }
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
     let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let place = place_of(machine, item, group[2]);
-    let first = place[1];
+    let location = location_of(machine, item, group[2]);
+    let first = location[1];
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_3;
     let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, place, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, lanes, group[2]);
         return;
     }
     let count = item.count;
-    let segment = segment_at_arc_segment(machine, place[0]);
+    let segment = segment_at_arc_segment(machine, location[0]);
     let constant = constant_of_arc_segment(machine, segment);
     if first_j < count {
         let _block = machine.block(line!(), 9);
@@ -2712,50 +2732,50 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
         rotation = result;
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, place[2]);
+            let result_2 = constant_at(machine, location[2]);
             rotation = result_2;
         }
         let loaded_4 = rotation;
         store(machine, first.wrapping_add(first_j), loaded_4);
     }
     j = first_j.wrapping_add(lanes);
-    let end = count.wrapping_add(idle);
-    let first_pair_end = 3u32.wrapping_mul(lanes);
-    if first_pair_end <= end {
-        let _block = machine.block(line!(), 2);
-        let pair = 2u32.wrapping_mul(lanes);
-        pair_end = first_pair_end;
+    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
+    let loaded_5 = pairs;
+    if loaded_5 > 1u32 {
         loop {
-            let _block = machine.block(line!(), 18);
-            let loaded_5 = j;
-            let next_j = loaded_5.wrapping_add(lanes);
+            let _block = machine.block(line!(), 22);
             let loaded_6 = j;
-            let rotation_2 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_6);
-            let next = evaluate_near_arc_segment(machine, item, segment, constant, next_j);
             let loaded_7 = j;
-            store(machine, first.wrapping_add(loaded_7), rotation_2);
-            store(machine, first.wrapping_add(next_j), next);
-            j = next_j.wrapping_add(lanes);
-            let loaded_8 = pair_end;
-            pair_end = loaded_8.wrapping_add(pair);
-            let loaded_9 = pair_end;
-            if loaded_9 > end {
+            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_7);
+            store(machine, first.wrapping_add(loaded_6), result_3);
+            let loaded_8 = j;
+            j = loaded_8.wrapping_add(lanes);
+            let loaded_9 = j;
+            let loaded_10 = j;
+            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_10);
+            store(machine, first.wrapping_add(loaded_9), result_4);
+            let loaded_11 = j;
+            j = loaded_11.wrapping_add(lanes);
+            let loaded_12 = pairs;
+            pairs = loaded_12.wrapping_sub(1u32);
+            let loaded_13 = pairs;
+            if loaded_13 <= 1u32 {
                 break;
             }
         }
     }
-    let loaded_10 = j;
-    if loaded_10 < count {
+    let loaded_14 = j;
+    if loaded_14 < count {
         loop {
             let _block = machine.block(line!(), 11);
-            let loaded_11 = j;
-            let loaded_12 = j;
-            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_12);
-            store(machine, first.wrapping_add(loaded_11), result_3);
-            let loaded_13 = j;
-            j = loaded_13.wrapping_add(lanes);
-            let loaded_14 = j;
-            if loaded_14 >= count {
+            let loaded_15 = j;
+            let loaded_16 = j;
+            let result_5 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_16);
+            store(machine, first.wrapping_add(loaded_15), result_5);
+            let loaded_17 = j;
+            j = loaded_17.wrapping_add(lanes);
+            let loaded_18 = j;
+            if loaded_18 >= count {
                 break;
             }
         }
@@ -2799,19 +2819,19 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -2926,19 +2946,19 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -3053,19 +3073,19 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_arc_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -3310,8 +3330,8 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     let invocation = machine.ids().local_invocation_index;
     let mut rotation: [M::F; 4] = Default::default();
     let mut j: u32 = Default::default();
-    let mut pair_end: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut pairs: u32 = Default::default();
+    let _block = machine.block(line!(), 38);
     let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << lanes_log2;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3325,18 +3345,18 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     }
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
     let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let place = place_of(machine, item, group[2]);
-    let first = place[1];
+    let location = location_of(machine, item, group[2]);
+    let first = location[1];
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_3;
     let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, place, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, lanes, group[2]);
         return;
     }
     let count = item.count;
-    let segment = segment_at_polynomial_segment(machine, place[0]);
+    let segment = segment_at_polynomial_segment(machine, location[0]);
     let constant = constant_of_polynomial_segment(machine, segment);
     if first_j < count {
         let _block = machine.block(line!(), 9);
@@ -3344,52 +3364,53 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
         rotation = result;
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, place[2]);
+            let result_2 = constant_at(machine, location[2]);
             rotation = result_2;
         }
         let loaded_4 = rotation;
         store(machine, first.wrapping_add(first_j), loaded_4);
     }
     j = first_j.wrapping_add(lanes);
-    let end = count.wrapping_add(idle);
-    let first_pair_end = 3u32.wrapping_mul(lanes);
-    if first_pair_end <= end {
-        let _block = machine.block(line!(), 2);
-        let pair = 2u32.wrapping_mul(lanes);
-        pair_end = first_pair_end;
+    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
+    let loaded_5 = pairs;
+    if loaded_5 > 1u32 {
         loop {
-            let _block = machine.block(line!(), 18);
-            let loaded_5 = j;
-            let next_j = loaded_5.wrapping_add(lanes);
+            let _block = machine.block(line!(), 22);
             let loaded_6 = j;
-            let rotation_2 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_6);
-            let next = evaluate_near_polynomial_segment(machine, item, segment, constant, next_j);
             let loaded_7 = j;
-            store(machine, first.wrapping_add(loaded_7), rotation_2);
-            store(machine, first.wrapping_add(next_j), next);
-            j = next_j.wrapping_add(lanes);
-            let loaded_8 = pair_end;
-            pair_end = loaded_8.wrapping_add(pair);
-            let loaded_9 = pair_end;
-            if loaded_9 > end {
+            let result_3 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_7);
+            store(machine, first.wrapping_add(loaded_6), result_3);
+            let loaded_8 = j;
+            j = loaded_8.wrapping_add(lanes);
+            let loaded_9 = j;
+            let loaded_10 = j;
+            let result_4 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_10);
+            store(machine, first.wrapping_add(loaded_9), result_4);
+            let loaded_11 = j;
+            j = loaded_11.wrapping_add(lanes);
+            let loaded_12 = pairs;
+            pairs = loaded_12.wrapping_sub(1u32);
+            let loaded_13 = pairs;
+            if loaded_13 <= 1u32 {
                 break;
             }
         }
     }
-    let loaded_10 = j;
-    if loaded_10 < count {
+    let loaded_14 = j;
+    if loaded_14 < count {
         loop {
             let _block = machine.block(line!(), 11);
-            let loaded_11 = j;
-            let loaded_12 = j;
-            let result_3 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_12);
-            store(machine, first.wrapping_add(loaded_11), result_3);
-            let loaded_13 = j;
-            j = loaded_13.wrapping_add(lanes);
-            let loaded_14 = j;
-            if loaded_14 >= count {
+            let loaded_15 = j;
+            let loaded_16 = j;
+            let result_5 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_16);
+            store(machine, first.wrapping_add(loaded_15), result_5);
+            let loaded_17 = j;
+            j = loaded_17.wrapping_add(lanes);
+            let loaded_18 = j;
+            if loaded_18 >= count {
                 break;
             }
         }
@@ -3433,19 +3454,19 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -3560,19 +3581,19 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -3687,19 +3708,19 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
         item = result_2;
     }
     let loaded_8 = item;
-    let place = place_of(machine, loaded_8, group[2]);
+    let location = location_of(machine, loaded_8, group[2]);
     let loaded_9 = item.count;
     let segment = segment_at_polynomial_segment(
         machine,
         if loaded_9 & IS_CONSTANT != 0u32 {
             0u32
         } else {
-            place[0]
+            location[0]
         },
     );
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
-    let first = place[1];
+    let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
@@ -4632,26 +4653,6 @@ pub(crate) fn parts_3_of_matrix3x4_2<M: Machine>(
             third
         },
     ]
-}
-
-/// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
-pub(crate) fn place_of<M: Machine>(
-    machine: &M,
-    item: SpreadRun<M::F>,
-    repetition: u32,
-) -> [u32; 3] {
-    let _block = machine.block(line!(), 7);
-    let loaded = machine.load::<u32>(Global::Dispatch, 6);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
-    let steps = [loaded, loaded_2, loaded_3];
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
-    let listed = [item.source, item.output.wrapping_add(loaded_4), item.key];
-    both(
-        listed,
-        both([repetition; 3], steps, |x, y| x.wrapping_mul(y)),
-        |x, y| x.wrapping_add(y),
-    )
 }
 
 /// The coefficients are those of 1, s, s², … s¹⁰. Neighbouring powers are added in pairs (Estrin's
@@ -6214,7 +6215,7 @@ pub(crate) fn store_of_f32_2<M: Machine>(machine: &M, index: u32, rotation: [M::
 pub(crate) fn store_with_care<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    place: [u32; 3],
+    location: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
@@ -6229,8 +6230,8 @@ pub(crate) fn store_with_care<M: Machine>(
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => store_with_care_of_alone(machine, item, place, first_j, lanes, repetition),
-        _ => store_with_care_of_alone_2(machine, item, place, first_j, lanes, repetition),
+        0 => store_with_care_of_alone(machine, item, location, first_j, lanes, repetition),
+        _ => store_with_care_of_alone_2(machine, item, location, first_j, lanes, repetition),
     }
 }
 
@@ -6238,7 +6239,7 @@ pub(crate) fn store_with_care<M: Machine>(
 pub(crate) fn store_with_care_of_alone<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    place: [u32; 3],
+    location: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
@@ -6246,7 +6247,7 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
     let mut j: u32 = Default::default();
     let _block = machine.block(line!(), 12);
     let count = sample_count(machine, item);
-    let first = place[1];
+    let first = location[1];
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
@@ -6272,7 +6273,7 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         }
         return;
     }
-    let segment = segment_at_arc_segment(machine, place[0]);
+    let segment = segment_at_arc_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);
@@ -6302,7 +6303,7 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
 pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
-    place: [u32; 3],
+    location: [u32; 3],
     first_j: u32,
     lanes: u32,
     repetition: u32,
@@ -6310,7 +6311,7 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     let mut j: u32 = Default::default();
     let _block = machine.block(line!(), 12);
     let count = sample_count(machine, item);
-    let first = place[1];
+    let first = location[1];
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
@@ -6336,7 +6337,7 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         }
         return;
     }
-    let segment = segment_at_polynomial_segment(machine, place[0]);
+    let segment = segment_at_polynomial_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
         let _block = machine.block(line!(), 5);

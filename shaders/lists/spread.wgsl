@@ -58,7 +58,7 @@ const NO_KEY: u32 = 0xffffffff;
 var<immediate> dispatch: Spread;
 
 // Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
-fn place_of(item: SpreadRun, repetition: u32) -> vec3u {
+fn location_of(item: SpreadRun, repetition: u32) -> vec3u {
     let steps = vec3u(dispatch.segments, dispatch.outputs, dispatch.constants);
     let listed = vec3u(item.source, item.output + dispatch.first_output, item.key);
     return listed + repetition * steps;

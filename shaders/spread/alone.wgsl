@@ -18,44 +18,40 @@ fn main(
         return;
     }
     let item = item_at(dispatch.first_item + index);
-    let place = place_of(item, group.z);
-    let first = place.y;
+    let location = location_of(item, group.z);
+    let first = location.y;
     // The first iteration begins where the line of the first sample does. What lies before that sample wraps to a
     // large number.
     let idle = first & dispatch.line_mask;
     let first_j = (invocation & (lanes - 1u)) - idle;
     if item.count >= NEEDS_CARE {
-        store_with_care(item, place, first_j, lanes, group.z);
+        store_with_care(item, location, first_j, lanes, group.z);
         return;
     }
     // No bits are set in it.
     let count = item.count;
-    let segment = segment_at(place.x);
+    let segment = segment_at(location.x);
     let constant = constant_of(segment);
     if first_j < count {
         var rotation = evaluate_near(item, segment, constant, first_j);
         if (first_j == 0u) & (item.key != NO_KEY) {
-            rotation = constant_at(place.z);
+            rotation = constant_at(location.z);
         }
         store(first + first_j, rotation);
     }
     var j = first_j + lanes;
-    // Iterations in which every lane has a sample, two at a time.
-    let end = count + idle;
-    let first_pair_end = 3u * lanes;
-    if first_pair_end <= end {
-        let pair = 2u * lanes;
-        var pair_end = first_pair_end;
+    // Iterations behind the first one in which every lane has a sample, two at a time. One more is counted: the first
+    // iteration with another, or none of either.
+    var pairs = (((count + idle) >> lanes_log2) + 1u) >> 1u;
+    if pairs > 1u {
         loop {
-            let next_j = j + lanes;
-            let rotation = evaluate_near(item, segment, constant, j);
-            let next = evaluate_near(item, segment, constant, next_j);
-            store(first + j, rotation);
-            store(first + next_j, next);
-            j = next_j + lanes;
-            pair_end += pair;
+            store(first + j, evaluate_near(item, segment, constant, j));
+            j += lanes;
+            store(first + j, evaluate_near(item, segment, constant, j));
+            j += lanes;
+            pairs -= 1u;
             continuing {
-                break if pair_end > end;
+                break if pairs <= 1u;
             }
         }
     }
@@ -78,13 +74,13 @@ fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> ve
 // A constant, or a run whose samples are not all simple, which is rare.
 fn store_with_care(
     item: SpreadRun,
-    place: vec3u,
+    location: vec3u,
     first_j: u32,
     lanes: u32,
     repetition: u32,
 ) {
     let count = sample_count(item);
-    let first = place.y;
+    let first = location.y;
     var j = first_j;
     if (item.count & IS_CONSTANT) != 0u {
         let constant = constant_of_run(item.source, repetition);
@@ -96,7 +92,7 @@ fn store_with_care(
         }
         return;
     }
-    let segment = segment_at(place.x);
+    let segment = segment_at(location.x);
     if j < count {
         store(first + j, sample_of(item, segment, j, repetition));
     }

@@ -26,10 +26,10 @@ fn main(
         item = item_at(dispatch.first_item + index);
     }
     // Constants have no segment; the first one exists in any case.
-    let place = place_of(item, group.z);
-    let segment = segment_at(select(place.x, 0u, (item.count & IS_CONSTANT) != 0u));
+    let location = location_of(item, group.z);
+    let segment = segment_at(select(location.x, 0u, (item.count & IS_CONSTANT) != 0u));
     let count = sample_count(item);
-    let first = place.y;
+    let first = location.y;
     let idle = first & dispatch.line_mask;
     let lane = invocation & (lanes - 1u);
     // The samples of an iteration: the first iteration begins where the line of the first sample does.
@@ -46,7 +46,7 @@ fn main(
             }
         }
         workgroupBarrier();
-        // From the number of a part in the run to its place.
+        // From the number of a part in the run to its location.
         let shift = values + (lanes - end) * PARTS;
         let parts_end = select(end, count, count < end) * PARTS;
         for (var part = begin * PARTS + lane; part < parts_end; part += lanes) {

@@ -4,22 +4,13 @@
 
 use glam::Vec4;
 
-use crate::crowd::clip_tables::{ChannelCurve, arcs_between};
+use crate::crowd::channel_curve::{ChannelCurve, FORM_KEYS, FORM_LINE, FORM_PACKED, arcs_between};
 use crate::math::canonical::{canonical, round_f32};
 use crate::math::quaternion::{dot, unit};
 use crate::shader::{CrowdChannel, CrowdSpan, FORM_ARC, FORM_CUBIC, ON_KEY};
 use crate::simd::lanes::Lanes;
 use crate::twin::arc_between::arc_between;
 use crate::twin::functions::cubic;
-
-/// Rotations on arcs, as their keys: a cell for each.
-pub(crate) const FORM_KEYS: u32 = 16;
-
-/// Rotations on arcs, as packed keys: half a cell for each. The first key of a channel is counted in halves.
-pub(crate) const FORM_PACKED: u32 = 17;
-
-/// Translations on straight lines, as their keys.
-pub(crate) const FORM_LINE: u32 = 18;
 
 /// The largest magnitude of the three smaller components of a quaternion.
 const LIMIT: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -161,7 +152,7 @@ fn packed(key: [f32; 4]) -> [f32; 4] {
     ]
 }
 
-/// What [`packed`] stored.
+/// The rotation that [`packed`] stored.
 #[inline(always)]
 fn unpacked([low, high]: [u32; 2]) -> [f32; 4] {
     const STEP: f32 = (LIMIT / LARGEST as f64) as f32;

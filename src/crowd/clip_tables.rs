@@ -6,9 +6,8 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd::clip_keys::{
-    FORM_KEYS, FORM_LINE, FORM_PACKED, KeyPrecision, keeps_keys, keys_of, pack,
-};
+use crate::crowd::channel_curve::{ChannelCurve, FORM_PACKED};
+use crate::crowd::clip_keys::{KeyPrecision, keeps_keys, keys_of, pack};
 use crate::crowd_error::{CrowdError, MAX_TICKS};
 use crate::curve::options::Quantity;
 use crate::math::canonical::round_f32;
@@ -29,7 +28,6 @@ use crate::time::spans::SpanSource;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
-use crate::twin::arc_between::arc_between;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
@@ -53,71 +51,6 @@ pub(crate) struct ClipTables {
     /// Whether the curves of clips keep their keys where these are enough; `None`: constants alone, as kernels read
     /// them.
     pub(crate) keys: Option<KeyPrecision>,
-}
-
-/// One channel before it is stored in the tables: its spans, and the constants of each.
-#[derive(Default)]
-pub(crate) struct ChannelCurve {
-    pub(crate) form: u32,
-    pub(crate) spans: Vec<CrowdSpan>,
-    /// The constants of each span; their number depends on the form.
-    pub(crate) constants: Vec<[f32; 4]>,
-    /// The key at the start of each span, 0 if there is none. Samples at a tick have its bits if the span says that it
-    /// starts there.
-    pub(crate) keys: Vec<[f32; 4]>,
-}
-
-/// The number of constants of a form in each span.
-pub(crate) fn constants_of(form: u32) -> usize {
-    match form {
-        FORM_CONSTANT | FORM_KEYS | FORM_LINE | FORM_PACKED => 1,
-        FORM_ARC => 2,
-        FORM_CUBIC => 4,
-        _ => POWERS,
-    }
-}
-
-impl ChannelCurve {
-    fn constant(value: [f32; 4]) -> Self {
-        Self {
-            form: FORM_CONSTANT,
-            constants: vec![value],
-            ..Self::default()
-        }
-    }
-
-    /// Adds a span in which the value is constant: the first constant is the value, the others are 0.
-    fn push_constant(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
-        let span = CrowdSpan {
-            start,
-            whole: start as i32,
-            ..CrowdSpan::zeroed()
-        };
-        let mut constants = [[0.0; 4]; POWERS];
-        constants[0] = value;
-        self.push(span, &constants, key);
-    }
-
-    /// Adds a span with the first of the constants, as many as the form has.
-    fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]; POWERS], key: Option<[f32; 4]>) {
-        self.spans.push(span);
-        self.constants
-            .extend_from_slice(&constants[..constants_of(self.form)]);
-        self.keys.push(key.unwrap_or_default());
-    }
-
-    /// Marks the last span: its key lies on its first tick.
-    fn mark_on_key(&mut self) {
-        if let Some(span) = self.spans.last_mut() {
-            span.start |= ON_KEY;
-        }
-    }
-
-    /// The constants of a span.
-    pub(crate) fn constants_at(&self, span: usize) -> &[[f32; 4]] {
-        let each = constants_of(self.form);
-        &self.constants[span * each..][..each]
-    }
 }
 
 /// The curve of one track as for evaluation at frames: a frame is a tick, and the clip has `period` of them from its
@@ -477,46 +410,6 @@ fn arc_block<L: Lanes>(
         square,
         L::all(parameter),
     )))
-}
-
-/// As many arcs between keys as the vector has lanes: their middles and tangents.
-#[inline(always)]
-fn block_between<L: Lanes>(
-    starts: &[[f32; 4]],
-    ends: &[[f32; 4]],
-    [middles, tangents]: [&mut [[f32; 4]]; 2],
-) {
-    let (middle, tangent) = arc_between(L::load_rotations(starts), L::load_rotations(ends));
-    L::store_rotations(middle, middles);
-    L::store_rotations(tangent, tangents);
-}
-
-/// The middles and tangents of arcs between keys of neighbouring joints.
-#[inline(always)]
-pub(crate) fn arcs_between<L: Lanes>(
-    starts: &[[f32; 4]],
-    ends: &[[f32; 4]],
-    [middles, tangents]: [&mut [[f32; 4]]; 2],
-) {
-    let whole = middles.len() / L::COUNT * L::COUNT;
-    for first in (0..whole).step_by(L::COUNT) {
-        let joints = first..first + L::COUNT;
-        let found = [&mut middles[joints.clone()], &mut tangents[joints.clone()]];
-        block_between::<L>(&starts[joints.clone()], &ends[joints], found);
-    }
-    let rest = middles.len() - whole;
-    if rest > 0 {
-        // The last vector is filled up with arcs that are left out.
-        let mut keys = [[[0.0; 4]; MAX_LANES]; 2];
-        keys[0][..rest].copy_from_slice(&starts[whole..][..rest]);
-        keys[1][..rest].copy_from_slice(&ends[whole..][..rest]);
-        let mut found = [[[0.0; 4]; MAX_LANES]; 2];
-        let [of_middles, of_tangents] = &mut found;
-        let arcs = [&mut of_middles[..L::COUNT], &mut of_tangents[..L::COUNT]];
-        block_between::<L>(&keys[0][..L::COUNT], &keys[1][..L::COUNT], arcs);
-        middles[whole..].copy_from_slice(&of_middles[..rest]);
-        tangents[whole..].copy_from_slice(&of_tangents[..rest]);
-    }
 }
 
 /// Evaluates arcs of neighbouring joints at one parameter.

@@ -41,6 +41,7 @@
 // tables stay; entries that changed are written with the next
 // evaluation; positions live for a window alone.
 
+pub(crate) mod channel_curve;
 pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
 pub(crate) mod fade;

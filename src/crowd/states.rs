@@ -6,8 +6,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::crowd::clip_keys::{FORM_KEYS, FORM_LINE, FORM_PACKED, KeyRows, keeps_keys};
-use crate::crowd::clip_tables::{ClipTables, arcs, constants_of, runs_of};
+use crate::crowd::channel_curve::{FORM_KEYS, FORM_LINE, FORM_PACKED, constants_of};
+use crate::crowd::clip_keys::{KeyRows, keeps_keys};
+use crate::crowd::clip_tables::{ClipTables, arcs, runs_of};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;

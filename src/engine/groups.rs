@@ -186,7 +186,7 @@ pub(crate) struct GroupedTracks {
     pub(super) quantity: Quantity,
 }
 
-/// What samples of each group are computed from, and for each track the index of its group and its index there.
+/// The source of the samples of each group, and for each track the index of its group and its index there.
 type GroupsAndTracks = (Vec<ClipSource>, Vec<(usize, usize)>);
 
 /// The tracks that have equal interpolations.

@@ -127,7 +127,7 @@ impl Uploaded {
         }
     }
 
-    /// What single samples are computed from; an error if the segments exceed the engine's memory limit, and samples
+    /// The source of single samples; an error if the segments exceed the engine's memory limit, and samples
     /// cannot be computed from keys within it.
     pub(crate) fn source(&self) -> Result<ClipSource, EvaluateError> {
         Ok(match self {
@@ -160,7 +160,7 @@ fn exceeds(set: &TrackSet, data: &ClipData) -> EvaluateError {
     OutOfMemoryError::new::<u8>(SEGMENTS, needed).into()
 }
 
-/// What single samples of a clip are computed from.
+/// The source of single samples of a clip.
 pub(crate) enum ClipSource {
     Segments(Arc<ClipData>),
     Keys(Arc<KeptKeys>),

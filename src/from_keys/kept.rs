@@ -107,7 +107,7 @@ impl KeptKeys {
         self.set.rotation_bytes() + size_of_val(&**tracks) + prepared.bytes()
     }
 
-    /// What the weights of keys follow from, in addition to their times.
+    /// The numbers from which the weights of keys follow, in addition to their times.
     pub(crate) fn weight_rule(&self) -> Option<(WeightRule, Ends)> {
         match self.curve {
             KeyCurve::Cubics(rule) => Some((rule, self.data.interpolation.ends)),

@@ -219,9 +219,12 @@ impl Manifest {
                 let entry = self.results()[&***output];
                 self.is_renamed(&entry.input, entry.whole().0)
             };
-            let (renamed, gone): (Vec<&String>, Vec<&String>) =
+            let (renamed, orphaned): (Vec<&String>, Vec<&String>) =
                 orphans.iter().partition(of_other_name);
-            self.note_orphans(&gone, "no input any more (--prune removes what has none)");
+            self.note_orphans(
+                &orphaned,
+                "no input any more (--prune removes what has none)",
+            );
             self.note_orphans(&renamed, "another name now (--prune removes the old ones)");
         }
         if self.prune {

@@ -100,8 +100,8 @@ pub(crate) fn preview(
     if let [path] = &*inputs.paths()
         && goes_to_file(inputs, out)
     {
-        choose(out, options.format)?;
         Destination::new(out, options.overwrite, std::slice::from_ref(path))?;
+        choose(out, options.format)?;
         return Ok((vec![planned(path, out, false)], Vec::new()));
     }
     let format = format(out, options.format)?;
@@ -160,8 +160,8 @@ pub(crate) fn plan(
             if options.prune {
                 return Err(Failure::usage("--prune is for a directory of results"));
             }
-            let format = choose(out, options.format)?;
             let destination = Destination::new(out, options.overwrite, &paths)?;
+            let format = choose(out, options.format)?;
             // The surest check is to try.
             destination.check_writable()?;
             destination.refuse_terminal(format)?;

@@ -103,7 +103,7 @@ fn mirror_axis() -> impl TypedValueParser<Value = usize> {
     ])
 }
 
-/// What was computed, with `--json`.
+/// The computed features, with `--json`.
 #[derive(Debug, Serialize)]
 struct FeatureReport {
     frames: usize,

@@ -59,11 +59,11 @@ pub(crate) struct Arguments {
     /// the rest pose of its skeleton]
     #[arg(long, value_name = "FRAME")]
     rest_frame: Option<usize>,
-    /// What the way of the hips is multiplied by: hips, the ratio of their heights; legs, the ratio of the
+    /// The factor for the translations of the hips: hips, the ratio of their heights; legs, the ratio of the
     /// lengths of the legs; or a number
     #[arg(long, value_name = "hips|legs|FACTOR", default_value = "hips", value_parser = hips_scale)]
     hips_scale: HipsScale,
-    /// Also write, as JSON: the pairs of joints, the joints without a partner, and how far hands and feet are from where
+    /// Write a report: as JSON, the pairs of joints, the joints without a partner, and how far hands and feet are from where
     /// the input has them; needs a single input
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -170,7 +170,7 @@ fn bones(file: &Path) -> Result<Vec<(String, String)>, Failure> {
     pairs.into_iter().map(pair).collect()
 }
 
-/// What was done with a clip, in `--json` and `--report`.
+/// The result of a clip, in `--json` and `--report`.
 #[derive(Debug, Serialize)]
 struct ClipReport {
     clip: Option<String>,

@@ -208,7 +208,7 @@ fn frames_of_amp(
     npz::read_plan(&archive, &mut plan, options, warnings)
 }
 
-/// What an episode says of itself.
+/// The metadata of an episode.
 #[derive(Deserialize)]
 struct Info {
     image: Option<Image>,

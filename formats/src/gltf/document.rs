@@ -165,7 +165,7 @@ impl Document for GltfDocument {
     }
 }
 
-/// What is written other than it was read.
+/// The parts that are written other than they were read.
 enum Change<'a> {
     /// The keys of some animations.
     Keys(&'a [(usize, SampledClip<'a>)]),

@@ -157,8 +157,8 @@ pub fn feature_arrays(
                     let of_joint: Vec<bool> =
                         found.iter().skip(joint).step_by(joints).copied().collect();
                     let filtered = majority(&of_joint, request.window);
-                    let places = values.iter_mut().skip(joint).step_by(joints);
-                    places
+                    let positions = values.iter_mut().skip(joint).step_by(joints);
+                    positions
                         .zip(filtered)
                         .for_each(|(value, touches)| *value = f64::from(u8::from(touches)));
                 }
@@ -177,11 +177,11 @@ pub fn feature_arrays(
                     &[joints, 3],
                     points(&moved.collect::<Vec<_>>()),
                 ));
-                let turned = partners
+                let rotated = partners
                     .iter()
                     .map(|&at| mirrored_rotation(poses.rotations[at], axis));
-                let turned = turned.flat_map(|rotation| rotation.to_array());
-                all.push(array("mirrored_rotations", &[joints, 4], turned.collect()));
+                let rotated = rotated.flat_map(|rotation| rotation.to_array());
+                all.push(array("mirrored_rotations", &[joints, 4], rotated.collect()));
                 let pairs = pairs.into_iter().map(|pair| pair as f64).collect();
                 all.push(whole(FeatureArray {
                     shape: vec![joints],

@@ -12,7 +12,7 @@ use crate::quaternion::ComponentOrder;
 use crate::warnings::Warnings;
 
 /// Arrays of the layout that do not contain keys: data of the clip that do not depend on frames.
-pub(crate) const CONSTANTS: [&str; 12] = [
+pub(crate) const CONSTANTS: [&str; 13] = [
     "name",
     "names",
     "parents",
@@ -24,6 +24,7 @@ pub(crate) const CONSTANTS: [&str; 12] = [
     END_SITES,
     SCALAR_NAMES,
     SCALAR_KINDS,
+    SCALAR_SAMPLERS,
     SCALAR_LIMITS,
 ];
 
@@ -35,6 +36,9 @@ pub(crate) const SCALAR_NAMES: &str = "scalar_names";
 
 /// The array with the kind of each scalar: `angle`, `length`, `plain` or `contact`.
 pub(crate) const SCALAR_KINDS: &str = "scalar_kinds";
+
+/// The array with the interpolation of each scalar: `STEP`, `LINEAR`, or empty where it is not stated.
+pub(crate) const SCALAR_SAMPLERS: &str = "scalar_samplers";
 
 /// The array with the limits of each scalar, the smallest and the largest value; NaN for a scalar without.
 pub(crate) const SCALAR_LIMITS: &str = "scalar_limits";
@@ -159,6 +163,15 @@ fn read_scalars(
     };
     let rows = (member, Layout::TrackMajor, 0);
     plan.add_scalars(archive, rows, names, kind, warnings)?;
+    if let (Some(samplers), Some(array)) = (texts(SCALAR_SAMPLERS)?, plan.scalars.last_mut()) {
+        for ((_, scalar), text) in array.scalars.iter_mut().zip(&samplers) {
+            scalar.interpolation = match text.as_str() {
+                "STEP" => Some(ChannelInterpolation::Step),
+                "LINEAR" => Some(ChannelInterpolation::Linear),
+                _ => None,
+            };
+        }
+    }
     if let (Some(member), Some(array)) = (archive.find(SCALAR_LIMITS), plan.scalars.last_mut()) {
         let limits = read_numbers(archive, member)?;
         let limits = limits.as_chunks::<2>().0;

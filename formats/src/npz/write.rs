@@ -292,6 +292,12 @@ fn scalar_arrays(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::
     members.texts(&path(tumble_layout::SCALAR_NAMES), &names, &[count])?;
     let kinds: Vec<&str> = all.iter().map(|scalar| scalar.kind.name()).collect();
     members.texts(&path(tumble_layout::SCALAR_KINDS), &kinds, &[count])?;
+    let has_default =
+        |scalar: &Scalar| scalar.interpolation == Scalar::of(scalar.kind).interpolation;
+    if !all.iter().all(has_default) {
+        let samplers: Vec<&str> = all.iter().map(scalar_sampler).collect();
+        members.texts(&path(tumble_layout::SCALAR_SAMPLERS), &samplers, &[count])?;
+    }
     if all.iter().all(|scalar| scalar.limits.is_none()) {
         return Ok(());
     }
@@ -302,6 +308,15 @@ fn scalar_arrays(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::
             .flat_map(|scalar| scalar.limits.unwrap_or([f64::NAN; 2]));
         limits.try_for_each(put)
     })
+}
+
+fn scalar_sampler(scalar: &Scalar) -> &'static str {
+    match scalar.interpolation {
+        Some(ChannelInterpolation::Step) => "STEP",
+        Some(ChannelInterpolation::Linear) => "LINEAR",
+        // The layout has no tangents.
+        Some(ChannelInterpolation::Cubic) | None => "",
+    }
 }
 
 /// The rate of the samples, or of all but the last one, if the clip ends between two frames: programs that read no times

@@ -13,7 +13,7 @@ use crate::table::plan::TablePlan;
 /// Where the description of a data set is, from the folder of one of its tables.
 pub(crate) const INFO: &str = "../../meta/info.json";
 
-/// What a data set says of itself.
+/// The metadata of a data set.
 #[derive(Deserialize)]
 pub(super) struct Info {
     /// That the file is of `LeRobot`.

@@ -87,12 +87,12 @@ pub(crate) struct ScalarColumn {
     pub(crate) column: usize,
     /// Which numbers of a list; `None` for all of it.
     pub(crate) items: Option<Range<usize>>,
-    /// What the names of several scalars begin with, and the name of one.
+    /// The beginning of the names of several scalars, or the name of one.
     pub(crate) name: String,
     /// The name of each of several, if they are known.
     pub(crate) names: Vec<String>,
     pub(crate) kind: ScalarKind,
-    /// What the numbers are multiplied by.
+    /// The factor for the numbers.
     pub(crate) factor: f64,
 }
 

@@ -716,7 +716,7 @@ fn hash_of_times(parts: &[(&[f64], f64)]) -> u64 {
     hasher.finish()
 }
 
-/// What the weights of a cursor follow from, which all its tracks share.
+/// The times from which the weights of a cursor follow, which all its tracks share.
 fn weight_rule(clip: &ClipSource) -> Option<(WeightRule, Ends)> {
     match clip {
         ClipSource::Segments(_) => None,

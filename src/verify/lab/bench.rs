@@ -31,7 +31,7 @@ struct Effort {
     dispatches: u32,
     /// Rows whose median is a time in the last measurements.
     rows: u32,
-    /// What the ceiling of empty workgroups is called, and their number.
+    /// The name of the ceiling of empty workgroups, and their number.
     workgroups: (&'static str, u32),
 }
 

@@ -185,15 +185,20 @@ impl EvaluationJob<'_> {
     fn warn_of_lost_channels(&self, clips: &[&Motion]) {
         let has = |says: fn(&Motion) -> bool| clips.iter().any(|clip| says(clip));
         let mut lost = Vec::new();
-        if self.arguments.output.poses().is_none() && has(Motion::has_vectors) {
+        let output = &self.arguments.output;
+        let is_of_scalars = output.scalars().is_some();
+        if is_of_scalars && has(|clip| clip.set.track_count() > 0) {
+            lost.push("the rotations");
+        }
+        if output.poses().is_none() && has(Motion::has_vectors) {
             lost.push("the translations and scales");
         }
-        if has(|clip| clip.set.scalar_count() > 0) {
+        if !is_of_scalars && has(|clip| clip.set.scalar_count() > 0) {
             lost.push("the scalars");
         }
         if !lost.is_empty() {
             let message = format!(
-                "the numbers of --quantity {} have no room for this, left out: {}; -o FILE.npz has all channels",
+                "--quantity {} writes no other numbers of the clip; left out: {}; -o FILE.npz has all of them",
                 self.arguments.output.name(),
                 lost.join(", ")
             );

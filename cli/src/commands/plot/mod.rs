@@ -107,7 +107,7 @@ pub(crate) struct Arguments {
     /// sphere: the axis of the box to draw; -y points along the box
     #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
     axis: AxisArgument,
-    /// Write all plots, and an HTML page that shows them, into a directory
+    /// Write a report: all plots, and an HTML page that shows them, into a directory
     #[arg(long, conflicts_with_all = ["show", "components", "dimensions", "boxes", "tracks", "axis"])]
     report: bool,
     /// The format of the results: svg or png [default: by the name of the output, else svg]

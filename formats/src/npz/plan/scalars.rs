@@ -1,5 +1,6 @@
 //! Arrays of scalars: where their numbers are, and how they are read and written.
 
+use std::collections::HashSet;
 use std::io;
 
 use tumble::Layout;
@@ -8,6 +9,7 @@ use crate::array::shape_text;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::map::Entry;
 use crate::motion::{Motion, SampledClip, Scalar, ScalarKind};
+use crate::names::unique_name;
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::warnings::Warnings;
@@ -26,7 +28,7 @@ pub(crate) struct ScalarArray {
     pub(crate) layout: Layout,
     /// The first of its columns (of rows, scalars first) that is a scalar.
     first: usize,
-    /// What its numbers are multiplied by.
+    /// The factor for its numbers.
     factor: f64,
     pub(crate) scalars: Vec<(String, Scalar)>,
 }
@@ -118,7 +120,18 @@ impl ArchivePlan {
             });
             (0..count).map(|index| format!("joint_{index}")).collect()
         });
-        let scalar = |(index, name)| (name, Scalar::of(kind(index)));
+        let mut used = HashSet::new();
+        let scalar = |(index, name): (usize, String)| {
+            let unique = unique_name(name.clone(), index, &mut used);
+            if unique != name {
+                warnings.warn(Code::SameName, || {
+                    let message =
+                        format!("two joints are called `{name}`; the second becomes `{unique}`");
+                    (None, message)
+                });
+            }
+            (unique, Scalar::of(kind(index)))
+        };
         self.scalars.push(ScalarArray {
             member,
             layout,
