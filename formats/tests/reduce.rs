@@ -147,8 +147,8 @@ fn assert_bytes_of_keys(clip: &Motion) {
         let set = TrackSet::with_shared_times(&times, rotations.as_quats()).unwrap();
         for (method, bound) in [
             (method::SLERP, 16.5),
-            (method::CATMULL_ROM, 34.0),
-            (method::BESSEL_OVERHAUSER, 34.0),
+            (method::CATMULL_ROM, 36.0),
+            (method::BESSEL_OVERHAUSER, 36.0),
         ] {
             let bytes = engine.upload(&set, method).unwrap().bytes_per_key();
             println!("{method} at {rate} Hz: {bytes:.1} bytes a key");

@@ -38,7 +38,7 @@ up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recog
 
 Examples:
   tumble features walk.bvh --sets six-columns,heading -o walk.npz
-  tumble features walk.pkl --robot g1.xml --fps 50 --sets contacts,positions --vertical z -o walk.npz
+  tumble features walk.pkl --robot g1.xml -f 50 --sets contacts,positions --vertical z -o walk.npz
   tumble features amass --body-model models --up-axis y --fps 20 --sets humanml3d -o out --resume")]
 pub(crate) struct Arguments {
     #[command(flatten)]
