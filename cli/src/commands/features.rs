@@ -51,7 +51,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SETS", value_delimiter = ',', required = true, value_parser = sets())]
     sets: Vec<FeatureSet>,
     /// Frames per second [default: the rate of the input]
-    #[arg(long, value_name = "FPS")]
+    #[arg(short = 'f', long, value_name = "FPS")]
     fps: Option<FrameRate>,
     /// How to interpolate: `authored`, or a method (`tumble methods`)
     #[arg(short, long, value_name = "METHOD", default_value = "authored", value_parser = method_argument())]
