@@ -144,6 +144,7 @@ fn write_inputs(folder: &Path) {
     }
     generate("reduce walk.bvh --tolerance 0.1deg -o reduced.glb");
     generate("convert take.bvh -o character.glb");
+    generate("convert lafan1/walk.csv --robot g1.xml --dialect gmr -o walk.pkl");
     write(
         "bones.json",
         br#"{"hips": "hips", "spine": "spine", "head": "head"}"#,
