@@ -116,7 +116,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 11] = [
+    const WORDS: [(&str, &str); 12] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -140,6 +140,7 @@ pub(crate) fn in_python(message: &str) -> String {
         ("`--by exact`", r#"`by="exact"`"#),
         ("`--by edges`", r#"`by="edges"`"#),
         ("--weld DISTANCE", "weld=DISTANCE"),
+        ("--source-fps FPS", "source_fps=FPS"),
     ];
     const FLAGS: [&str; 5] = [
         "bridge_gaps",

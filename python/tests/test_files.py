@@ -142,7 +142,7 @@ def test_columns_that_tell_apart_are_known(track, clip, tmp_path):
 def test_messages_name_keywords(tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("stamp,x,y,z,w\n0,0,0,0,1\n")
-    with pytest.raises(tumble.InputError, match='; map="time=NAME"'):
+    with pytest.raises(tumble.InputError, match='name the time column with map="time=NAME", or give source_fps=FPS'):
         tumble.load(path)
     path.write_text("time,x,y,z,w\n0,0,0,0,1\n0,1,0,0,0\n")
     with pytest.raises(tumble.InputError, match='duplicates="first" or "last" keeps one'):
