@@ -16,4 +16,8 @@ while IFS= read -r file; do files+=("$file"); done < <(find "$folder" -type f | 
     echo "there is no file below $folder" >&2
     exit 1
 }
+# One list of checksums of everything, beside those of each file.
+sums=$folder/SHA256SUMS
+(cd "$folder" && find . -type f ! -name SHA256SUMS ! -name '*.sha256' -exec sha256sum {} + | sed -E 's|  .*/|  |' | sort -k 2) >"$sums"
+files+=("$sums")
 gh release create "$tag" --draft --title "Tumble $version" --notes-file CHANGELOG.md "${files[@]}"
