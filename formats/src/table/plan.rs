@@ -224,6 +224,14 @@ impl ColumnNames<'_> {
         }
     }
 
+    /// As [`ColumnNames::position`]; an error without such a column.
+    fn required(&self, source: &str) -> Result<usize, Diagnostic> {
+        self.position(source).ok_or_else(|| {
+            let message = format!("there is no column `{source}`; there are {}", self.list());
+            self.refuse(Code::ColumnMissing, message)
+        })
+    }
+
     /// The index of the column that `--map` names. Of several columns of one name, the second is called `x.1`, the
     /// third `x.2`, as pandas names them.
     fn position(&self, source: &str) -> Option<usize> {
@@ -533,14 +541,7 @@ fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<MappedColumns, Diagn
             mapped.tracks.push(entry);
             continue;
         }
-        let Some(index) = names.position(&entry.source) else {
-            let message = format!(
-                "there is no column `{}`; there are {}",
-                entry.source,
-                names.list()
-            );
-            return Err(names.refuse(Code::ColumnMissing, message));
-        };
+        let index = names.required(&entry.source)?;
         let is_rotation = entry.order.is_some() || entry.form.is_some();
         if entry.columns.is_some() || is_rotation || !is_column(&entry.name) {
             mapped.tracks.push(entry);
@@ -562,14 +563,7 @@ fn scalar_columns(
 ) -> Result<Vec<ScalarColumn>, Diagnostic> {
     let mut all = Vec::new();
     for entry in &mapped.scalars {
-        let Some(index) = names.position(&entry.source) else {
-            let message = format!(
-                "there is no column `{}`; there are {}",
-                entry.source,
-                names.list()
-            );
-            return Err(names.refuse(Code::ColumnMissing, message));
-        };
+        let index = names.required(&entry.source)?;
         let need = match entry.columns {
             Some(_) => ColumnNeed::List,
             None => ColumnNeed::Number,
