@@ -99,15 +99,22 @@ fn write(path: &Path, skeleton: &Value, rest: &[(DQuat, DVec3)], keys: &[DQuat],
     fs::write(path, bytes).unwrap();
 }
 
+/// A file of the test data; says so where it is not there.
+fn test_data(name: &str) -> Option<Value> {
+    let file = root().join(format!("../shared/data/robots/retarget/{name}.json"));
+    let Ok(text) = fs::read_to_string(&file) else {
+        eprintln!("{} is not there: nothing compared", file.display());
+        return None;
+    };
+    Some(serde_json::from_str(&text).unwrap())
+}
+
 /// The rest-pose transfer of the test data, through the program: between other axes, units and rest poses.
 #[test]
 fn rotations_are_those_of_the_formulas() {
-    let shared = root().join("../shared/data/robots/retarget/transfer.json");
-    let Ok(text) = fs::read_to_string(&shared) else {
-        eprintln!("{} is not there: nothing compared", shared.display());
+    let Some(data) = test_data("transfer") else {
         return;
     };
-    let data: Value = serde_json::from_str(&text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let (source, target) = (&data["source"], &data["target"]);
@@ -185,12 +192,9 @@ fn rotations_are_those_of_the_formulas() {
 /// Every kind of skeleton of the test data, recognised by its names through the program, onto every other one.
 #[test]
 fn skeletons_are_recognised_by_their_names() {
-    let shared = root().join("../shared/data/robots/retarget/names.json");
-    let Ok(text) = fs::read_to_string(&shared) else {
-        eprintln!("{} is not there: nothing compared", shared.display());
+    let Some(data) = test_data("names") else {
         return;
     };
-    let data: Value = serde_json::from_str(&text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (kind, names) in data["names"].as_object().unwrap() {
