@@ -100,6 +100,29 @@ fn every_command_prints_json_without_debug_text() {
     }
 }
 
+/// The line about a result and its record say the same of frames that were assumed, and of an end that is left out.
+#[test]
+fn records_have_the_assumed_rate_and_the_end_that_is_left_out() {
+    let temporary = sample_folder();
+    let record = |line: &str| -> Value {
+        let line: Vec<&str> = line.split(' ').collect();
+        let run = run(temporary.path(), &line);
+        assert_eq!(run.code, 0, "{}", run.words);
+        let records: Value = serde_json::from_slice(&run.out).unwrap();
+        records[0].clone()
+    };
+    let assumed = record("eval a.dat -o assumed.npy --json");
+    assert_eq!(assumed["assumed_fps"], "25", "{assumed}");
+    assert!(assumed["left_out_seconds"].is_null(), "{assumed}");
+    let chosen = record("eval a.dat --fps 7.3 -o chosen.npy --json");
+    assert!(chosen["assumed_fps"].is_null(), "{chosen}");
+    let left_out = chosen["left_out_seconds"].as_f64().unwrap();
+    assert!(
+        (left_out - 0.6 / 7.3).abs() < 1e-9 && chosen["frames"] == 15,
+        "{chosen}"
+    );
+}
+
 /// Inputs that fail are records too: a reader of the JSON alone learns of all.
 #[test]
 fn lists_have_the_inputs_that_failed() {

@@ -50,6 +50,12 @@ pub(crate) struct EvaluationReport {
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_gaps: Option<usize>,
+    /// The frames a second, where they were assumed, because the keys have no rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    assumed_fps: Option<String>,
+    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left_out_seconds: Option<f64>,
     /// The output that was written for each rotation, as `--quantity` names it.
     #[serde(rename = "what")]
     output_kind: &'static str,
@@ -342,7 +348,8 @@ impl EvaluationJob<'_> {
         let mut assumed = assumed
             .iter()
             .filter_map(|clip| self.samples.assumed_rate(clip));
-        let assumed = assumed.next().map_or(String::new(), |rate| {
+        let assumed_fps = assumed.next().map(|rate| rate.to_string());
+        let assumed = assumed_fps.as_ref().map_or(String::new(), |rate| {
             format!(" ({rate} fps, because its keys have no rate)")
         });
         let done = format!(
@@ -360,6 +367,8 @@ impl EvaluationJob<'_> {
                 .has("max_gap")
                 .then_some(self.in_gaps),
             last_time: span.map(|span| span.1),
+            assumed_fps,
+            left_out_seconds: self.left_out,
             output_kind: self.arguments.output.name(),
             order: order.map(ComponentOrder::name),
             method: method.to_owned(),
