@@ -10,6 +10,7 @@ use crate::from_keys::cubics::sample;
 use crate::shader::{IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
+use crate::simd::together::Together;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
@@ -40,8 +41,8 @@ pub(crate) struct IntervalLanes {
     keys: [[u32; MAX_LANES]; 4],
     /// Whether they are the keys of consecutive intervals.
     are_in_order: bool,
-    /// At the start and at the end of each interval.
-    weights: [[TangentWeights; MAX_LANES]; 2],
+    /// At the start and at the end of each interval, by the fields of [`TangentWeights`].
+    weights: [[[f32; MAX_LANES]; 4]; 2],
     /// The index of the first sample of each, and the number of its samples; unused lanes have none.
     first: [u32; MAX_LANES],
     count: [u32; MAX_LANES],
@@ -148,7 +149,7 @@ impl IntervalPlan {
             // Lanes that stay unused have the keys of the first.
             self.vectors.push(IntervalLanes::new(
                 keys.map(|key| [key; MAX_LANES]),
-                [[at_start; MAX_LANES], [at_end; MAX_LANES]],
+                [at_start, at_end],
                 self.parameters.len(),
             ));
         }
@@ -158,8 +159,12 @@ impl IntervalPlan {
         for (lanes, key) in vector.keys.iter_mut().zip(keys) {
             lanes[lane] = key;
         }
-        vector.weights[0][lane] = at_start;
-        vector.weights[1][lane] = at_end;
+        for (of_end, weights) in vector.weights.iter_mut().zip([at_start, at_end]) {
+            let fields: [f32; 4] = bytemuck::cast(weights);
+            for (lanes, field) in of_end.iter_mut().zip(fields) {
+                lanes[lane] = field;
+            }
+        }
         vector.first[lane] = first as u32;
         vector.count[lane] = samples.len() as u32;
         vector.used = lane + 1;
@@ -175,15 +180,13 @@ impl IntervalPlan {
 }
 
 impl IntervalLanes {
-    fn new(
-        keys: [[u32; MAX_LANES]; 4],
-        weights: [[TangentWeights; MAX_LANES]; 2],
-        parameters: usize,
-    ) -> Self {
+    fn new(keys: [[u32; MAX_LANES]; 4], weights: [TangentWeights; 2], parameters: usize) -> Self {
+        let in_lanes =
+            |weights| bytemuck::cast::<_, [f32; 4]>(weights).map(|field| [field; MAX_LANES]);
         Self {
             keys,
             are_in_order: false,
-            weights,
+            weights: weights.map(in_lanes),
             first: [0; MAX_LANES],
             count: [0; MAX_LANES],
             used: 0,
@@ -215,16 +218,6 @@ impl IntervalLanes {
             (interval as usize, first..first + count)
         })
     }
-
-    /// The keys at one end of the intervals in the lanes from `lane` on.
-    #[inline(always)]
-    fn load<L: Lanes>(&self, end: usize, lane: usize, keys: &[[f32; 4]]) -> [L; 4] {
-        let indices = &self.keys[end][lane..];
-        match self.are_in_order {
-            true => L::load_rotations(&keys[indices[0] as usize..]),
-            false => L::gather_rotations(keys, indices),
-        }
-    }
 }
 
 /// Evaluates the samples of a track with these keys, as they were added and with their signs for the shortest path;
@@ -254,16 +247,20 @@ impl InLanesInto<[[f32; 4]], [[f32; 4]]> for Arcs<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(&self, keys: &[[f32; 4]], output: &mut [[f32; 4]]) {
-        for lanes in &self.0.vectors {
-            for lane in (0..lanes.used).step_by(L::COUNT) {
-                let from = lanes.load::<L>(1, lane, keys);
-                let (middle, tangent) = arc_between(from, lanes.load::<L>(2, lane, keys));
-                let square = norm_squared(tangent);
-                for i in 0..lanes.max_count {
-                    let parameter = L::load(&self.0.parameters[lanes.parameters + i][lane..]);
-                    let found = canonical(on_arc(middle, tangent, square, parameter));
-                    store::<L>(lanes, lane, i, found, output);
-                }
+        let mut vectors = Vectors(&self.0.vectors, 0);
+        while let Some(a) = vectors.next::<L>() {
+            // The last of an odd number is computed twice.
+            let b = vectors.next::<L>().unwrap_or(a);
+            let from = Together::of_rotations(a.keys::<L>(1, keys), b.keys(1, keys));
+            let to = Together::of_rotations(a.keys::<L>(2, keys), b.keys(2, keys));
+            let (middle, tangent) = arc_between(from, to);
+            let square = norm_squared(tangent);
+            for i in 0..a.lanes.max_count.max(b.lanes.max_count) {
+                let parameters = [a.parameters::<L>(self.0, i), b.parameters(self.0, i)];
+                let found = canonical(on_arc(middle, tangent, square, Together(parameters)));
+                let [of_a, of_b] = Together::rotations(found);
+                a.store(i, of_a, output);
+                b.store(i, of_b, output);
             }
         }
     }
@@ -279,50 +276,98 @@ impl InLanesInto<[[f32; 4]], [[f32; 4]]> for Cubics<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&self, keys: &[[f32; 4]], output: &mut [[f32; 4]]) -> bool {
         let mut are_resolved = true;
-        for lanes in &self.0.vectors {
-            let [first, last] = &lanes.weights;
-            for lane in (0..lanes.used).step_by(L::COUNT) {
-                let curve: SmallAngleCubic<L> = small_angle_cubic(
-                    lanes.load(0, lane, keys),
-                    lanes.load(1, lane, keys),
-                    lanes.load(2, lane, keys),
-                    lanes.load(3, lane, keys),
-                    L::load_rotations(bytemuck::cast_slice(&first[lane..])).into(),
-                    L::load_rotations(bytemuck::cast_slice(&last[lane..])).into(),
-                );
-                let valid = L::choose(curve.is_valid, L::all(1.0), L::all(0.0));
-                are_resolved &= !valid.any_at_most(0.0);
-                for i in 0..lanes.max_count {
-                    let parameter = L::load(&self.0.parameters[lanes.parameters + i][lane..]);
-                    store::<L>(lanes, lane, i, sample(&curve, parameter), output);
-                }
+        let mut vectors = Vectors(&self.0.vectors, 0);
+        while let Some(at) = vectors.next::<L>() {
+            let curve: SmallAngleCubic<L> = small_angle_cubic(
+                at.keys(0, keys),
+                at.keys(1, keys),
+                at.keys(2, keys),
+                at.keys(3, keys),
+                at.weights(0).into(),
+                at.weights(1).into(),
+            );
+            let valid = L::choose(curve.is_valid, L::all(1.0), L::all(0.0));
+            are_resolved &= !valid.any_at_most(0.0);
+            for i in 0..at.lanes.max_count {
+                at.store(i, sample(&curve, at.parameters(self.0, i)), output);
             }
         }
         are_resolved
     }
 }
 
-/// Stores the `i`th sample of each interval in the lanes from `lane` on.
-#[inline(always)]
-fn store<L: Lanes>(
-    lanes: &IntervalLanes,
-    lane: usize,
-    i: usize,
-    components: [L; 4],
-    output: &mut [[f32; 4]],
-) {
-    let rotations = L::rotations(components);
-    let first = &lanes.first[lane..lane + L::COUNT];
-    if i < lanes.min_count {
-        for (&first, rotation) in first.iter().zip(rotations.as_ref()) {
-            output[first as usize + i] = *rotation;
+/// The vectors of intervals that are still to be evaluated, and the first lane of the next.
+struct Vectors<'a>(&'a [IntervalLanes], usize);
+
+impl<'a> Vectors<'a> {
+    #[inline(always)]
+    fn next<L: Lanes>(&mut self) -> Option<VectorAt<'a>> {
+        let (lanes, rest) = self.0.split_first()?;
+        let at = VectorAt {
+            lanes,
+            lane: self.1,
+        };
+        self.1 += L::COUNT;
+        if self.1 >= lanes.used {
+            *self = Self(rest, 0);
         }
-        return;
+        Some(at)
     }
-    let counts = &lanes.count[lane..lane + L::COUNT];
-    for ((&first, &count), rotation) in first.iter().zip(counts).zip(rotations.as_ref()) {
-        if i < count as usize {
-            output[first as usize + i] = *rotation;
+}
+
+/// The intervals in the lanes from `lane` on, as many as a vector has.
+#[derive(Clone, Copy)]
+struct VectorAt<'a> {
+    lanes: &'a IntervalLanes,
+    lane: usize,
+}
+
+impl VectorAt<'_> {
+    /// The keys before, at the start, at the end and after each interval: by `end` 0 to 3.
+    #[inline(always)]
+    fn keys<L: Lanes>(self, end: usize, keys: &[[f32; 4]]) -> [L; 4] {
+        let indices = &self.lanes.keys[end][self.lane..];
+        match self.lanes.are_in_order {
+            true => L::load_rotations(&keys[indices[0] as usize..]),
+            false => L::gather_rotations(keys, indices),
+        }
+    }
+
+    /// The tangent weights at the start or at the end of each interval.
+    #[inline(always)]
+    fn weights<L: Lanes>(self, end: usize) -> [L; 4] {
+        let [before, after, outgoing, kind] = &self.lanes.weights[end];
+        [
+            L::load(&before[self.lane..]),
+            L::load(&after[self.lane..]),
+            L::load(&outgoing[self.lane..]),
+            L::load(&kind[self.lane..]),
+        ]
+    }
+
+    /// The parameter of each interval's sample `i`; any where it has fewer.
+    #[inline(always)]
+    fn parameters<L: Lanes>(self, plan: &IntervalPlan, i: usize) -> L {
+        let i = i.min(self.lanes.max_count - 1);
+        L::load(&plan.parameters[self.lanes.parameters + i][self.lane..])
+    }
+
+    /// Stores sample `i` of each interval that has as many.
+    #[inline(always)]
+    fn store<L: Lanes>(self, i: usize, components: [L; 4], output: &mut [[f32; 4]]) {
+        let rotations = L::rotations(components);
+        let first = &self.lanes.first[self.lane..self.lane + L::COUNT];
+        if i < self.lanes.min_count {
+            for (&first, rotation) in first.iter().zip(rotations.as_ref()) {
+                output[first as usize + i] = *rotation;
+            }
+            return;
+        }
+        let counts = &self.lanes.count[self.lane..self.lane + L::COUNT];
+        for ((&first, &count), rotation) in first.iter().zip(counts).zip(rotations.as_ref()) {
+            if i < count as usize {
+                output[first as usize + i] = *rotation;
+            }
         }
     }
 }

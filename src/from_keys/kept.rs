@@ -16,7 +16,8 @@ use crate::prepare::preparation::{PART_INTERVALS, Preparation};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{KEY_INNER, KeySample, PolynomialSegment, TangentWeights};
 use crate::simd::dispatch::VectorWidth;
-use crate::simd::lanes::{Lanes, MAX_LANES, Number as _, canonical};
+use crate::simd::lanes::{Lanes, MAX_LANES, Number, canonical};
+use crate::simd::together::Together;
 use crate::time::frame_clock::in_seconds;
 use crate::time::runs::Parameter;
 use crate::time::spans::SpanSource;
@@ -123,27 +124,38 @@ impl KeptKeys {
         }
     }
 
-    /// The rotations of the tracks in the lanes at a time between two of their keys, in the first elements of `output`, which
-    /// may be fewer than there are lanes.
+    /// The rotations of tracks at a time between two of their keys, of one vector of tracks or of two. The last lanes may
+    /// have no element in `output`.
     #[inline(always)]
     pub(crate) fn evaluate<L: Lanes>(
         &self,
         at: &TimeBetweenKeys,
-        tracks: &TracksInLanes,
+        tracks: &[TracksInLanes; 2],
         output: &mut [[f32; 4]],
     ) {
         if cfg!(smallest) {
             return; // no clip keeps keys there
         }
-        let mut found = [[0.0; 4]; MAX_LANES];
-        L::store_rotations(self.lanes::<L>(at, tracks), &mut found[..L::COUNT]);
-        let mut has_unresolved = false;
-        for (value, found) in output.iter_mut().zip(&found) {
-            *value = *found;
-            has_unresolved |= found[3] == 0.0;
-        }
-        if has_unresolved && self.has_rest() {
-            self.resolve(at, tracks, output);
+        let [first, second] = tracks;
+        match self.curve {
+            KeyCurve::Arcs if output.len() > L::COUNT => {
+                let found = self.on_arcs::<Together<L, 2>>(at, tracks);
+                let [of_first, of_second] = Together::rotations(found);
+                let (values, rest) = output.split_at_mut(L::COUNT);
+                L::store_rotations(of_first, values);
+                store(of_second, rest);
+            }
+            KeyCurve::Arcs => store::<L>(self.on_arcs(at, first), output),
+            _ => {
+                let vectors = output.chunks_mut(L::COUNT);
+                for (tracks, values) in [first, second].into_iter().zip(vectors) {
+                    store::<L>(self.on_cubics(at, tracks), values);
+                    // Those have components of 0, of which one is quickly compared.
+                    if values.iter().any(|value| value[3] == 0.0) {
+                        self.resolve(at, tracks, values);
+                    }
+                }
+            }
         }
     }
 
@@ -158,29 +170,29 @@ impl KeptKeys {
         }
     }
 
-    fn has_rest(&self) -> bool {
-        matches!(self.curve, KeyCurve::Cubics(_))
+    #[inline(always)]
+    fn on_arcs<N: Number>(&self, at: &TimeBetweenKeys, tracks: &impl KeysOf<N>) -> [N; 4] {
+        let key = at.key as u32;
+        let (middle, tangent) = arc_between(tracks.keys(self, key), tracks.keys(self, key + 1));
+        let parameter = N::all(at.parameter);
+        canonical(on_arc(middle, tangent, norm_squared(tangent), parameter))
     }
 
-    /// A track in each lane.
     #[inline(always)]
-    fn lanes<L: Lanes>(&self, at: &TimeBetweenKeys, tracks: &TracksInLanes) -> [L; 4] {
+    fn on_cubics<L: Lanes>(&self, at: &TimeBetweenKeys, tracks: &TracksInLanes) -> [L; 4] {
         let key = at.key as u32;
-        let from = self.keys::<L>(key, tracks);
-        let to = self.keys::<L>(key + 1, tracks);
-        let parameter = L::all(at.parameter);
-        if let KeyCurve::Arcs = self.curve {
-            let (middle, tangent) = arc_between(from, to);
-            return canonical(on_arc(middle, tangent, norm_squared(tangent), parameter));
-        }
         let [first, last] = at.weights;
         let before = key - u32::from(first.kind == KEY_INNER);
         let after = key + 1 + u32::from(last.kind == KEY_INNER);
-        let before = self.keys::<L>(before, tracks);
-        let after = self.keys::<L>(after, tracks);
-        let (first, last) = (alike::<L>(first), alike::<L>(last));
-        let curve = small_angle_cubic(before, from, to, after, first.into(), last.into());
-        sample(&curve, parameter)
+        let curve = small_angle_cubic(
+            self.keys::<L>(before, tracks),
+            self.keys(key, tracks),
+            self.keys(key + 1, tracks),
+            self.keys(after, tracks),
+            alike::<L>(first).into(),
+            alike::<L>(last).into(),
+        );
+        sample(&curve, L::all(at.parameter))
     }
 
     /// The key of each track with this index in it, with its sign for the shortest path.
@@ -201,6 +213,36 @@ impl KeptKeys {
             ];
         }
         keys
+    }
+}
+
+/// Stores the rotations of as many lanes as `output` has elements.
+#[inline(always)]
+fn store<L: Lanes>(components: [L; 4], output: &mut [[f32; 4]]) {
+    let rotations = L::rotations(components);
+    for (value, found) in output.iter_mut().zip(rotations.as_ref()) {
+        *value = *found;
+    }
+}
+
+/// Tracks whose keys are numbers of this type.
+trait KeysOf<N> {
+    /// As [`KeptKeys::keys`].
+    fn keys(&self, kept: &KeptKeys, key: u32) -> [N; 4];
+}
+
+impl<L: Lanes> KeysOf<L> for TracksInLanes {
+    #[inline(always)]
+    fn keys(&self, kept: &KeptKeys, key: u32) -> [L; 4] {
+        kept.keys(key, self)
+    }
+}
+
+impl<L: Lanes> KeysOf<Together<L, 2>> for [TracksInLanes; 2] {
+    #[inline(always)]
+    fn keys(&self, kept: &KeptKeys, key: u32) -> [Together<L, 2>; 4] {
+        let [a, b] = self;
+        Together::of_rotations(kept.keys(key, a), kept.keys(key, b))
     }
 }
 

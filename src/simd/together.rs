@@ -80,6 +80,28 @@ impl<L: Lanes, const VECTORS: usize> Number for Together<L, VECTORS> {
     }
 }
 
+impl<L: Lanes> Together<L, 2> {
+    /// From the components of two vectors of rotations, `x y z w` each.
+    #[inline(always)]
+    pub(crate) fn of_rotations(a: [L; 4], b: [L; 4]) -> [Self; 4] {
+        [
+            Self([a[0], b[0]]),
+            Self([a[1], b[1]]),
+            Self([a[2], b[2]]),
+            Self([a[3], b[3]]),
+        ]
+    }
+
+    /// The components of the two vectors of rotations.
+    #[inline(always)]
+    pub(crate) fn rotations([x, y, z, w]: [Self; 4]) -> [[L; 4]; 2] {
+        [
+            [x.0[0], y.0[0], z.0[0], w.0[0]],
+            [x.0[1], y.0[1], z.0[1], w.0[1]],
+        ]
+    }
+}
+
 impl<L: Lanes, const VECTORS: usize> Together<L, VECTORS> {
     /// `then` where a number is `value`, else `otherwise`.
     #[inline(always)]

@@ -49,7 +49,57 @@ pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     } else if contains(near + 1) {
         near + 1
     } else {
-        let behind = starts.partition_point(|&start| start <= time);
-        behind.saturating_sub(1)
+        // Most keys are even: the interval in which the time is if all are. Rounding may give the one beside it.
+        let guess = even_interval(starts, time);
+        if contains(guess) {
+            guess
+        } else if contains(guess + 1) {
+            guess + 1
+        } else {
+            let behind = starts.partition_point(|&start| start <= time);
+            behind.saturating_sub(1)
+        }
+    }
+}
+
+/// The interval that would contain a time if all were equally long.
+#[inline(always)]
+fn even_interval(starts: &[f64], time: f64) -> usize {
+    let (Some(first), Some(last)) = (starts.first(), starts.last()) else {
+        return 0;
+    };
+    let intervals = starts.len() - 1;
+    let passed = (time - first) / (last - first) * intervals as f64;
+    // The cast takes what is not finite, and times outside, to the ends.
+    (passed as usize).min(intervals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Catches a guess that is taken where the time is in another interval: even keys, uneven ones, a single one, and
+    /// times on, between, before and after them, from any interval.
+    #[test]
+    fn the_interval_of_a_time_is_found_from_anywhere() {
+        let even: Vec<f64> = (0..50).map(|key| 0.1 + f64::from(key) / 30.0).collect();
+        let uneven: Vec<f64> = (0..50).map(|key| f64::from(key * key)).collect();
+        let one_gap: Vec<f64> = (0..50)
+            .map(|key| f64::from(key + 1000 * (key / 25)))
+            .collect();
+        for starts in [even, uneven, one_gap, vec![2.0], vec![-f64::MAX, f64::MAX]] {
+            let beside = |time: f64| [time.next_down(), time, time.next_up(), time + 0.01];
+            for time in starts.iter().copied().flat_map(beside) {
+                let expected = starts.iter().rposition(|&start| start <= time);
+                for near in 0..=starts.len() {
+                    let found = interval_at(&starts, time, near);
+                    assert_eq!(
+                        found,
+                        expected.unwrap_or(0),
+                        "{time} of {starts:?} from {near}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -13,7 +13,7 @@ use bytemuck::Zeroable as _;
 use glam::{Quat, Vec4};
 
 use crate::checks::check_rows;
-use crate::cpu::evaluate::at_parameter;
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, at_parameter};
 use crate::curve::options::{Ends, Quantity};
 use crate::error::Error;
 use crate::evaluate::uploaded::ClipSource;
@@ -579,12 +579,14 @@ impl InLanesInto<(), [[f32; 4]]> for TracksAtCursor<'_> {
             self.one_by_one(group, self.parts, output);
             return;
         }
-        let mut parts = self.parts.chunks_exact(L::COUNT);
-        let (whole, rest) = output.split_at_mut(output.len() - parts.remainder().len());
-        for (parts, values) in (&mut parts).zip(whole.chunks_exact_mut(L::COUNT)) {
+        let chunks = self.parts.chunks(L::COUNT);
+        for (parts, values) in chunks.zip(output.chunks_mut(L::COUNT)) {
+            if parts.len() <= SAMPLES_ONE_BY_ONE {
+                self.one_by_one(group, parts, values);
+                continue;
+            }
             self.arcs::<L>(group, parts, values);
         }
-        self.one_by_one(group, parts.remainder(), rest);
     }
 }
 
@@ -603,7 +605,7 @@ impl TracksAtCursor<'_> {
         }
     }
 
-    /// A lane for each track, if all are on arcs.
+    /// A lane for each track, if all are on arcs. Lanes that stay unused have the arc of the first.
     #[inline(always)]
     fn arcs<L: Lanes>(
         &self,
@@ -615,9 +617,11 @@ impl TracksAtCursor<'_> {
         // A middle and a tangent each.
         let rotations: &[[f32; 4]] = bytemuck::cast_slice(group.arcs());
         let (mut middles, mut tangents) = ([0; MAX_LANES], [0; MAX_LANES]);
-        for (part, (middle, tangent)) in parts.iter().zip(middles.iter_mut().zip(&mut tangents)) {
-            let SpanSource::Segment(index) = spans.sources[part.first_span + self.cursor.span]
-            else {
+        let lanes = middles[..L::COUNT].iter_mut().zip(&mut tangents);
+        for (lane, (middle, tangent)) in lanes.enumerate() {
+            let part = parts.get(lane).unwrap_or(&parts[0]);
+            let source = spans.sources[part.first_span + self.cursor.span];
+            let SpanSource::Segment(index) = source else {
                 return self.one_by_one(group, parts, output);
             };
             (*middle, *tangent) = (2 * index, 2 * index + 1);
@@ -627,7 +631,10 @@ impl TracksAtCursor<'_> {
         let seconds = self.time - self.cursor.start;
         let parameter = L::all(self.cursor.in_seconds.parameter(seconds));
         let found = on_arc(middle, tangent, norm_squared(tangent), parameter);
-        L::store_rotations(canonical(found), output);
+        let rotations = L::rotations(canonical(found));
+        for (value, found) in output.iter_mut().zip(rotations.as_ref()) {
+            *value = *found;
+        }
     }
 }
 
@@ -654,12 +661,14 @@ fn pose_of_keys<L: Lanes>(
         return;
     }
     let at = cursor.between_keys(time);
-    let chunks = parts.chunks(L::COUNT);
-    for (parts, values) in chunks.zip(output.chunks_mut(L::COUNT)) {
-        let mut tracks = TracksInLanes::zeroed();
-        for (lane, part) in parts.iter().enumerate() {
-            tracks.indices[lane] = part.track;
-            tracks.first_keys[lane] = part.first_span as u32;
+    let chunks = parts.chunks(2 * L::COUNT);
+    for (parts, values) in chunks.zip(output.chunks_mut(2 * L::COUNT)) {
+        let mut tracks = [TracksInLanes::zeroed(), TracksInLanes::zeroed()];
+        for (tracks, parts) in tracks.iter_mut().zip(parts.chunks(L::COUNT)) {
+            for (lane, part) in parts.iter().enumerate() {
+                tracks.indices[lane] = part.track;
+                tracks.first_keys[lane] = part.first_span as u32;
+            }
         }
         keys.evaluate::<L>(&at, &tracks, values);
     }
