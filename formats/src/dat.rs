@@ -302,7 +302,7 @@ impl DatKeys {
         }
         let gap = time - previous;
         if !(1e-9..=1e9).contains(&gap) {
-            let message = format!("{gap:e} s since the key before; are the times seconds?");
+            let message = format!("{gap} s since the previous key; are the times seconds?");
             lines.warn(1, Code::Gap, message);
         }
         Ok(())
@@ -369,7 +369,7 @@ impl DatKeys {
             lines.warn(1, Code::OneKey, "only one key; nothing moves");
         }
         if self.total >= 8 && self.w_last == self.total {
-            let message = "every quaternion is near 0 … 1 from left to right: is w the last column? \
+            let message = "in every quaternion the first number is near 0 and the last near 1: is w the last column? \
                            this format has w first";
             lines.warn(1, Code::Order, message);
         }

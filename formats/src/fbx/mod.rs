@@ -209,7 +209,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
             ErrorType::OutOfMemory | ErrorType::MemoryLimit | ErrorType::AllocationLimit => (
                 Code::Memory,
                 format!(
-                    "reading it takes more than the {half} bytes that an input of this length gets"
+                    "reading it takes more than {half} bytes, the limit for an input of this length"
                 ),
             ),
             ErrorType::NodeDepthLimit => (

@@ -221,15 +221,15 @@ fn loss(
             clip.channels
                 .iter()
                 .any(|channels| channels.has(ChannelInterpolation::Step)),
-            "that channels hold each key until the next one",
+            "the steps of channels, which keep each key until the next one",
         ),
         Feature::Lines => (
             are_keys(sampled) && bends_by(clip, Some(ChannelInterpolation::Linear)),
-            "that lines and arcs join the keys (evaluate them with the method slerp)",
+            "the lines and arcs between the keys (evaluate the result with the method slerp)",
         ),
         Feature::Curves => (
             are_keys(sampled) && bends_by(clip, None),
-            "that smooth curves join the keys (lines and arcs join them there; more frames are nearer to the curves)",
+            "the smooth curves between the keys (it has lines and arcs; with more frames they are nearer to the curves)",
         ),
         Feature::Bvh => (
             !clip.written_joints.is_empty() && !clip.is_world,

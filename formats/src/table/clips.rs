@@ -46,7 +46,7 @@ pub(crate) fn clips(
     if let Some(columns) = plan.left_out(table) {
         warnings.warn(Code::ColumnsLeftOut, || {
             let message = format!(
-                "left out, because nothing says that they are keys: {columns}; name the keys with --map"
+                "columns with unknown names are left out: {columns}; if they are keys, name them with --map"
             );
             (None, message)
         });

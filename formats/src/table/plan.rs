@@ -296,7 +296,7 @@ impl ColumnNames<'_> {
         for ((cell, found), name) in cells.iter_mut().zip(found).zip(&names) {
             let Some(index) = found else {
                 let message = format!(
-                    "there is no column `{name}` beside the others of {}; there are {}",
+                    "column `{name}` is missing: {} belong together; there are {}",
                     names.join(", "),
                     self.list()
                 );

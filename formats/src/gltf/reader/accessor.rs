@@ -268,7 +268,7 @@ impl<'a> GltfReader<'a> {
             let count = numbers.len() / width;
             if index >= count || before.is_some_and(|before| index <= before) {
                 let message = format!(
-                    "index {index} of {count} elements; indices must increase and be less than that"
+                    "index {index} of {count} elements; indices must increase and be less than {count}"
                 );
                 return Err(refuse(message));
             }

@@ -87,8 +87,8 @@ pub enum ReduceMotionError {
     },
     /// A bound is smaller than the precision with which keys are stored.
     #[error(
-        "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \
-         {kept}: give a larger one"
+        "even with all samples as keys the error is {found:.3e} {unit}, and the bound is {bound:.3e}; keys are \
+         {kept}: give a larger bound"
     )]
     TooSmall {
         /// The largest error with all samples as keys.

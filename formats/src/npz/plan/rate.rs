@@ -81,7 +81,7 @@ impl ArchivePlan {
         }
         self.two_rates.get_or_insert_with(|| {
             format!(
-                "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
+                "the file states {rate} frames a second, but by `{name}` {} frames last {seconds} s, which is \
                  {by_length:.3} a second; the first is used, --override-fps replaces it",
                 self.frames
             )
@@ -146,7 +146,7 @@ impl ArchivePlan {
                 };
             } else if let Some(other) = options.source_rate.filter(is_other) {
                 self.two_rates = Some(format!(
-                    "the file says {rate} frames a second, which is used; --source-fps {other} is for files that say \
+                    "the file states {rate} frames a second, which is used; --source-fps {other} is for files that state \
                      none, --override-fps replaces a rate"
                 ));
             }
@@ -215,7 +215,7 @@ impl ArchivePlan {
         };
         if let (Some(first), None, Some(found), false) = (self.rate, said, found, ends_between) {
             self.two_rates = Some(format!(
-                "the file says {first} frames a second, and its times lie at {found}; the times are used"
+                "the file states {first} frames a second, but its times have {found}; the times are used"
             ));
         }
         self.rate = said.or(found);
