@@ -313,7 +313,7 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
     times.sort_by(f64::total_cmp);
     times.dedup();
     if let [time] = times[..] {
-        // A single time tells no rate, but it may be a frame of a usual one.
+        // A single time does not determine a rate, but it may be at a frame of a usual rate.
         let off = precision.rounding(time);
         let (from, to) = (time - off, time + off);
         let grid = on_common_grid(&[TimeWindow { from, to }]).filter(|_| time != 0.0)?;

@@ -47,7 +47,7 @@ pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     count: usize,
     lines: StreamingLines<'_>,
 ) {
-    // The evaluation starts where the line does; the rotations that are there already stay.
+    // Evaluation starts at the beginning of the cache line. The rotations that are already in the line are kept.
     let (_, there) = lines.begun;
     let (first, count) = (first - there as f32, there + count);
     frames_in_vectors::<L, S>(segment, affine, first, count, lines);

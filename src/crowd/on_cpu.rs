@@ -121,7 +121,7 @@ fn matrices(
     let (matrices, _) = output.as_chunks_mut::<3>();
     for step in FrameStep::of(scene.values.into()) {
         match step {
-            // They are there.
+            // The caller has computed these steps already.
             FrameStep::Positions | FrameStep::Rotations => {}
             FrameStep::Locals => {
                 for ((joint, &rotation), matrix) in (0..).zip(found).zip(&mut *matrices) {

@@ -91,7 +91,8 @@ impl InLanes for NearBlocks<'_> {
     #[inline(always)]
     #[allow(clippy::disallowed_methods)] // the length of a sum, with room for its rounding
     fn run<L: Lanes>(&mut self) {
-        // Each block with the rotation behind it, with which the next one begins.
+        // A block is read with the first rotation of the next block, because signs are compared with the next
+        // rotation.
         while let Some(block) = self
             .rotations
             .get(self.count * BLOCK..)

@@ -125,7 +125,8 @@ fn prepare(
             preparation.only_for(timeline, set);
         }
         let keys = match &batch {
-            // As many as have a sample; these lists are not kept.
+            // The number of segments is not known: only intervals with a sample are prepared. These lists are
+            // discarded, so nothing is reserved.
             Batch::Intervals { .. } if preparation.leaves_intervals_out() => 0,
             batch => batch.keys(set),
         };

@@ -64,7 +64,7 @@ fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
 
 /// Whether the curve stays near to all samples without this key.
 fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
-    // One key more on each side than the curve that changes: its tangents depend on those.
+    // One key more on each side than the changed part of the curve, because its tangents depend on these keys.
     let first = key.saturating_sub(REACH + 1);
     let end = (key + REACH + 2).min(keys.len());
     let kept: Vec<usize> = (first..end)
@@ -93,7 +93,7 @@ impl<T: Value> ReductionTask<'_, T> {
             for i in keys[interval] + 1..keys[interval + 1] {
                 let apart = self.samples[i].apart(curve(self.times[i]));
                 let part = match apart <= self.tolerance {
-                    // Also where both are 0.
+                    // `min` also turns 0 / 0, which is NaN, into 1.
                     true => (apart / self.tolerance).min(1.0),
                     // NaN is not near.
                     false => (apart / self.tolerance).max(1.0).next_up(),

@@ -84,7 +84,7 @@ impl HandleRule {
         let whole = logarithm(track.difference(i));
         let at_end = |other: DVec3, clamped: Option<DVec3>, rest: DQuat| match (ends, clamped) {
             (Ends::Secant, _) => (self.by_rate)(whole, whole),
-            // Half of the angle that the end turns by in the whole interval.
+            // Half of the angle by which the velocity at the end rotates in the whole interval.
             (_, Some(velocity)) => (self.by_rate)(velocity / 2.0 * track.step(i), whole),
             (Ends::Natural, None) => (self.natural)(logarithm(rest), other),
             _ => (self.parabolic)(whole, other),

@@ -490,7 +490,7 @@ mod tests {
         let unnamed = |count: usize| Joints::named(vec![""; count]);
         assert_eq!(unnamed(2).order_of(&unnamed(2), LABELS).unwrap(), [0, 1]);
         refused(&unnamed(2), &unnamed(3), "b: 3 tracks; a has 2 joints");
-        // Files that need names write these.
+        // Formats that require names write these for joints without names.
         let written = Joints::named(["box2", "box1"]);
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
         let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);

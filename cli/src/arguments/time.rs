@@ -521,7 +521,8 @@ impl SampleChoice {
             } => return in_frames(rate.of(clip), [*start, *end], clip, outside, name),
             Self::Times(times) => at(times.iter().map(|&time| clip.time_in_set(time)).collect()),
             Self::Keys(keys) => {
-                // Each clip has its own time offset, in whole seconds.
+                // The times of another clip are relative to its time offset, so they are shifted to the offset of
+                // this clip.
                 let shift = (keys.from - clip.time_offset) as f64;
                 let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
                 let common = outside.check_common(&times, clip);

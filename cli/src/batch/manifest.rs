@@ -255,7 +255,7 @@ impl Manifest {
         let is_orphan = |entry: &ManifestEntry| {
             let whole = entry.whole().0;
             if self.complete.contains(whole) {
-                // Of a file that had several clips, and has one now.
+                // The file had several clips before, and has one now.
                 return entry.output != whole && self.previous.contains_key(whole);
             }
             match self.planned.contains(whole) {

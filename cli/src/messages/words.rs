@@ -120,7 +120,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
         let message = reason(info.payload());
-        // A library's, on broken bytes, which becomes a message about the input.
+        // A panic of a library on damaged bytes, which is reported as an error of the input.
         if is_guarded() {
             return;
         }

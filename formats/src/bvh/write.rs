@@ -231,7 +231,7 @@ fn node(
     let is_moved = is_root || (0..3).any(moves);
     let has_rest = (has_positions(&channels) || is_moved) && !clip.skeleton.is_empty();
     let offset = if has_rest { rest } else { first };
-    // Coordinates that the file's channels leave to the OFFSET, and that are others now.
+    // Coordinates without a channel in the file, whose OFFSET is no longer right.
     let is_missing = |axis: &usize| {
         !channels.contains(&WrittenChannel::Position(*axis))
             && (is_root || moves(*axis) || first[*axis] != offset[*axis])

@@ -256,7 +256,7 @@ impl ChannelFollower<'_> {
 
     fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
-        // The arc of half a turn may go either way.
+        // Near half a turn, the direction of the arc is not determined, so this is not a line.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Ok(false);
         }

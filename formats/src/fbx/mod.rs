@@ -157,7 +157,7 @@ pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loade
     for stack in 0..scene.anim_stacks.len() {
         match reader.clip(stack, &mut warnings) {
             Ok(clip) => loaded.clips.push(clip),
-            // The others would be refused too.
+            // The limit applies to the whole file, so the other stacks would be refused too.
             Err(fault) if [Code::Memory, Code::FbxWork].contains(&fault.code) => return Err(fault),
             Err(fault) => loaded.refused.push(fault),
         }

@@ -241,7 +241,7 @@ impl GltfDocument {
             check_length(&json, bytes as u64)?;
             self.container.write_glb(&text, bin.as_deref(), out)?;
         }
-        // Whatever else is remarkable was said when the file was read.
+        // All other warnings were already reported when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
         warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
         Ok(warnings)

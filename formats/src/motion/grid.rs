@@ -106,7 +106,7 @@ mod tests {
         let mut lists = vec![times.clone(), vec![0.25, 0.5]];
         assert_eq!(restore(&mut lists, Precision::F32), None);
         assert_eq!(lists, [times, vec![0.25, 0.5]]);
-        // A day in, an f32 is 7.8 ms wide: it says nothing about a rate.
+        // After a day, the steps of f32 are 7.8 ms, too large to determine a rate.
         let late = vec![vec![86_400.0, 86_400.039]];
         assert_eq!(restore(&mut late.clone(), Precision::F32), None);
         assert_eq!(restore(&mut [vec![0.0]], Precision::F64), None);

@@ -95,7 +95,7 @@ impl Origin<'_> {
             return Ok(None);
         }
         let mut kept: Vec<usize> = Vec::with_capacity(times.len());
-        // Whether the key before the last one that stays was moved from the same time.
+        // Whether the last kept key is the second of a jump: the key before it was moved away from the same time.
         let mut jumps = false;
         for key in 0..times.len() {
             let time = times[key];

@@ -243,7 +243,7 @@ impl ChannelMethods {
             if methods[..first].contains(&method) {
                 continue;
             }
-            // Those that have this method, as a set of their own.
+            // The scalars with this method are evaluated together, as a separate set.
             let of_method: Vec<usize> = (first..count)
                 .filter(|&index| methods[index] == method)
                 .collect();

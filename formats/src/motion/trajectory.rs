@@ -351,7 +351,7 @@ fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
     for (index, row) in vectors.iter_mut().enumerate() {
         row[index] = 1.0;
     }
-    // Each round squares what is off the diagonal; six are enough for f64.
+    // Each round squares the elements off the diagonal; six rounds are enough for f64.
     for _ in 0..16 {
         for p in 0..3 {
             for q in p + 1..4 {

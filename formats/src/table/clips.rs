@@ -444,7 +444,7 @@ impl TableClip<'_> {
         keys: &mut [RowKeys],
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
-        // The list whose times were found to increase.
+        // The last list whose times are known to increase, so that it is not checked again.
         let mut increases = None;
         for (track, keys) in keys.iter_mut().enumerate() {
             let list = shared.tracks[track].list;

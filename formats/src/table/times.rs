@@ -109,7 +109,8 @@ pub(crate) fn times(
             })
         }
         ColumnValues::Numbers(ColumnNumbers::Whole(times)) => {
-            // Text does not tell 2 from 2.0: small whole numbers are seconds there.
+            // In text, 2 may mean 2.0, so small whole numbers are seconds. In binary files, whole numbers need a
+            // unit.
             let small = times
                 .iter()
                 .all(|time| (time.unsigned_abs() as f64) < LARGEST_SECONDS);

@@ -86,7 +86,7 @@ impl KeyFit<5> for Halves {
         };
         let ends = [RangeEnd::new(end, backward[2], HALF.slope), seam];
         sample(samples, &LAST_HALF, middle, ends);
-        // The parameter runs backwards there.
+        // In the second half, the parameter runs backwards, so odd parts change their sign.
         for odd in samples.odd.as_flattened_mut() {
             *odd = -*odd;
         }

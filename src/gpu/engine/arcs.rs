@@ -80,7 +80,7 @@ impl VulkanEngine {
             let push = ArcsDispatch { count };
             work.recording.dispatch(set, &push, workgroups(count));
         }
-        // Whatever is submitted later, an application's work too, sees the arcs.
+        // All work that is submitted later sees the arcs, also an application's work.
         work.recording.publish();
         work.bind(|kernel| self.pipeline(kernel))?;
         submission.run()?;

@@ -476,7 +476,8 @@ impl Bench<'_> {
         let mut left = rules::halve(variants.len(), FINALISTS, &mut |index, rows| {
             self.row(dispatch(index), between, rows)
         })?;
-        // A rule asks for the one that differs from today's in its stores alone.
+        // The rule about stores needs the variant that differs from the engine's only in its stores, so it is never
+        // left out.
         let cached = variants[0].cached();
         let cached = variants.iter().position(|variant| *variant == cached);
         left.extend(cached.filter(|index| !left.contains(index)));

@@ -382,7 +382,7 @@ impl EvaluationJob<'_> {
 impl EvaluationJob<'_> {
     /// Whether the result is the input's file with other keys.
     fn is_baked(&self, target: &ResultTarget) -> bool {
-        // Some tracks alone are another file.
+        // With --tracks, the result is a new file.
         self.arguments.output.is_rotations()
             && !self.arguments.command_line.has("tracks")
             && self.keeps(target)

@@ -281,7 +281,7 @@ impl Arguments {
             None => clip,
         };
         let times = SampleTimes::at(clip.key_times());
-        // The samples and the poses of the input and of the result.
+        // Memory for the samples and the poses of the input and of the result.
         room::in_memory(name, &clip.set, &times, 14)?;
         let options = ReduceOptions {
             curve: self.method,
