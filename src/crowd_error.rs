@@ -253,7 +253,7 @@ impl From<SetError> for CrowdError {
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
             SetError::Threads(error) => Self::Threads(error),
             SetError::Stopped(stopped) => Self::Stopped(stopped),
-            // No frames are asked for when a clip is prepared.
+            // Cannot happen: preparing a clip requests no frames.
             SetError::Frames(_) => Self::TooLarge,
         }
     }

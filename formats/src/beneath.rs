@@ -139,7 +139,7 @@ fn open_by_steps(folder: &Path, name: &Path) -> io::Result<File> {
     if found.is_symlink() {
         return Err(leads_out());
     }
-    // Looked at before it is opened: opening a pipe waits for its writer.
+    // The type is checked before opening, because opening a pipe waits for its writer.
     if !found.is_file() {
         return Err(no_file());
     }

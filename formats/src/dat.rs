@@ -228,7 +228,7 @@ impl DatKeys {
             lines.warn(1, Code::BlankLine, message);
         }
         self.read_numbers(lines, line).or_else(|error| {
-            // A fault of the whole line explains more.
+            // A wrong number of columns is reported first, because it explains more.
             self.check_columns(lines, line)?;
             Err(error)
         })

@@ -441,7 +441,7 @@ fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
         let (from, to) = (time - off, time + off);
         match all.last_mut() {
             Some(last) if from <= last.to => {
-                // Two roundings of one time.
+                // Two rounded values of the same time: the true time is in both windows.
                 (last.from, last.to) = (last.from.max(from), last.to.min(to));
             }
             _ => all.push(TimeWindow { from, to }),
@@ -496,7 +496,7 @@ impl StepRates {
             counts: Vec::with_capacity(windows.len()),
             ..*self
         };
-        // Those near 0 tell how to count the others.
+        // Times near 0 are assigned to frames first, because they determine how the others are counted.
         let mut order: Vec<usize> = (0..windows.len()).collect();
         let near = |index: usize| windows[index].middle().abs();
         order.sort_by(|&a, &b| near(a).total_cmp(&near(b)));

@@ -169,7 +169,7 @@ struct ListedDistances<'a, S>(&'a [f32], PhantomData<S>);
 impl<L: Lanes, S: Evaluate> Distances<L> for ListedDistances<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        // The loop asks for parameters after its last iteration; their values do not count.
+        // The pipelined loop also reads parameters after its last iteration; their values have no effect.
         let Some((vector, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
             return L::all(0.0);
         };

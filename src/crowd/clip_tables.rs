@@ -153,7 +153,7 @@ impl ClipTables {
         if interpolation.quantity != Quantity::Rotation {
             return Err(CrowdError::NotRotations);
         }
-        // Instances say how they go on.
+        // The wrap mode is a property of the instances.
         (interpolation.before, interpolation.after) = (WrapMode::Hold, WrapMode::Hold);
         let joints = offsets.len();
         let (start, end) = set.time_span().unwrap_or((0.0, 0.0));
@@ -282,7 +282,7 @@ impl ClipTables {
             sides.entry(side).or_default().push((index, curve));
         }
         if self.bases.len() == first_base {
-            // Entries always stand somewhere.
+            // Every entry needs a time base, so there is always one.
             self.push_base(&[CrowdSpan::zeroed()]);
         }
         let first_channel = self.channels.len();

@@ -99,7 +99,7 @@ impl InLanes for InstancesTask<'_, '_> {
         let (found, layered) = self.rotations.split_at_mut(scene.library.joint_count());
         for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
             let is_all = scene.values == CrowdValues::Rotations;
-            // One call: its many instructions are compiled where it stands.
+            // A single call for both cases, because the function is inlined and has many instructions.
             let into = if is_all { &mut *output } else { &mut *found };
             rotations::<L>(&context, tables, instance, layered, into);
             if !is_all {

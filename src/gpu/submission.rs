@@ -309,8 +309,8 @@ impl Semaphore {
 impl Drop for Semaphore {
     fn drop(&mut self) {
         if self.device.may_destroy() {
-            // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
-            // semaphores let go of them a moment after they signal the fence.
+            // A fence shows that the copy has ended. But Mesa's drivers that emulate timeline semaphores still use
+            // them for a moment after they signal the fence.
             if !self.is_exported {
                 self.device.settle(); // timelines that can be exported are no such
             }

@@ -35,7 +35,7 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
 pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     let after = rotations.get(tracks..).unwrap_or_default();
     if tracks != 1 {
-        // Without a branch for each: lists are long, and seldom jump.
+        // No branch for each rotation, because lists are long and signs seldom change.
         let mut blocks = rotations.chunks(BLOCK).zip(after.chunks(BLOCK));
         return blocks.any(|(before, after)| jump(before, after));
     }
@@ -99,7 +99,7 @@ impl InLanes for NearBlocks<'_> {
             .and_then(|rest| rest.first_chunk::<{ BLOCK + 1 }>())
         {
             let components: &[f32] = bytemuck::cast_slice(&block[..BLOCK]);
-            // Those of four rotations side by side.
+            // The sums of four rotations side by side.
             let mut sums = [0.0; 16];
             for next in components.as_chunks::<16>().0 {
                 for (sum, component) in sums.iter_mut().zip(next) {

@@ -134,7 +134,7 @@ fn prepare(
         stop::during(stop.clone(), || {
             preparation.push(&mut prepared, set, batch.intervals(set))
         })?;
-        // A part's track counts from the first of the tracks asked for.
+        // The track of a part is relative to the first requested track.
         for part in &mut prepared.parts {
             part.track -= first_track;
         }
@@ -194,7 +194,7 @@ impl ClipData {
             (Channel::Scale, ScalarQuantity::Value) => Vec3::ONE,
             _ => Vec3::ZERO,
         };
-        // Where a track without vectors is held.
+        // A track without vectors gets a single key, which is held.
         let still = VectorTrack {
             times: vec![0.0],
             keys: vec![rest],

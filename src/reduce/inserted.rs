@@ -53,7 +53,7 @@ fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
             if can_miss(&indices, i, worst_of_each) {
                 indices.remove(i);
             }
-            // Behind a key that is out the next one stays for this round.
+            // After a removed key, the next key is kept in this round.
             i += 1;
         }
         if indices.len() == before {
@@ -71,7 +71,7 @@ fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
         .filter(|&k| k != key)
         .map(|k| keys[k])
         .collect();
-    // Cut ends are not those of the curve, and their intervals do not change.
+    // The ends of this part are not ends of the whole curve; the intervals there do not change.
     let skipped = usize::from(first > 0);
     let count = kept.len() - 1 - usize::from(end < keys.len());
     worst_of_each(&kept, skipped..count)

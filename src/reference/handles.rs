@@ -221,7 +221,8 @@ pub(crate) const SHOEMAKE: Definition = by_handles!(
     HandleRule {
         parabolic: |whole, other| {
             let handle: DVec3 = 2.0 * whole - other;
-            // No arc leads to the opposite of a quaternion more than any other: the rotation itself then.
+            // Opposite quaternions are the same rotation and determine no arc between them, so the handle is the
+            // rotation itself.
             match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs()
                 < 1e-5
             {

@@ -63,7 +63,7 @@ pub fn round(
     seed: u64,
     number: u64,
 ) -> Result<RandomRound, GoldenError> {
-    // Neighbouring seeds and rounds have nothing in common.
+    // Mixed, so that neighbouring seeds and rounds give unrelated sequences.
     let mut random =
         SeededRandom(seed.rotate_left(32) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     random.next();

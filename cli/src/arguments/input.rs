@@ -329,7 +329,7 @@ impl UnreadFiles {
 
     fn add(&mut self, path: &Path) {
         let name = path.file_name().unwrap_or_default();
-        // The manifest of a directory of results is a file of Tumble's.
+        // Skip the manifest of a directory of results: it is not an input.
         if name == entry::NAME {
             return;
         }
@@ -602,7 +602,7 @@ impl GatheredInputs {
             false => matches(path),
         };
         self.many |= !matching.is_empty();
-        // Opening a file that is not there reports it.
+        // A file that does not exist is reported when it is opened.
         let all = match matching.is_empty() {
             true => alone(),
             false => matching,

@@ -299,7 +299,7 @@ impl ResultDescription<'_> {
 }
 
 fn sequence(result: &ResultDescription<'_>) -> Option<String> {
-    // Files of angles have them whatever `--quantity` is (BVH).
+    // BVH stores Euler angles, whatever `--quantity` is.
     let is_angles = result.kind.is_clip() && result.format.takes(FormatOption::Sequence);
     let applies = result.output.is_euler() || is_angles;
     result.unless(applies, "sequence", "--quantity euler, or BVH")

@@ -561,7 +561,8 @@ pub(crate) fn in_frames(
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // With an explicit option the user knows what tracks do there; `kept` prints how many times are left out.
+    // With an explicit option the user has chosen what happens outside the keys, so there is no warning; `kept`
+    // prints how many times are left out.
     let [is_default_before, is_default_after] = outside.is_default();
     if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =

@@ -184,7 +184,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     missing.extend(unfinished(&lines));
     if !missing.is_empty() {
         let missing = missing.join(", ");
-        // Without its first line a manifest is no longer taken for one.
+        // A manifest is recognised by its first line.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
         let remedy = match is_known {
             true if lines.damaged > 0 => {

@@ -114,7 +114,7 @@ impl<R: BufRead> Parser<'_, R> {
             let message = "the file ends without MOTION; is it truncated?".to_owned();
             return Err(self.lines.refuse_end(Code::BvhMotion, message));
         };
-        // The joint that the word stands in; an End Site holds an OFFSET and nothing else.
+        // The joint that contains the word. An End Site contains only an OFFSET.
         let block = self.open.last();
         let (in_joint, outside) = (block.is_some_and(|b| b.joint.is_some()), block.is_none());
         match word.text.to_ascii_uppercase().as_str() {

@@ -258,7 +258,7 @@ fn node(
     }
     let is_partial = written.is_some() && file_axes.len() < 3;
     if sequence.is_some() || !is_partial || uses_other_axes(sampled, track, axes, &file_axes) {
-        // All three, where the file's first rotation is.
+        // All three rotation channels are written at the position of the file's first one.
         let is_rotation = |channel: &WrittenChannel| matches!(channel, WrittenChannel::Rotation(_));
         let first_rotation = channels.iter().position(is_rotation);
         let is_sorted = file_axes == axes;

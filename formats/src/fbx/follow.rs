@@ -300,7 +300,8 @@ impl ChannelFollower<'_> {
             };
             open.push(*piece);
             while let Some(mut piece) = open.pop() {
-                // A cut lies on the other side of 0 from the curve before.
+                // The two halves of a divided interval may have the opposite sign of the curve before, so the sign is
+                // continued from the last key.
                 let last = keys.len() - 1;
                 piece = self.after(piece, keys[last].1);
                 let cubic = Cubic::through(piece.ends, piece.thirds);

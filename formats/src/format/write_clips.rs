@@ -88,7 +88,7 @@ pub(crate) fn no_offsets(clip: &Motion, options: &MotionOptions) -> Option<Diagn
 
 /// Refuses samples whose times do not increase: no reader of clips takes such a file.
 pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
-    // Where a clip's keys are written, the samples are none.
+    // If keys are written instead of samples, `sampled.times` is empty.
     let mut pairs = sampled.times.windows(2).filter(|_| !sampled.is_at_keys);
     let Some(sample) = pairs.position(|pair| pair[1] <= pair[0]) else {
         return Ok(());

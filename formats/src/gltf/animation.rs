@@ -80,7 +80,7 @@ pub(super) fn read(
     let mut keys: Vec<ChannelKeys> = Vec::new();
     let mut borrowed = Vec::new();
     for moved in &moved {
-        // Until the set has them, keys are there twice.
+        // Keys are in memory twice until they are moved into the set.
         let count = times[&moved.sampler.input].len();
         borrowed.push(reader.borrow(count, moved.key_bytes(), &pointer)?);
         reader.take(count, moved.key_bytes(), &pointer)?;

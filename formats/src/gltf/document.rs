@@ -69,8 +69,8 @@ impl Document for GltfDocument {
         let start = (first * rate.per_second()).floor() as i64;
         let end = (last * rate.per_second()).ceil() as i64;
         let time = |frame: i64| rate.time_of(frame.unsigned_abs()) * frame.signum() as f64;
-        // The ends are given as they are, and stand for the frames that they were rounded from:
-        // within an ulp, where frames are much longer (see `grid`).
+        // The ends are exact times, but they may have been rounded from frames. If frames are much longer than
+        // rounding, an ulp is tolerated (see `grid`).
         let near = if spacing * rate.per_second() < 0.01 {
             1.0
         } else {

@@ -35,7 +35,7 @@ pub(super) fn buffers<'a>(
         let buffer: Buffer<'_> = json.typed(raw, &pointer)?;
         let found = match &buffer.uri {
             Some(_) => stays_outside(reader, reader.buffer(index, &pointer)),
-            // A buffer without bytes: it stands for the data that meshopt decodes.
+            // A fallback buffer of meshopt: it has no bytes, only the length of the decoded data.
             None => None,
         };
         let Some(found) = found else {

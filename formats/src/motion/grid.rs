@@ -17,7 +17,8 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
         let found =
             common.or_else(|| of(&RateSource::Times(std::slice::from_ref(list), precision)));
         let Some(found) = found else { continue };
-        // Frames that count from a first time somewhere are no nearer than those that f64 has already.
+        // For frames relative to an arbitrary first time, the exact time is not nearer than the f64 time, so such
+        // times are kept.
         let was_rounded = |&time: &f64| {
             let off = (time - frame_time(found.grid, found.phase, time)).abs();
             off > 2.0 * Precision::F64.rounding(time)

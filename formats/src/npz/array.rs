@@ -185,7 +185,7 @@ impl Array<'_> {
         };
         let whole = |text: String| text.trim_end_matches('\0').to_owned();
         if size == 0 {
-            // Texts without a character take no bytes: how many there are is the file's word alone.
+            // Empty texts take no bytes, so their number cannot be checked against the file's length.
             let empty = text(&[])?;
             return Ok(vec![empty; usize::from(self.header.shape.is_empty())]);
         }

@@ -85,7 +85,7 @@ impl NpzDocument {
             if !is_beside || self.archive.find(name) == Some(whole.member) {
                 continue;
             }
-            // One that is no such array is judged as any other.
+            // An array of another form is not part of the pose; it is treated like any other array.
             let piece = KeyArray::of(&self.archive, name, vectors, first, Layout::FrameMajor);
             let Ok(Some((piece, frames))) = piece else {
                 continue;
@@ -154,7 +154,7 @@ impl NpzDocument {
             }
             match self.frame_axis(index) {
                 None => MemberOutcome::Constant,
-                // At the same times everything is the same.
+                // If the times of the samples are those of the keys, the array is copied unchanged.
                 Some(_) if is_same && !options.linear.contains(&member.name) => {
                     MemberOutcome::Constant
                 }
@@ -361,7 +361,7 @@ impl Document for NpzDocument {
             return Err(self.refuse(Code::OneClip, message));
         };
         check_times(sampled, &options.name)?;
-        // `trans` counts from where the shape puts the pelvis.
+        // `trans` is relative to the pelvis of the body shape.
         let pelvis = sampled
             .clip
             .body

@@ -173,7 +173,7 @@ impl ParquetFile<'_> {
             let mut reader = ColumnReaderImpl::<T>::new(Arc::clone(&descriptor), Box::new(pages));
             loop {
                 levels.clear();
-                // A page's count is its word: not more is made room for than a batch takes.
+                // The count of a page is not trusted: memory is reserved for at most one batch.
                 let read = reader.read_records(BATCH, Some(&mut levels), None, &mut values);
                 let (records, numbers, _) = read.ok()?;
                 if records != numbers {

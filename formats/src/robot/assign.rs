@@ -65,7 +65,7 @@ impl Robot {
             return Err(refused.swap_remove(0));
         }
         loaded.refused.append(&mut refused);
-        // The robot names them.
+        // The robot names the joints, so the warning about unnamed joints is removed.
         loaded
             .warnings
             .retain(|warning| !matches!(warning.code, Code::UnnamedJoints | Code::AngleJumps));
@@ -455,7 +455,7 @@ fn error(
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
-    // The rotation of the first is known.
+    // The rotation of the first body is known.
     (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {

@@ -230,7 +230,7 @@ impl TableClip<'_> {
                     (row, (reader.at(row) * scalars.factor) as f32)
                 });
                 let numbers: Vec<(usize, f32)> = numbers.collect();
-                // Of a scalar that other clips of the table have, all numbers are missing.
+                // A scalar that only other clips of the table have: all its numbers are missing.
                 if numbers.iter().all(|(_, number)| number.is_nan()) {
                     continue;
                 }
@@ -355,7 +355,7 @@ impl TableClip<'_> {
             if missing.is_empty() {
                 continue;
             }
-            // As a set names tracks without a name.
+            // The same name as a set gives to a track without a name.
             let name = match &*shared.tracks[track].name {
                 "" => format!("box{}", track + 1),
                 name => printable(name).into_owned(),

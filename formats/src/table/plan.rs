@@ -478,7 +478,8 @@ impl TablePlan {
         };
         let is_read: HashSet<usize> = names.requested.iter().map(|it| it.index).collect();
         mapped.check_used(&names, &is_read)?;
-        // Beside times, frames say nothing more, and a comma at the end of a line makes a column without a name.
+        // If there are times, a column of frame numbers adds nothing. A comma at the end of a line makes a column
+        // without a name.
         let is_known = |name: &str| name.is_empty() || COUNTED.contains(&name);
         let left_out = (file_columns.iter().enumerate())
             .filter(|(index, name)| !is_read.contains(index) && !is_known(name))

@@ -79,7 +79,7 @@ pub(crate) fn times(
         );
         return Err(table.refuse_at(column, 0, Code::RateBesideTimes, message));
     }
-    // A unit that is given holds for numbers of every kind; stamps have their own.
+    // `--time-unit` applies to numbers of every kind; timestamps have their own unit.
     let unit = match values {
         ColumnValues::Numbers(numbers) if numbers.len() > 0 => {
             let first = numbers.at(0);

@@ -301,7 +301,7 @@ mod tests {
         let mut three = || DVec3::new(number(), number(), number());
         let mut vectors = [three(), three(), three()];
         if goes_back {
-            // A curve that turns back has the largest coefficients of the highest powers.
+            // A curve that reverses its direction has the largest coefficients of high powers.
             vectors[1] = vectors[0] * -1.5;
             vectors[2] = vectors[0] * 0.9;
         }

@@ -208,7 +208,7 @@ mod tests {
             let engine = vulkan(&engine);
             for set in &sets {
                 let [expected, listed] = [false, true].map(|lists| prepared(&engine, set, lists));
-                // Buffers that were used before are longer, and have other arcs.
+                // Reused buffers are longer and contain other arcs, so the device must write exactly the new ones.
                 let mut spare = None;
                 for _ in 0..2 {
                     let buffers = engine.upload(&listed, spare.take()).unwrap();

@@ -488,7 +488,8 @@ impl Arguments {
                         let (bound, unit) = match kind.parse() {
                             Ok(ScalarKind::Angle) => (self.tolerance, "°"),
                             Ok(ScalarKind::Length) => (self.distance, ""),
-                            // A number without a unit has no bound of its own: with one of 0, all numbers are equal.
+                            // Numbers without a unit have no tolerance, except 0, which requires that all numbers are
+                            // equal.
                             _ => (self.tolerance.filter(|&bound| bound == 0.0), ""),
                         };
                         let quantity = format!("{kind} {}", difference.track);

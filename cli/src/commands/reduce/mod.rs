@@ -400,7 +400,7 @@ impl Arguments {
             ..target.motion_options()
         };
         let otherwise = match keys_per_channel {
-            // A file that is kept keeps the bytes of its old keys too.
+            // If the file is edited instead of written anew, the bytes of its old keys stay in it.
             true if self.meshopt => Some("compression makes"),
             true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),

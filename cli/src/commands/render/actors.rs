@@ -96,7 +96,7 @@ impl Subject {
             return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
         }
         let count = timeline.len();
-        // Times that decide where the camera stands.
+        // The times from which the position of the camera is computed.
         let seen = || (0..count).step_by(count.div_ceil(REACHES).max(1));
         let at = |frame: usize| frame * tracks..(frame + 1) * tracks;
         let (shape, reach) = match &self.mesh {

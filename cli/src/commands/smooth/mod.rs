@@ -227,7 +227,7 @@ fn smoothed(
     if let (Some(last), Some((_, end))) = (last, clip.set.time_span())
         && end - last > 1e-3 * fps.map_or(f64::INFINITY, |rate| rate.time_of(1))
     {
-        // A kernel needs even samples, so that there can be no key at the end.
+        // A smoothing kernel needs evenly spaced samples, so an additional key at the end is not possible.
         words::warning(&format!(
             "{name}: the {} s after the last frame are left out; a rate of which the end is a frame keeps them",
             words::seconds(end - last)

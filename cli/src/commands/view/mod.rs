@@ -160,7 +160,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         Ok(())
     };
-    // An input that fails does not take the page of the others away.
+    // If an input fails, the page is still written for the others.
     let outcome = for_each(&inputs, |path| {
         read(path).inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
     });

@@ -147,7 +147,7 @@ impl PathDifference {
             let motions = clips.map(|(_, clip, _)| clip);
             check_known_parents(names, motions, &[clips.map(|(_, _, track)| track)])?;
         }
-        // Each clip counts from whole seconds of its own.
+        // Each clip has its own time offset, in whole seconds.
         let shift = (first.time_offset - clips[1].1.time_offset) as f64;
         let times = [0, 1].map(|side| {
             let (_, clip, track) = clips[side];

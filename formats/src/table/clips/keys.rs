@@ -107,8 +107,7 @@ impl TableClip<'_> {
             // Where the system refuses threads this one does it all.
             .unwrap_or_else(|_| alone()),
         };
-        // Where there is something to be said it is said in the order of the rows: tracks that share
-        // columns are read together.
+        // Tracks that share columns are read together, so that warnings are in the order of the rows.
         let mut known: Option<(&Parts, AllKeys)> = None;
         let keys = shared.tracks.iter().zip(quiet).map(|(track, quiet)| {
             if let Some(keys) = quiet {
@@ -379,7 +378,7 @@ fn units(keys: impl Iterator<Item = Quat>) -> Option<Vec<Quat>> {
 fn finite(vectors: impl Iterator<Item = Vec3>) -> Option<Vec<Vec3>> {
     let vectors: Vec<Vec3> = vectors.collect();
     let numbers: &[f32] = bytemuck::cast_slice(&vectors);
-    // To the end in any case, so that it is compiled to vectors.
+    // The loop has no early exit, so that it is compiled to vector instructions.
     let are_finite = |all: bool, number: &f32| all & number.is_finite();
     numbers.iter().fold(true, are_finite).then_some(vectors)
 }
