@@ -245,8 +245,8 @@ impl ClipTarget {
         unsafe { self.record_between(commands, offset, CommandScopes::default()) }
     }
 
-    /// As [`ClipTarget::record`], with barriers for some users of the result's memory alone: the evaluation waits for
-    /// those before it, and those after it see the result.
+    /// As [`ClipTarget::record`], with barriers only for the commands that use the result's memory (`scopes`): the
+    /// evaluation waits for earlier ones, and later ones see the result.
     ///
     /// # Errors
     /// As for [`ClipTarget::record`].
