@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     /// A joint that is slower touches the ground, if it is lower too; metres a second
     #[arg(long, value_name = "SPEED", default_value_t = ContactLimits::PROTOMOTIONS.speed)]
     contact_speed: f64,
-    /// Contacts are those of most of so many frames, an odd number
+    /// Replace each contact by the majority of this many frames around it, an odd number
     #[arg(long, value_name = "FRAMES", default_value_t = 1)]
     contact_window: usize,
     /// The axis across the mirror

@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     /// The file with the skeleton: glTF, with or without animations, or the first clip of any other file
     #[arg(long, value_name = "FILE")]
     onto: PathBuf,
-    /// The joints that belong together, as JSON: {\"joint of --onto\": \"joint of the input\", …} [default: by the
+    /// The joints that belong together, as JSON: {"joint of --onto": "joint of the input", …} [default: by the
     /// parts of the body that their names mean]
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,

@@ -68,8 +68,8 @@ pub(crate) struct Arguments {
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
-    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
-    /// no rotations the largest difference of two numbers
+    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; for arrays
+    /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
     /// The largest distance: between two translations that pass
@@ -84,7 +84,7 @@ pub(crate) struct Arguments {
     /// Relative errors: over steps of this many seconds, or units of length along the second path
     #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
-    /// How poses are associated: interpolated, or nearest:SECONDS, the nearest at most so far away
+    /// How poses are associated: interpolated, or nearest:SECONDS, the nearest one within this time
     #[arg(long, value_name = "HOW", value_parser = association, help_heading = TRAJECTORIES)]
     associate: Option<Associate>,
     /// The longest gap, seconds: poses between two of the interpolated input that are further apart are left out

@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "KERNEL", default_value = "gaussian:2")]
     kernel: SmoothingKernel,
     /// Instead of a kernel: keep motion below this frequency; motion at the frequency keeps 71 % of its size
-    /// (-3 dB), motion at twice of it 25 %
+    /// (-3 dB), motion at twice the frequency 25 %
     #[arg(long, value_name = "HZ", conflicts_with_all = ["kernel", "passes"], value_parser = frequency)]
     low_pass: Option<f64>,
     /// The number of passes
