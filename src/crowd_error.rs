@@ -112,7 +112,7 @@ pub enum CrowdError {
         joint: usize,
     },
     /// Skinning matrices are requested, but the library has no inverse bind matrices.
-    #[error("the library has no inverse bind matrices; set_inverse_bind gives it some")]
+    #[error("the library has no inverse bind matrices; call set_inverse_bind")]
     NoInverseBind,
     /// The number of instances is 0 or too large.
     #[error("{requested} instances; there can be 1 to {}", MAX_INSTANCES)]

@@ -41,7 +41,9 @@ impl OverBudget {
         match self.is_requested {
             true => format!("the limit is {limit}"),
             false => {
-                format!("the limit for an input of this length is {limit}; it states more than it contains")
+                format!(
+                    "the limit for an input of this length is {limit}; it states more than it contains"
+                )
             }
         }
     }

@@ -195,7 +195,9 @@ pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
 
 /// The warning that a file's rate is replaced.
 pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
-    format!("the file states {rate} frames a second; because of --override-fps it is read at {other}")
+    format!(
+        "the file states {rate} frames a second; because of --override-fps it is read at {other}"
+    )
 }
 
 /// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number

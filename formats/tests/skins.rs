@@ -86,7 +86,11 @@ fn files_without_meshes_have_none_and_broken_ones_say_why() {
             "\"joints\": [\n    1\n",
             "index 1 of the skin's joints does not exist: the list has length 1",
         ),
-        ("\"skin\": 0", "\"skin\": 3", "index 3 of skins does not exist"),
+        (
+            "\"skin\": 0",
+            "\"skin\": 3",
+            "index 3 of skins does not exist",
+        ),
         (
             "\"JOINTS_0\": 1",
             "\"JOINTS_0\": 2",

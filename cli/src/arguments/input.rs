@@ -283,8 +283,7 @@ fn directory_failure(path: &Path) -> Failure {
     let mut endings: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
     endings.sort_unstable();
     let message = format!(
-        "is a directory without a file of a format that is read ({}); give its files one by one if their names \
-         end otherwise",
+        "is a directory without files in readable formats ({}); if its files have other endings, name them",
         endings.join(", ")
     );
     refuse(Code::NotAFile, message)

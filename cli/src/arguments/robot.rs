@@ -300,7 +300,7 @@ impl DialectArguments {
         let (name, tree) = (&*work.name, &robot.tree);
         let Some(rate) = rate else {
             let message = format!(
-                "{} has frames of one rate, and the samples are none; give --fps (`tumble eval`)",
+                "{} stores frames of one rate, and the samples have no rate; give --fps (`tumble eval`)",
                 dialect.name
             );
             return Err(Failure::input(

@@ -569,7 +569,7 @@ fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(
             "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             --before and --after say what tracks do outside them (by default they hold their first and last key)"
+             --before and --after select the values outside them (by default the first and the last key)"
         ));
     }
 }

@@ -188,8 +188,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let is_known = shards.is_some() || entry::open(folder).is_ok();
         let remedy = match is_known {
             true if lines.damaged > 0 => {
-                "a result whose line is damaged is a file of somebody else's for `--resume`: `tumble eval … \
-                 --overwrite` makes all results again"
+                "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
+                 makes all results again"
             }
             true if is_made_again => "`tumble eval … --resume` makes them again",
             true => "`tumble eval … --resume` tries them again",

@@ -147,7 +147,8 @@ impl TextDialect {
             options.source_rate = FrameRate::new(per_second, 1).ok();
             warnings.warn(Code::AssumedRate, || {
                 let message = format!(
-                    "the file has no rate; {per_second} frames a second are assumed, as usual for such files; --source-fps gives \
+                    "the file has no rate; {per_second} frames a second are assumed, as usual for such files; \
+                     --source-fps gives \
                      another"
                 );
                 (None, message)

@@ -205,7 +205,8 @@ fn moved(
         }
         if nodes.has_matrix(node) {
             reader.warn(Code::NodeMatrix, &format!("/nodes/{node}/matrix"), || {
-                format!("node {node} is animated and has a matrix, which is decomposed into translation, rotation and scale")
+                format!("node {node} is animated and has a matrix, which is decomposed into translation, \
+                         rotation and scale")
             });
         }
         let Some(sampler) = animation.samplers.get(channel.sampler) else {

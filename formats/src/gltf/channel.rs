@@ -152,7 +152,7 @@ impl MovedChannel {
         if times.is_empty() {
             reader.warn(Code::EmptySampler, &self.input, || {
                 format!(
-                    "the sampler has no keys; the {} of node {} rests",
+                    "the sampler has no keys; the {} of node {} is not animated",
                     self.path, self.node
                 )
             });

@@ -276,8 +276,8 @@ impl GltfDocument {
                         count => format!("{count} channels of weights and other properties are"),
                     };
                     format!(
-                        "{channels} not cut: copied whole, at the times of before, in step with the keys \
-                         that are cut; the animation lasts as long as the longest channel"
+                        "{channels} not cut but copied whole, at their times; the animation is as long as its \
+                         longest channel"
                     )
                 });
             }

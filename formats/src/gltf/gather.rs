@@ -177,7 +177,7 @@ pub(super) fn images<'a>(
             let kind = kind(&bytes).ok_or_else(|| json.refuse(&pointer, Code::Uri, message()))?;
             if !["image/png", "image/jpeg"].contains(&kind) && plain.contains(&index) {
                 let message = format!(
-                    "{uri}: a texture has {kind} as its plain `source`, where glTF has PNG and JPEG alone"
+                    "{uri}: a texture has {kind} as its `source`; glTF allows only PNG and JPEG there"
                 );
                 return Err(json.refuse(&pointer, Code::Uri, message));
             }

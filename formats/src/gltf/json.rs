@@ -166,7 +166,8 @@ impl<'a> Json<'a> {
     }
 
     pub(super) fn no_such(&self, list: &str, index: usize, count: usize, from: &str) -> Diagnostic {
-        let message = format!("index {index} of {list} does not exist: the list has length {count}");
+        let message =
+            format!("index {index} of {list} does not exist: the list has length {count}");
         self.refuse(from, Code::IndexRange, message)
     }
 

@@ -304,7 +304,8 @@ impl<'a> Records<'a> {
         let limit = UNPACKED.saturating_mul(self.budget.limit());
         if self.unpacked > limit {
             let message = format!(
-                "its chunks have more than {limit} bytes when they are unpacked, the limit for an input of this length; \
+                "its chunks have more than {limit} bytes when they are unpacked, the limit for an input of this \
+                 length; \
                  it states more than a recording contains"
             );
             return Err(Diagnostic::new(self.name, Code::Memory, message));

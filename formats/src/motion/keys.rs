@@ -62,7 +62,8 @@ impl Origin<'_> {
                 return Err(self.refuse(index, Code::NotFinite, message));
             }
             if norm < LEAST_NORM {
-                let message = "the quaternion has a norm below 1e-6; a rotation has norm 1".to_owned();
+                let message =
+                    "the quaternion has a norm below 1e-6; a rotation has norm 1".to_owned();
                 return Err(self.refuse(index, Code::KeyNorm, message));
             }
             if (norm - 1.0).abs() > QUIET_NORM {

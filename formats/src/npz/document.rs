@@ -395,7 +395,7 @@ impl Document for NpzDocument {
             return Err(self.refuse(Code::Layout, message));
         }
         if sampled.rate.is_none() && !self.has_times() {
-            let message = "the layout tells times by a rate alone; give --fps, not times";
+            let message = "the layout stores a rate and no times; give --fps instead of times";
             return Err(self.refuse(Code::Layout, message.to_owned()));
         }
         let parts = self.parts()?;
@@ -406,7 +406,7 @@ impl Document for NpzDocument {
         if start != 0.0 && !self.has_times() {
             warnings.warn(Code::StartMoved, || {
                 let message = format!(
-                    "the first frame is at {start} s; the layout has a rate alone and begins at 0"
+                    "the first frame is at {start} s; the layout stores a rate and no times, and begins at 0"
                 );
                 (None, message)
             });

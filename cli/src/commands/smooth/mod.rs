@@ -229,7 +229,7 @@ fn smoothed(
     {
         // A smoothing kernel needs evenly spaced samples, so an additional key at the end is not possible.
         words::warning(&format!(
-            "{name}: the {} s after the last frame are left out; a rate of which the end is a frame keeps them",
+            "{name}: the {} s after the last frame are left out; with a rate that has a frame at the end they are kept",
             words::seconds(end - last)
         ));
     }

@@ -195,8 +195,8 @@ impl PathDifference {
             .collect();
         warnings.extend(alignment.undetermined.map(|why| {
             format!(
-                "{why}, so that no alignment by {} determines the rotation; the smallest one is used, and the \
-                 rotation errors mean nothing",
+                "{why}, so an alignment by {} does not determine the rotation; the smallest rotation is used, \
+                 and rotation errors have no meaning",
                 measure.align.name()
             )
         }));

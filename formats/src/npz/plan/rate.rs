@@ -146,7 +146,8 @@ impl ArchivePlan {
                 };
             } else if let Some(other) = options.source_rate.filter(is_other) {
                 self.two_rates = Some(format!(
-                    "the file states {rate} frames a second, which is used; --source-fps {other} is for files that state \
+                    "the file states {rate} frames a second, which is used; --source-fps {other} is for files \
+                     that state \
                      none, --override-fps replaces a rate"
                 ));
             }
