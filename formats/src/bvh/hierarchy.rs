@@ -240,8 +240,10 @@ impl<R: BufRead> Parser<'_, R> {
                     let (exact, site) = (DVec3::from(offset), DVec3::from(offset).as_vec3());
                     let lost = (site.as_dvec3() - exact).abs().max_element();
                     if exact.abs().max_element() >= SMALL && lost > 0.0 {
+                        // Three digits, without an exponent.
+                        let lost = format!("{lost:.2e}").parse().unwrap_or(lost);
                         let message = format!(
-                            "an End Site is kept in f32, up to {lost:.2e} from its position in the file"
+                            "an End Site is stored in f32, up to {lost} from its position in the file"
                         );
                         self.lines
                             .warn(keyword.column, Code::EndSiteRounded, message);
