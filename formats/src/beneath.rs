@@ -104,7 +104,7 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
 
     let root = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let root = open(folder, root, Mode::empty())?;
-    // Opening a pipe waits for its writer, unless it is said not to.
+    // Without this flag, opening a pipe would wait for its writer.
     let flags = OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | OFlags::NOCTTY;
     let resolve = ResolveFlags::BENEATH | ResolveFlags::NO_MAGICLINKS;
     for _ in 0..100 {

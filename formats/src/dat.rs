@@ -374,7 +374,7 @@ impl DatKeys {
             lines.warn(1, Code::Order, message);
         }
         let (times, keys) = (self.times.into_columns(), self.rows.into_columns());
-        // Checked above; a set refuses what slipped through.
+        // The keys were checked above; this reports an error that the checks missed.
         let set = TrackSet::from_shared_times(times, keys)
             .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
         let clip = Motion {

@@ -123,7 +123,7 @@ impl OutputLocation {
         match self.folder.parent_of(&self.name) {
             Ok(parent) if parent.is_in_place() => Ok(parent),
             Ok(parent) => Err(moved(parent.path())),
-            // It was there when the output was planned.
+            // The directory existed when the output was planned.
             Err(error)
                 if is_refused(&error)
                     || matches!(

@@ -269,7 +269,7 @@ impl ClipTables {
             if curve.form != FORM_CONSTANT {
                 let bytes: &[u8] = bytemuck::cast_slice(&curve.spans);
                 base = match last {
-                    // Mostly all curves have the same spans.
+                    // Usually all curves have the same spans.
                     Some((spans, base)) if bytes == bytemuck::cast_slice::<_, u8>(spans) => base,
                     _ => *known.entry(bytes.to_vec()).or_insert_with(|| {
                         self.push_base(&curve.spans);

@@ -84,7 +84,7 @@ impl Exported {
         let info = vk::SemaphoreWaitInfo::default()
             .semaphores(&semaphores)
             .values(&values);
-        // A device that has hung is not waited for again.
+        // If the device has hung, do not wait for it a second time.
         let seconds = TIMEOUT_SECONDS * u64::from(device.may_destroy());
         // SAFETY: a timeline semaphore of this device, which has Vulkan 1.2.
         match unsafe { device.raw.wait_semaphores(&info, seconds * 1_000_000_000) } {

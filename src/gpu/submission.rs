@@ -194,7 +194,7 @@ impl Submission {
         self.device.check_process()?;
         let raw = &self.device.raw;
         let fences = [self.fence];
-        // A device that has hung is not waited for again.
+        // If the device has hung, do not wait for it a second time.
         let seconds = TIMEOUT_SECONDS * u64::from(self.device.may_destroy());
         let timeout = seconds * 1_000_000_000;
         // SAFETY: the fence belongs to this device.

@@ -117,7 +117,7 @@ pub(crate) fn stretches(
     let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..timed_path.curves.len() {
         if stop::is_stopped() {
-            // The preparation checks again when this returns.
+            // If the work was stopped, the preparation finds this out when this returns.
             return Vec::new();
         }
         let slope = &timed_path.slopes[interval];

@@ -95,7 +95,7 @@ impl<T: Value> ReductionTask<'_, T> {
                 let part = match apart <= self.tolerance {
                     // `min` also turns 0 / 0, which is NaN, into 1.
                     true => (apart / self.tolerance).min(1.0),
-                    // NaN is not near.
+                    // NaN counts as too far away.
                     false => (apart / self.tolerance).max(1.0).next_up(),
                 };
                 if part > worst.1 {

@@ -106,7 +106,7 @@ impl<T: Value> ReductionTask<'_, T> {
                 false => start.towards(end, part(i)),
             };
             let apart = sample.apart(curve);
-            // NaN is not near.
+            // NaN counts as too far away.
             if apart.is_nan() || apart > limit {
                 return None;
             }

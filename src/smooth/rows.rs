@@ -280,7 +280,7 @@ impl SmoothingBlock<'_> {
         let before = self.first as isize - radius as isize;
         let steps = &mut self.steps[0];
         steps.resize(4 * count + EACH, 0.0);
-        // The steps that stand in the row, and those before its start and beyond its end.
+        // The steps inside the row, before its start, and after its end.
         let start = (-before).clamp(0, count as isize);
         let end = (row.count as isize - 1 - before).clamp(start, count as isize);
         let (start, end) = (start as usize, end as usize);

@@ -80,7 +80,7 @@ pub(crate) fn usage(error: &mut clap::Error, arguments: &[OsString]) {
     for word in arguments {
         let word = word.to_string_lossy();
         let shown = printable(&word);
-        // Also the part behind `--option=`.
+        // The part after `--option=` is also printed safely.
         let parts = word.split('=').zip(shown.split('='));
         for (word, shown) in std::iter::once((&*word, &*shown)).chain(parts) {
             if word != shown {

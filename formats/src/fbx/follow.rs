@@ -564,7 +564,7 @@ mod tests {
             [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, ChannelValue::X * x));
         let found = follow.keys(&stops, &thirds).unwrap();
         assert_eq!(found, (FollowedKeys::Step(keys.to_vec()), true));
-        // Straight up to 1, where it falls to 0, and stays.
+        // A line up to time 1, then 0.
         let saw = |time: f64| Ok(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
         follow.value = &saw;
         let stops = [

@@ -405,7 +405,7 @@ impl FbxReader<'_> {
         let over = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let (scene, tracks) = (self.scene, &self.nodes.tracks);
         self.budget.take(tracks.len(), TRACK).map_err(over)?;
-        // Each clip has the names of its tracks.
+        // Memory for the names of the tracks, which each clip contains.
         let names = self.nodes.names.iter().map(String::len).sum();
         self.budget.take(names, 1).map_err(over)?;
         let anim_stack = &scene.anim_stacks[stack];

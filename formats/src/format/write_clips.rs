@@ -195,7 +195,7 @@ fn loss(
     let joints = || clip.skeleton.iter();
     let (has_it, loss) = match feature {
         Feature::TrackNames => {
-            // Readers of trajectories make up this name, so that nothing is lost with it.
+            // This name was not in the file: readers of trajectories add it, so leaving it out loses nothing.
             let named = |name: Option<&str>| {
                 name.is_some_and(|name| !name.is_empty() && name != TRAJECTORY_TRACK)
             };

@@ -68,7 +68,7 @@ pub(super) fn read(
     let (times, stored, rate) = times(reader, &moved, options)?;
     let tracks = Tracks::of(nodes, &moved);
     reader.take(tracks.nodes.len(), TRACK, &pointer)?;
-    // Each clip has the names of its tracks.
+    // Memory for the names of the tracks, which each clip contains.
     let names = tracks.nodes.iter().map(|&node| nodes.name(node).len());
     reader.take(names.sum(), 1, &pointer)?;
     let mut motion = Motion {

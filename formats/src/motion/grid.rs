@@ -66,7 +66,7 @@ impl Motion {
     pub fn rate_of_keys(&self) -> Option<FrameRate> {
         let mut all: Vec<Vec<f64>> = Vec::new();
         for list in self.key_lists() {
-            // Tracks mostly have the times of the track before.
+            // Most tracks have the same times as the track before.
             if all.last().is_none_or(|last| last != list) {
                 all.push(list.to_vec());
             }

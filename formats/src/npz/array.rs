@@ -102,7 +102,7 @@ impl Array<'_> {
             let blocks = starts.par_iter().with_min_len(at_least);
             blocks.flat_map_iter(block).collect()
         });
-        // Where the system refuses threads this one does it all.
+        // If the system refuses to start threads, this thread does all the work.
         together.unwrap_or_else(|_| starts.iter().flat_map(block).collect())
     }
 

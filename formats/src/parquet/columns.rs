@@ -109,7 +109,7 @@ impl ParquetFile<'_> {
             false => {
                 let numbers = || plain.par_iter().map(|&leaf| self.numbers(leaf)).collect();
                 let together = tumble::on_threads(|| rayon::join(read_others, numbers));
-                // Where the system refuses threads this one does it all.
+                // If the system refuses to start threads, this thread does all the work.
                 together.unwrap_or_else(|_| {
                     let numbers = plain.iter().map(|&leaf| self.numbers(leaf));
                     (read_others(), numbers.collect())

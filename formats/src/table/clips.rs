@@ -407,7 +407,7 @@ impl TableClip<'_> {
         let mut lists: Vec<Vec<f64>> = Vec::new();
         for (name, range) in names.into_iter().zip(ranges) {
             let times = self.sorted(&mut order[range.clone()], plan, warnings)?;
-            // Tracks mostly have the times of the track before.
+            // Most tracks have the same times as the track before.
             if lists.last() != Some(&times) {
                 lists.push(times);
             }

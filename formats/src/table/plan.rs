@@ -309,7 +309,7 @@ impl ColumnNames<'_> {
 
     /// The columns of one track, and whether its translations are relative to the world.
     fn parts(&mut self, prefix: &str) -> Result<(Parts, bool), Diagnostic> {
-        // Trajectories call their rotations qx qy qz qw, and may call their positions x y z.
+        // In trajectories, rotations are called qx qy qz qw, and positions may be called x y z.
         let is_pose = self.find(&format!("{prefix}qw"))?.is_some();
         let names = match is_pose {
             true => ["qx", "qy", "qz", "qw"],

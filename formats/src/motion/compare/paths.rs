@@ -267,7 +267,7 @@ fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
     let start = times.map(|times| times.first().copied().unwrap_or(f64::INFINITY));
     let end = times.map(|times| times.last().copied().unwrap_or(f64::NEG_INFINITY));
     let common = start[0].max(start[1])..=end[0].min(end[1]);
-    // As in evo, where all poses count and the second is the sparser of two equal ones.
+    // As in evo: all poses count, and if both have equally many, the second is used.
     let counts = match measure.associate {
         Associate::Nearest(_) => times.map(<[f64]>::len),
         Associate::Interpolated => {

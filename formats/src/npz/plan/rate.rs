@@ -98,7 +98,7 @@ impl ArchivePlan {
             let message = format!("{} numbers for {} frames", numbers.len(), self.frames);
             return Err(archive.refuse(member, Code::Shape, message));
         }
-        // Up to here every whole number is one of f64.
+        // Up to this limit, f64 represents every whole number exactly.
         let is_number = |&number: &f64| (0.0..9e15).contains(&number) && number.fract() == 0.0;
         match numbers.iter().find(|number| !is_number(number)) {
             None => Ok(numbers.into_iter().map(|number| number as u64).collect()),

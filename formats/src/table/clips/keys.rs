@@ -104,7 +104,7 @@ impl TableClip<'_> {
                 let tracks = shared.tracks.par_iter().with_min_len(at_least);
                 tracks.map(quiet_keys).collect()
             })
-            // Where the system refuses threads this one does it all.
+            // If the system refuses to start threads, this thread does all the work.
             .unwrap_or_else(|_| alone()),
         };
         // Tracks that share columns are read together, so that warnings are in the order of the rows.
@@ -242,7 +242,7 @@ impl TableClip<'_> {
                 let rotation = |position| {
                     let row = self.row(position);
                     let numbers: Vec<f64> = columns.iter().map(|column| column.at(row)).collect();
-                    // Gaps are left out later.
+                    // Rows with NaN are removed later.
                     if self.options.bridge_gaps && numbers.iter().any(|number| number.is_nan()) {
                         return Ok(DQuat::IDENTITY);
                     }
