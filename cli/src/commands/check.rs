@@ -29,8 +29,8 @@ use crate::threads::on_threads;
 JSON with the SHA-256 of the result, of its input (with the files that it refers to) and of \
 the files that options name, the options, the kernels, the program's version and the device; \
 and a line for each input that failed or has no result yet. The exit code is 0 only if the \
-batch is complete: all inputs have their results, no result has changed, and neither has an \
-input, or a file that an option names, that is found by its path in the manifest. If shards \
+batch is complete: all inputs have their results, and no result, no input and no file that an option \
+names has changed. Inputs that are not found by their paths in the manifest are not checked. If shards \
 are missing in the directory, it checks the results of the complete shards, and prints how \
 many there are.
 

@@ -32,8 +32,8 @@ use crate::messages::{listing, names, words};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway \
-between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only \
-if neither file has names; joints with other parents are compared with --world alone. A table lists \
+between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, or by \
+index if neither file has names. Joints with different parents can be compared only with --world. A table lists \
 the joints that are furthest apart. Frames are those of the first input, from 0 at its first key; \
 frame 7.5 is halfway between two. Two NPY files are compared number by number, and by angles if they contain \
 rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these \
