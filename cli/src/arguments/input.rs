@@ -552,7 +552,7 @@ impl GatheredInputs {
                 words::warning(&match name == kept {
                     true => format!("{name}: named twice; it is processed once"),
                     false => {
-                        format!("{name}: is the same file as {kept}, which alone is processed")
+                        format!("{name}: is the same file as {kept}, and is processed once")
                     }
                 });
             }

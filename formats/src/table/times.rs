@@ -74,9 +74,7 @@ pub(crate) fn times(
     };
     let Column { name, values, .. } = &table.columns[column];
     if let Some(rate) = options.source_rate {
-        let message = format!(
-            "`{name}` has the time of every row; --source-fps {rate} would be another, leave it out"
-        );
+        let message = format!("`{name}` has the time of every row; leave out --source-fps {rate}");
         return Err(table.refuse_at(column, 0, Code::RateBesideTimes, message));
     }
     // `--time-unit` applies to numbers of every kind; timestamps have their own unit.

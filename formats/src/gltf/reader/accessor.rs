@@ -290,7 +290,8 @@ impl<'a> GltfReader<'a> {
         let size = component.size() * width;
         let stride = found.stride.unwrap_or(size);
         if stride < size {
-            let message = format!("elements of {size} bytes, and from one to the next {stride}");
+            let message =
+                format!("the stride, {stride} bytes, is less than an element, {size} bytes");
             return Err(self
                 .json
                 .refuse(&format!("/bufferViews/{view}"), Code::Property, message));

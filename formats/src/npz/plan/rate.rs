@@ -163,9 +163,8 @@ impl ArchivePlan {
                 Some(_) => "--override-fps",
                 None => "--source-fps",
             };
-            let message = format!(
-                "the file has the time of every frame; {option} {rate} would be another, leave it out"
-            );
+            let message =
+                format!("the file has the time of every frame; leave out {option} {rate}");
             return Err(archive.refuse(list.member, Code::RateBesideTimes, message));
         }
         let array = archive.array(list.member)?;
