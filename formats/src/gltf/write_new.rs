@@ -146,7 +146,9 @@ fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagn
     for offset in clips.iter().map(|clip| clip.clip.time_offset) {
         if offset != 0 {
             warnings.warn(Code::StartMoved, || {
-                let message = format!("times count from {offset} s; glTF's are too short for both");
+                let message = format!(
+                    "times are relative to {offset} s, because f32, in which glTF has times, cannot store the full times"
+                );
                 (None, message)
             });
         }
