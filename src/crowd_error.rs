@@ -112,7 +112,7 @@ pub enum CrowdError {
         joint: usize,
     },
     /// Skinning matrices are requested, but the library has no inverse bind matrices.
-    #[error("the library has no inverse bind matrices; set_inverse_bind gives it some")]
+    #[error("the library has no inverse bind matrices; call set_inverse_bind")]
     NoInverseBind,
     /// The number of instances is 0 or too large.
     #[error("{requested} instances; there can be 1 to {}", MAX_INSTANCES)]
@@ -253,7 +253,7 @@ impl From<SetError> for CrowdError {
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
             SetError::Threads(error) => Self::Threads(error),
             SetError::Stopped(stopped) => Self::Stopped(stopped),
-            // No frames are asked for when a clip is prepared.
+            // Cannot happen: preparing a clip requests no frames.
             SetError::Frames(_) => Self::TooLarge,
         }
     }

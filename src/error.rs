@@ -138,7 +138,8 @@ pub enum Error {
     BufferOnCpu,
     /// An exported result is requested from an engine that is the CPU, whose results are in no device's memory.
     #[error(
-        "this engine evaluates on the CPU, whose results lie in the host's memory; open a Vulkan device to have them in a device's"
+        "this engine evaluates on the CPU, whose results lie in the host's memory; open a Vulkan device to keep \
+         them in its memory"
     )]
     ExportOnCpu,
     /// A buffer is passed to an engine that opened its device itself.

@@ -75,7 +75,7 @@
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-// Code that is only faster is not called there (build/main.rs).
+// The smallest build (build/main.rs) does not call code that is only faster.
 #![cfg_attr(smallest, allow(dead_code, unused_imports))]
 
 mod checks;
@@ -103,7 +103,7 @@ mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
-// Devices alone run kernels.
+// Without `vulkan`, kernels are not run, and some of this is unused.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod shader;
 mod simd;
@@ -112,7 +112,7 @@ mod stream;
 mod threads;
 mod time;
 mod tracks;
-// Checks of devices run twins that the CPU has no use for.
+// Some twins are used only by checks of devices.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod twin;
 pub mod verify;

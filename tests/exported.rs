@@ -135,7 +135,7 @@ fn what_cannot_be_exported_is_said() {
         {
             let said = found.to_string();
             assert!(
-                said.contains("cannot hand the memory of results to others"),
+                said.contains("cannot share the memory of results with other APIs"),
                 "{said}"
             );
         }

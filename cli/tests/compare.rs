@@ -758,8 +758,8 @@ fn documented_checks_hold() {
     ] {
         let said = succeed(folder, &["convert", from, "-o", to]).words;
         let curves = [
-            "that smooth curves join the keys",
-            "that lines and arcs join the keys",
+            "the smooth curves between the keys",
+            "the lines and arcs between the keys",
         ];
         assert!(
             said.contains(curves[usize::from(from == "walk.bvh")]),

@@ -240,7 +240,7 @@ fn rates_of_options_contradict_no_file_silently() {
             .contains("\n2,0.03333333333333333,")
     );
     let words = line(at, "convert hip.bvh --override-fps 10 -o overridden.csv");
-    let expected = "the file says 60 frames a second; because of --override-fps it is read at 10";
+    let expected = "the file states 60 frames a second; because of --override-fps it is read at 10";
     assert!(words.contains(expected), "{words}");
     assert!(
         fs::read_to_string(at.join("overridden.csv"))

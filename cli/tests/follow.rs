@@ -244,8 +244,8 @@ fn what_cannot_be_followed_is_refused() {
         ],
     );
     for (name, words) in [
-        ("one", "stands still"),
-        ("still", "stands still"),
+        ("one", "does not move"),
+        ("still", "does not move"),
         ("turn", "180°"),
     ] {
         let out = format!("{name}.npy");

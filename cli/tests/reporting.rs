@@ -162,8 +162,7 @@ fn results_are_named_by_paths_without_links() {
         run.words
     );
     assert!(!folder.path().join("out/latest").exists(), "{}", run.words);
-    let said =
-        "inputs/latest/a.dat: is the same file as inputs/shots/a.dat, which alone is processed";
+    let said = "inputs/latest/a.dat: is the same file as inputs/shots/a.dat, and is processed once";
     assert!(run.words.contains(said), "{}", run.words);
     assert!(run.words.contains("not read (.txt)"), "{}", run.words);
 }

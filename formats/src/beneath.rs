@@ -104,7 +104,7 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
 
     let root = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let root = open(folder, root, Mode::empty())?;
-    // Opening a pipe waits for its writer, unless it is said not to.
+    // Without this flag, opening a pipe would wait for its writer.
     let flags = OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | OFlags::NOCTTY;
     let resolve = ResolveFlags::BENEATH | ResolveFlags::NO_MAGICLINKS;
     for _ in 0..100 {
@@ -139,7 +139,7 @@ fn open_by_steps(folder: &Path, name: &Path) -> io::Result<File> {
     if found.is_symlink() {
         return Err(leads_out());
     }
-    // Looked at before it is opened: opening a pipe waits for its writer.
+    // The type is checked before opening, because opening a pipe waits for its writer.
     if !found.is_file() {
         return Err(no_file());
     }

@@ -27,7 +27,7 @@ pub(crate) struct Budget {
 
 /// An input needs more memory than its budget.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("reading it takes {needed} bytes of memory at least, and {}", self.allowance())]
+#[error("reading it would take at least {needed} bytes of memory; {}", self.allowance())]
 pub(crate) struct OverBudget {
     needed: u64,
     limit: u64,
@@ -41,7 +41,9 @@ impl OverBudget {
         match self.is_requested {
             true => format!("the limit is {limit}"),
             false => {
-                format!("an input of this length gets {limit}; it states more than it contains")
+                format!(
+                    "the limit for an input of this length is {limit}; it states more than it contains"
+                )
             }
         }
     }

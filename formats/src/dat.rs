@@ -228,7 +228,7 @@ impl DatKeys {
             lines.warn(1, Code::BlankLine, message);
         }
         self.read_numbers(lines, line).or_else(|error| {
-            // A fault of the whole line explains more.
+            // A wrong number of columns is reported first, because it explains more.
             self.check_columns(lines, line)?;
             Err(error)
         })
@@ -302,7 +302,7 @@ impl DatKeys {
         }
         let gap = time - previous;
         if !(1e-9..=1e9).contains(&gap) {
-            let message = format!("{gap:e} s since the key before; are the times seconds?");
+            let message = format!("{gap} s since the previous key; are the times seconds?");
             lines.warn(1, Code::Gap, message);
         }
         Ok(())
@@ -369,12 +369,12 @@ impl DatKeys {
             lines.warn(1, Code::OneKey, "only one key; nothing moves");
         }
         if self.total >= 8 && self.w_last == self.total {
-            let message = "every quaternion is near 0 … 1 from left to right: is w the last column? \
+            let message = "in every quaternion the first number is near 0 and the last near 1: is w the last column? \
                            this format has w first";
             lines.warn(1, Code::Order, message);
         }
         let (times, keys) = (self.times.into_columns(), self.rows.into_columns());
-        // Checked above; a set refuses what slipped through.
+        // The keys were checked above; this reports an error that the checks missed.
         let set = TrackSet::from_shared_times(times, keys)
             .map_err(|error| lines.refuse_whole(Code::Norm, error.to_string()))?;
         let clip = Motion {

@@ -61,7 +61,7 @@ impl Decimal {
         if digits.is_empty() {
             return Some(Self(0));
         }
-        // An exponent of too many digits for i32 is out of range, or leaves nothing.
+        // An exponent that does not fit into i32 means out of range, or 0.
         let exponent = match exponent.parse::<i32>() {
             Ok(exponent) => exponent,
             Err(_) if exponent.starts_with('-') => return Some(Self(0)),

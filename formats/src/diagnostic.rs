@@ -149,13 +149,13 @@ macro_rules! codes {
 }
 
 codes! {
-    Open = "E001" elsewhere, "the input cannot be read", "The system refused to open or read it; its reason is given.";
+    Open = "E001" elsewhere, "the input cannot be read", "The system could not open or read it; the message contains the system's reason.";
     NotAFile = "E002" elsewhere, "not a file", "Directories, sockets and devices cannot be read as files. A named pipe is read only with `--pipes`; `-` reads standard input.";
     Changed = "E003" elsewhere, "the file changed while it was read", "Its length or its modification time changed during reading. Try again when the other program has finished writing.";
-    OtherFormat = "E004", "another format", "The first bytes or the name are those of another kind of file, which is not read as it is; the message says what it is and how to convert it.";
+    OtherFormat = "E004", "another format", "The first bytes or the name belong to a kind of file that is not read. The message names the kind and explains how to convert the file.";
     Encoding = "E005", "not plain text", "A `.dat` file is ASCII or UTF-8 text; UTF-16, NUL bytes and invalid UTF-8 are refused.";
-    Character = "E006", "a character that does not belong", "Only printable ASCII, blanks and tabs make up numbers; no-break spaces, form feeds and bare carriage returns are refused because editors hide them.";
-    LineTooLong = "E007" elsewhere, "a line is too long", "Lines of keyframe data are never this long; the file is probably something else.";
+    Character = "E006", "a character that does not belong", "Lines of numbers contain only printable ASCII, blanks and tabs. No-break spaces, form feeds and single carriage returns are refused because editors hide them.";
+    LineTooLong = "E007" elsewhere, "a line is too long", "Lines of keyframe data are never this long; the file is probably of another kind.";
     FileTooLong = "E008" elsewhere, "the file is too long", "The limit protects against endless inputs; raise it by `--max-size` if the file is correct.";
     Empty = "E010", "an empty file", "The file has no bytes, or no line: the program that wrote it may have been stopped, or its disk was full.";
     NoHeader = "E011", "no header", "The first line is `# <boxes> <box length>`, such as `# 4 3.0`.";
@@ -170,17 +170,17 @@ codes! {
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of 1 are normalised. Other norms are probably a mistake, such as a missing column.";
-    TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line, and so do the samples of a clip that is written (`--times`).";
+    TimeNotIncreasing = "E026", "times do not increase", "Key times must increase strictly from line to line. The times of samples (`--times`) must increase too if a clip is written.";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
-    LargeSeconds = "E029" elsewhere, "times too large for seconds", "CSV, Parquet, Arrow and TUM files and KITTI's files of times with such times would be read as milliseconds, microseconds or nanoseconds since 1970 (W305), so they are not written. `--time-unit` states the unit of the input's times.";
+    LargeSeconds = "E029" elsewhere, "times too large for seconds", "In CSV, Parquet, Arrow and TUM files and in KITTI's files of times, such large numbers are read as milliseconds, microseconds or nanoseconds since 1970 (W305). So they are not written to these formats. `--time-unit` states the unit of the input's times.";
     Time = "E030" elsewhere, "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
-    Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
-    Memory = "E034", "more memory than is allowed for its length", "Reading an input may take 64 times its length plus 64 MiB (`--max-memory`). This one would take more, because of a count, of compressed data, or of parts that refer to the same part many times.";
+    Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` defines the meaning of arrays or columns: entries `name=source[3:7]:order`, separated by commas. Each source must be in the file, and each entry must have an effect.";
+    Memory = "E034", "more memory than is allowed for its length", "Reading an input may take 64 times its length plus 64 MiB (`--max-memory`). This one would take more. Causes: a wrong count, compressed data, or parts that refer to the same part many times.";
     // E1xx and W1xx: glTF.
-    Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks after it.";
+    Glb = "E100", "not a whole GLB", "A GLB has a header with its length, a JSON chunk, and complete chunks after it.";
     GltfVersion = "E101", "not glTF 2.0", "Only version 2.0 is supported; all current exporters write it.";
-    Json = "E102", "not valid JSON", "A glTF file is a JSON object with a member `asset`; its text has an error at this location.";
+    Json = "E102", "not valid JSON", "A glTF file is a JSON object with a member `asset`. The JSON text has an error at this location.";
     Property = "E103", "an invalid property", "It is missing, given twice, or does not have the type that glTF 2.0 requires.";
     NoAnimations = "E104", "no animations", "The file contains no animation.";
     IndexRange = "E105", "an index out of range", "Parts of a glTF file refer to each other by index; this index does not exist.";
@@ -194,7 +194,7 @@ codes! {
     TwoChannels = "E113", "two channels for one target", "Both set the same property of the node; it is not clear which one applies.";
     Extension = "E114", "data that needs an unknown extension", "These bytes can be read only with an extension that is not supported.";
     Meshopt = "E115", "compressed data that cannot be read", "The meshopt compression of a buffer view is damaged or not supported.";
-    GltfFolder = "E116" elsewhere, "a .gltf in another folder than its files", "It refers to files relative to its folder, so it can only be written into the folder of its input. Write a .glb, which contains everything.";
+    GltfFolder = "E116" elsewhere, "a .gltf in another folder than its files", "A .gltf file refers to other files relative to its folder, so the result can only be written into the folder of the input. Write a .glb, which contains everything.";
     NothingToAnimate = "E180" elsewhere, "nothing to animate", "An animation in glTF needs at least one time and one channel. Clips without tracks or samples cannot be written.";
     NotTrees = "E181" elsewhere, "joints that are not trees", "glTF requires that nodes are trees with finite transforms. The joints of the clip are not.";
     TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Use a lower rate, or times nearer to 0.";
@@ -221,23 +221,23 @@ codes! {
     MemberSize = "E304", "a member of the wrong size", "The size or the checksum of a member differs from what the archive's directory says; the file is damaged.";
     ArrayHeader = "E305", "not an NPY array", "An array begins with `\\x93NUMPY`, a version, and a header with its type, order and shape.";
     Pickled = "E306" elsewhere, "pickled Python objects", "An array of numbers or texts is needed here, and this one holds objects. Save numbers and texts as arrays of plain types.";
-    ArraySize = "E307", "an array of the wrong size", "The number of bytes after the header does not agree with the shape and the type in the header.";
+    ArraySize = "E307", "an array of the wrong size", "The number of bytes after the header differs from the number that the shape and the type in the header require.";
     ElementType = "E308", "an array of the wrong type", "Keys and vectors must be floats (f2, f4, f8), rates and parents numbers, names text.";
     Shape = "E309", "an array of the wrong shape", "All arrays of a clip must have the same number of frames and of tracks, at least one of each.";
-    UnknownArrays = "E310", "arrays of unknown names", "Three layouts are recognised by the names of their arrays: motion of SMPL bodies (`poses`), body poses in world space (`body_rotations`), and Tumble's layout (`rotations`). For other files, `--map` says what the arrays are.";
+    UnknownArrays = "E310", "arrays of unknown names", "Three layouts are recognised by the names of their arrays: motion of SMPL bodies (`poses`), body poses in world space (`body_rotations`), and Tumble's layout (`rotations`). For other files, define the arrays with `--map`.";
     NoRate = "E311", "no times", "The file has neither times nor a frame rate, or the unit of its times is not known. Give the rate by `--source-fps` or the unit by `--time-unit`.";
     FrameRate = "E312", "not a frame rate", "A rate is one number of frames per second, greater than 0.";
-    Ambiguous = "E313", "tracks and frames cannot be distinguished", "Either of two axes may be the frames; `--map` says which axis comes first.";
+    Ambiguous = "E313", "tracks and frames cannot be distinguished", "Two axes of the array may be the frames. `--map` selects one.";
     Parents = "E314", "parents that are not a hierarchy", "The parent of each track is another track, or -1 for a root.";
     OneClip = "E315" elsewhere, "not one clip", "An NPZ file holds one clip.";
     Layout = "E316" elsewhere, "samples that do not fit the layout", "If the layout of a file is kept, the number of tracks must not change, and a file without a list of times needs frames at a constant rate.";
     NotPerFrame = "E317" elsewhere, "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, accepts names of numeric arrays that have an entry for each frame and are not keys.";
     RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
     BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ or pickle, or a folder with one for each gender. It must belong to the kind of body in the motion.";
-    BodyAlone = "E320" elsewhere, "the shape of a body without a motion", "Beside its motions AMASS stores the shape of each subject, `shape.npz`, and what the fit of markers began with, `*_stagei.npz`. They are no clips; leave them out. In Python `MotionLibrary.load(…, on_error=\"skip\")` does so, and lists them.";
+    BodyAlone = "E320" elsewhere, "the shape of a body without a motion", "In addition to motions, AMASS contains the shape of each subject, `shape.npz`, and the first stage of fitting markers, `*_stagei.npz`. These files contain no clips; leave them out. In Python, `MotionLibrary.load(…, on_error=\"skip\")` leaves them out and lists them.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
-    TableClaims = "E402", "more than the file can hold", "The file states more rows or bytes than its length can contain; nothing was read.";
+    TableClaims = "E402", "more than the file can contain", "The file states more rows or bytes than its length can contain; nothing was read.";
     Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
     NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
     NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas separate columns, and the first line names them.";
@@ -249,7 +249,7 @@ codes! {
     ListLength = "E411" elsewhere, "a list of another length", "A rotation needs four numbers of a list, a translation or a scale three; `--map NAME=LIST[3:7]` selects them.";
     NoRows = "E412", "a table without rows", "It has columns but no keys.";
     SeveralClips = "E413" elsewhere, "several clips for one table", "A table with a row for each time contains one clip. Write the clips to separate files, or as Parquet.";
-    ColumnsAmbiguous = "E414", "columns of two meanings", "The names `x y z` are a quaternion's with `w`, and a position's beside a quaternion whose columns have a number after their names (`x_1`, `x.1`). `--map` says which they are.";
+    ColumnsAmbiguous = "E414", "columns of two meanings", "The columns `x y z` may belong to a quaternion `x y z w`, or to a position if the quaternion's columns have numbers after their names (`x_1`, `x.1`). Select one with `--map`.";
     // E5xx and W5xx: trajectories.
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
@@ -270,7 +270,7 @@ codes! {
     // E7xx and W7xx: FBX.
     FbxDamaged = "E701", "an FBX file that cannot be read", "It is truncated, damaged, or not an FBX file, or has decimal commas. The message is that of the library that reads FBX, which gives no location.";
     FbxVersion = "E702", "an unknown version of FBX", "Versions 3.0 to 7.7 are supported, as text and as binary.";
-    FbxDepth = "E703" elsewhere, "a hierarchy that is too deep", "No skeleton is a thousand joints deep.";
+    FbxDepth = "E703" elsewhere, "a hierarchy that is too deep", "The hierarchy has more than a thousand levels; no skeleton has so many.";
     FbxWork = "E704" elsewhere, "curves that take too much work", "The number of evaluations of curves is limited in proportion to the length of the file. A file that needs more is damaged or malicious.";
     // E8xx and W8xx: MCAP.
     McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or not an MCAP file. The location is the position of the record in the file.";
@@ -281,10 +281,10 @@ codes! {
     RobotXml = "E900" elsewhere, "an XML file that cannot be read", "A robot's file is well-formed XML in UTF-8 without a document type definition, at most 4 MiB with the files that it includes.";
     RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
-    RobotElement = "E903" elsewhere, "an element that is not read", "It would make or move bodies by rules that are not supported; the message says what to use instead.";
+    RobotElement = "E903" elsewhere, "an element that is not read", "The element would create or move bodies by rules that are not supported; the message names an alternative.";
     JointsDoNotFit = "E904" elsewhere, "joints that are not the robot's", "The file names joints that the robot of `--robot` does not have, or has more or fewer joints without naming them. Robots of one name exist in versions with different joints.";
     NoMassCentre = "E905" elsewhere, "a body without a centre of mass", "Velocities of centres of mass (`--velocity-at mass`, BeyondMimic, IsaacLab) need them, and the robot's file has no `inertial` for this body. MuJoCo derives it from shapes, which are not read. Add it, or ask for velocities of origins.";
-    OrderContradicts = "E907" elsewhere, "an order that the bodies contradict", "A file with poses of bodies and the robot of `--robot` are compared: the joints put the bodies where the file has them in one order alone. Programs list joints and bodies depth first (MuJoCo, mjlab) or breadth first (PhysX, IsaacLab), and quaternions as w x y z or x y z w.";
+    OrderContradicts = "E907" elsewhere, "an order that the bodies contradict", "The poses of bodies in the file are compared with those that follow from its joints and the robot of `--robot`. They agree only in one order, and it is not the stated one. Programs list joints and bodies depth first (MuJoCo, mjlab) or breadth first (PhysX, IsaacLab), and quaternions as w x y z or x y z w.";
     TwoDialects = "E908", "arrays of two dialects", "Layouts of robots' motion are recognised by the names and the shapes of their arrays, and the file has those of two. Save one of them, or name the arrays with `--map`.";
     PickleDamaged = "E910", "a pickle that cannot be read", "It is truncated or damaged, or not a pickle. The location is a position in the file, or in what it unpacks to.";
     PickleCalls = "E911", "a pickle that would run code", "It names a function or a class that Python would call when it reads the file. Such files may do anything to the computer of those who open them with Python. Only numbers, texts, lists, dicts and arrays are read.";
@@ -292,8 +292,8 @@ codes! {
     PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
-    NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body that their names mean, and these names are not those of a known kind of skeleton, or hang on each other in another way. `--bones` pairs joints by their names.";
-    Dialect = "E918" elsewhere, "a motion that a dialect cannot hold", "The layout of another program has no room for it: it has a number for each hinge and slide, one root, and frames of one rate. The message says what is too much.";
+    NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body. The parts are found by the names and parents of joints, as in known kinds of skeletons; this skeleton is of another kind. Pair its joints with `--bones`.";
+    Dialect = "E918" elsewhere, "a motion that a dialect cannot store", "The layout of the other program has a number for each hinge and slide, one root, and frames of one rate. The message names the part of the motion that it cannot store.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
@@ -313,7 +313,7 @@ codes! {
     CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; the value is constant.";
     EmptySampler = "W102", "a sampler without keys", "Its target is not animated.";
     NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of weights and other properties; it is kept as it is.";
-    NodeMatrix = "W104", "a moved node with a matrix", "glTF requires translation, rotation and scale for animated nodes. The matrix is decomposed into these.";
+    NodeMatrix = "W104", "an animated node with a matrix", "glTF requires translation, rotation and scale for animated nodes. The matrix is decomposed into these.";
     Shear = "W105", "a matrix that shears", "It cannot be decomposed exactly into translation, rotation and scale. An approximation is used, and world poses are refused.";
     NegativeTime = "W106", "a negative time", "glTF has no negative times; players may not show this part.";
     ByteStride = "W107", "a stride in animation data", "glTF allows a stride only for vertices. It is used anyway.";
@@ -328,26 +328,26 @@ codes! {
     SameName = "W206", "two joints of one name", "A number is appended to the second name, so that names are unique. Braces and control characters in names are replaced by `_`.";
     NameChanged = "W207" elsewhere, "a name is changed", "The format does not allow line ends, braces or control characters in names, nor two equal names.";
     NoRoom = "W208" elsewhere, "data that the format cannot store", "It is left out. The table in docs/formats.md shows what each format can store.";
-    NoOffsets = "W209" elsewhere, "joints without offsets", "The input says the parents of joints, but not where the joints are relative to them. Motion of SMPL bodies is an example: the positions of joints depend on the shape of the body. In BVH and glTF such joints are at their parents. `--body-model` or `--offsets` places them.";
-    EndHeld = "W210" elsewhere, "a clip that ends between two frames", "The format stores frames of one rate and no times. One frame more has the value of the end, so that nothing is missing and loops continue; its time is that of the frame after the end. `--end-frame leave-out` ends with the last frame before the end instead. A format with times has a key at the end.";
-    FrameTimeRounded = "W211", "a frame time of few digits", "A frame time such as 0.033 is probably that of a common rate, 30 frames a second, rounded to few digits. This rate makes the clip longer or shorter by more than 0.5 %. `--raw-times` keeps the frame time as written, `--override-fps` replaces it.";
+    NoOffsets = "W209" elsewhere, "joints without offsets", "The input contains the parents of joints, but not the positions of joints relative to them. Motion of SMPL bodies is an example: the positions of joints depend on the shape of the body. In BVH and glTF such joints are at their parents. `--body-model` or `--offsets` places them.";
+    EndHeld = "W210" elsewhere, "a clip that ends between two frames", "The format stores frames of one rate and no times. One more frame, after the end, has the value of the end, so that nothing is missing and loops continue. With `--end-frame leave-out`, the result ends with the last frame before the end. Formats with times get a key at the end instead.";
+    FrameTimeRounded = "W211", "a frame time of few digits", "A frame time such as 0.033 is probably that of a usual rate, 30 frames a second, rounded to few digits. With this rate the clip is longer or shorter by more than 0.5 %. `--raw-times` keeps the frame time as written, `--override-fps` replaces it.";
     OffsetsReplaced = "W212" elsewhere, "offsets in the file are replaced", "The file has offsets of its joints, and `--offsets` or `--body-model` gives others. Leave the option out to keep those of the file.";
-    OtherSpace = "W213" elsewhere, "another unit or up axis than the format's", "glTF is in metres with y up. The file that was read says that its unit or its up axis is another one, and the clip was not converted: it lies on its side, or is too large or too small. `--up-axis y --scale metres` converts it.";
+    OtherSpace = "W213" elsewhere, "another unit or up axis than the format's", "glTF is in metres with y up. The input states another unit or up axis, and the clip was not converted. So it lies on its side, or is too large or too small. `--up-axis y --scale metres` converts it.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "The keys are in other arrays, so that these are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
     TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file, or a number that is no rate; `--source-fps` is for files that state none.";
     TimeUnit = "W305", "times in another unit than seconds", "Seconds since 1970 have ten digits, milliseconds thirteen, microseconds sixteen, nanoseconds nineteen (ORB-SLAM writes them). A first time from 1e11 on is taken for milliseconds, from 1e14 on for microseconds, from 1e17 on for nanoseconds. `--time-unit` states the unit and avoids this warning.";
-    ArraysNotRead = "W306", "arrays that are not read", "This is no error: the rotations were found in other arrays, and the names of these are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. What files of a layout usually have besides the motion, such as `betas` and `gender` of AMASS, the shape of the body that `--body-model` uses, causes no warning. A result in the same layout keeps arrays that are constant.";
+    ArraysNotRead = "W306", "arrays that are not read", "This is not an error: the rotations were found in other arrays, and the names of these arrays are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. Arrays that files of a layout usually contain, such as `betas` and `gender` of AMASS, cause no warning. A result in the same layout keeps constant arrays.";
     Bridged = "W401" elsewhere, "keys that are missing", "Cells are blank or NaN. Because of `--bridge-gaps`, the track is interpolated between its other keys there.";
-    ColumnsLeftOut = "W402", "columns that are left out", "Their names are not known, or a list has more numbers than `--map` uses. `--map` says what columns are.";
+    ColumnsLeftOut = "W402", "columns that are left out", "Their names are not known, or a list has more numbers than `--map` uses. `--map` defines the meaning of columns.";
     RowsSorted = "W403", "rows that are not in the order of their times", "The rows of a track are sorted by time. If the clock was set back instead, so that sorting would mix two recordings, they are refused (E026).";
     FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory has a time, a position and a quaternion, or the twelve numbers of a matrix in KITTI. Numbers after these, such as a covariance or velocities, are not read.";
     FbxBeside = "W701", "content that is not motion", "Only nodes and their animation are read from FBX. Meshes, skins, materials and other content are not.";
     FbxProperties = "W702", "curves of other properties", "They animate something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack has a start and an end. Some curves have keys outside, which a player does not show.";
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
-    FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not follow it within the tolerance.";
+    FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not approximate it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, or is a pose: each curve has one key. Nothing moves.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
     FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
@@ -355,17 +355,17 @@ codes! {
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
     McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
-    AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` gives another.";
+    AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` sets another rate.";
     JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion leaves them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
-    RobotMerged = "W905" elsewhere, "bodies that others merge", "MuJoCo merges bodies without joints into their parents where `fusestatic` is set; the bodies' numbers differ then. Names are the same.";
+    RobotMerged = "W905" elsewhere, "bodies that others merge", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
     UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it.";
-    QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as of a robot that stands where w is first. The columns have no names that say it; `--source-order` does.";
-    TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On another skeleton, joints are as far from their parents as it has them; only the hips move. The source's other joints move too, by at most what the message says.";
-    InertObjects = "W911", "objects of classes that are not read", "They are kept by the names of their classes alone; nothing is looked up or run. A value that the motion needs must not be one of them.";
+    QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as for a robot that stands upright if w is first. The columns have no names; state the order with `--source-order`.";
+    TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On the target skeleton, only the hips have translations. Other joints of the source also move relative to their parents; the message has the largest distance.";
+    InertObjects = "W911", "objects of classes that are not read", "Only the names of their classes are kept; no code is run. If the motion needs the value of such an object, this is an error (E912).";
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
-    OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`, as of another version of the robot. Bodies are computed from the joints.";
-    AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn, as angles do that a program wraps to one turn. It is interpolated as it is, the long way around. `--robot` unwraps the hinges without limits; otherwise unwrap the angles before (numpy.unwrap).";
+    OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`. The file may belong to another version of the robot. Bodies are computed from the joints.";
+    AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
 }
 
 impl Code {

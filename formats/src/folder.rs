@@ -216,7 +216,7 @@ mod system {
     }
 
     pub(super) fn open_file(folder: &Folder, name: &OsStr) -> io::Result<File> {
-        // Opening a pipe waits for its writer, unless it is said not to.
+        // Without this flag, opening a pipe would wait for its writer.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
         Ok(openat(&*folder.handle, name, flags, Mode::empty())?.into())
     }

@@ -123,7 +123,7 @@ impl OutputLocation {
         match self.folder.parent_of(&self.name) {
             Ok(parent) if parent.is_in_place() => Ok(parent),
             Ok(parent) => Err(moved(parent.path())),
-            // It was there when the output was planned.
+            // The directory existed when the output was planned.
             Err(error)
                 if is_refused(&error)
                     || matches!(
@@ -180,7 +180,7 @@ impl TemporaryName {
         const LETTERS: &[u8] = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
         const TRIES: usize = 1000;
         for _ in 0..TRIES {
-            // Seeded by the system, and different for each state.
+            // `RandomState` is seeded by the system and gives a different number each time.
             let mut number = RandomState::new().hash_one(std::process::id());
             let mut random = String::new();
             for _ in 0..RANDOM {

@@ -195,7 +195,9 @@ pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
 
 /// The warning that a file's rate is replaced.
 pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
-    format!("the file says {rate} frames a second; because of --override-fps it is read at {other}")
+    format!(
+        "the file states {rate} frames a second; because of --override-fps it is read at {other}"
+    )
 }
 
 /// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number
@@ -313,7 +315,7 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
     times.sort_by(f64::total_cmp);
     times.dedup();
     if let [time] = times[..] {
-        // A single time tells no rate, but it may be a frame of a usual one.
+        // A single time does not determine a rate, but it may be at a frame of a usual rate.
         let off = precision.rounding(time);
         let (from, to) = (time - off, time + off);
         let grid = on_common_grid(&[TimeWindow { from, to }]).filter(|_| time != 0.0)?;
@@ -441,7 +443,7 @@ fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
         let (from, to) = (time - off, time + off);
         match all.last_mut() {
             Some(last) if from <= last.to => {
-                // Two roundings of one time.
+                // Two rounded values of the same time: the true time is in both windows.
                 (last.from, last.to) = (last.from.max(from), last.to.min(to));
             }
             _ => all.push(TimeWindow { from, to }),
@@ -496,7 +498,7 @@ impl StepRates {
             counts: Vec::with_capacity(windows.len()),
             ..*self
         };
-        // Those near 0 tell how to count the others.
+        // Times near 0 are assigned to frames first, because they determine how the others are counted.
         let mut order: Vec<usize> = (0..windows.len()).collect();
         let near = |index: usize| windows[index].middle().abs();
         order.sort_by(|&a, &b| near(a).total_cmp(&near(b)));

@@ -100,7 +100,7 @@ pub struct RetargetReport {
     pub below_ground: f64,
 }
 
-/// Why a motion cannot be carried over.
+/// An error of retargeting a motion.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RetargetError {
@@ -228,8 +228,8 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// Reads the skeleton that motions are carried to: that of a glTF file, with or without animations, whose
-/// [`document`](Loaded::document) can be written with other animations; of any other file, that of its first clip.
+/// Reads the target skeleton. A glTF file needs no animations; its [`document`](Loaded::document) can be written with
+/// other animations. For any other file, the skeleton is that of its first clip.
 ///
 /// # Errors
 /// When the file cannot be opened or is invalid, or has no skeleton.

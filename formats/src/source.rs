@@ -29,7 +29,7 @@ impl Source {
                 file: None,
             });
         }
-        // Looked at before it is opened: opening a pipe waits for its writer.
+        // The type is checked before opening, because opening a pipe waits for its writer.
         let metadata = std::fs::metadata(path).map_err(unreadable)?;
         let kind = file_kind(&metadata);
         let readable = kind == "a file" || kind == "a named pipe" && pipes;

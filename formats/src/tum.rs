@@ -322,7 +322,7 @@ impl TrajectoryPoses {
         select(&mut positions, kept.as_deref());
         select(&mut keys, kept.as_deref());
         let mut set = TrackSet::new();
-        // Checked above; a set refuses what slipped through.
+        // The keys were checked above; this reports an error that the checks missed.
         let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
         set.push(TRAJECTORY_TRACK, &times, &keys).map_err(refuse)?;
         let mut clip = Motion {
@@ -429,7 +429,7 @@ fn write_motion(
         let (rotation, position) = path.pose(sample)?;
         let [x, y, z] = position;
         let [qx, qy, qz, qw] = rotation.to_array();
-        // Memory takes everything.
+        // Writing to memory cannot fail.
         let _ = writeln!(text, "{digits} {x} {y} {z} {qx} {qy} {qz} {qw}");
         out.write_all(text.as_bytes())?;
         text.clear();

@@ -370,7 +370,7 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
         assert_eq!(is_stepped(&found), is_stepped(clip), "{case}");
     } else {
         assert!(
-            !is_stepped(clip) || is_reported("hold each key"),
+            !is_stepped(clip) || is_reported("the steps of channels"),
             "{case}: {left_out}"
         );
     }

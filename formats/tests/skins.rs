@@ -79,14 +79,18 @@ fn files_without_meshes_have_none_and_broken_ones_say_why() {
         (
             "\"joints\": [\n    1,",
             "\"joints\": [\n    9,",
-            "number 9 of nodes is named",
+            "index 9 of nodes does not exist",
         ),
         (
             "\"joints\": [\n    1,\n    2\n",
             "\"joints\": [\n    1\n",
-            "number 1 of the skin's joints is named, and there are 1",
+            "index 1 of the skin's joints does not exist: the list has length 1",
         ),
-        ("\"skin\": 0", "\"skin\": 3", "number 3 of skins is named"),
+        (
+            "\"skin\": 0",
+            "\"skin\": 3",
+            "index 3 of skins does not exist",
+        ),
         (
             "\"JOINTS_0\": 1",
             "\"JOINTS_0\": 2",

@@ -1,4 +1,4 @@
-/** The methods between keys, by the names that the program has for them. */
+/** The interpolation methods, with the names of the program. */
 export type Method =
   | "authored"
   | "slerp"
@@ -9,7 +9,7 @@ export type Layout = "track" | "frame";
 
 /** The curve between keys and outside them. */
 export interface CurveOptions {
-  /** Default: `authored`, the method that the file gives each channel; bessel-overhauser where it gives none. */
+  /** Default: `authored`, the interpolation that the file states for each channel, or bessel-overhauser if it states none. */
   method?: Method;
   /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
@@ -37,7 +37,7 @@ export interface SampleOptions extends CurveOptions {
 
 /** How angular velocities and accelerations are sampled. */
 export interface RateOptions extends SampleOptions {
-  /** The axes in which they are: the body's, which is the default, or its parent's. */
+  /** The axes of the result: those of the body (the default) or of its parent. */
   axes?: "body" | "parent";
 }
 
@@ -56,9 +56,9 @@ export type Times = number | ArrayLike<number> | Frames;
 /** The fields of all results. */
 export interface Result {
   tracks: number;
-  /** Of each track. */
+  /** The number of samples of each track. */
   samples: number;
-  /** Seconds, where frames were asked for. */
+  /** The times of the frames, seconds; only if frames were requested. */
   times?: Float64Array;
 }
 
@@ -86,7 +86,7 @@ export interface World extends Result {
   rotations: Float32Array;
 }
 
-/** Matrices that take points from joints to the world. */
+/** Matrices that transform points from the axes of a joint to the world. */
 export interface Matrices extends Result {
   /** 16 numbers a joint, column after column. */
   matrices: Float32Array;
@@ -127,17 +127,17 @@ export interface Track {
   scales?: VectorKeys;
   /** The index of its parent track. */
   parent?: number;
-  /** Where it is without keys. */
+  /** The rest pose, which is used without keys. */
   rest?: { translation?: ArrayLike<number>; rotation?: ArrayLike<number>; scale?: ArrayLike<number> };
   /** The interpolation that `authored` uses for it, as in glTF. */
   interpolation?: "step" | "linear" | "cubic";
 }
 
-/** Tracks that belong together, ready to be sampled. */
+/** A clip: tracks with their keys, as a clip of a file. */
 export class Clip {
   private constructor();
   readonly name: string | null;
-  /** Of the tracks. */
+  /** The names of the tracks. */
   readonly names: readonly string[];
   /** The index of each track's parent; null for roots. */
   readonly parents: readonly (number | null)[];
@@ -156,15 +156,15 @@ export class Clip {
   velocities(times: Times, options?: RateOptions): Rates;
   /** Angular accelerations, rad/s². */
   accelerations(times: Times, options?: RateOptions): Rates;
-  /** Where all joints are in the world. */
+  /** The positions and rotations of all joints in the world. */
   world(times: Times, options?: SampleOptions): World;
-  /** A matrix for each joint that takes it to the world. */
+  /** The matrix of each joint, from its axes to the world. */
   matrices(times: Times, options?: SampleOptions): Matrices;
   /** Rotations at one time after another, such as the frames of a game; the clip may be freed before it. */
   sampler(options?: CurveOptions): Sampler;
   /** The keys of a track, which counts from 0. */
   keys(track: number): Keys;
-  /** Frees its memory; else the garbage collector does, some time. */
+  /** Frees the memory at once; otherwise the garbage collector does this later. */
   free(): void;
 }
 
@@ -179,7 +179,7 @@ export class Sampler {
   pose(time: number, out?: Float32Array): Float32Array;
   /** `x y z w` of a track, which counts from 0. */
   sample(track: number, time: number, out?: Float32Array): Float32Array;
-  /** Frees its memory; else the garbage collector does, some time. */
+  /** Frees the memory at once; otherwise the garbage collector does this later. */
   free(): void;
 }
 
@@ -188,7 +188,7 @@ export class Tumble {
   private constructor();
   readonly version: string;
   readonly methods: readonly { name: string; summary: string; interpolates: boolean }[];
-  /** The formats that `read` knows. */
+  /** The formats that `read` supports. */
   readonly formats: readonly string[];
   /** A clip of arrays. */
   clip(tracks: Track[], options?: { name?: string | null; isWorld?: boolean }): Clip;

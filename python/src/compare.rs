@@ -58,17 +58,17 @@ impl Spread {
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ArrayDifference {
-    /// How many numbers there are.
+    /// The number of numbers that are compared.
     numbers: usize,
-    /// How many of them differ.
+    /// The number of numbers that differ.
     differing: usize,
     /// The differences of numbers.
     difference: Spread,
-    /// The indices of the largest.
+    /// The indices of the largest difference.
     largest_at: Vec<usize>,
-    /// Angles in degrees, where four numbers each are a rotation; else None.
+    /// The angles in degrees, if the arrays contain rotations (four numbers each); otherwise None.
     rotation: Option<Spread>,
-    /// The indices of the rotation of the largest angle; else None.
+    /// The indices of the rotation with the largest angle; None if there are no rotations.
     largest_rotation_at: Option<Vec<usize>>,
 }
 
@@ -100,17 +100,17 @@ impl ArrayDifference {
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelDifference {
-    /// The mean.
+    /// The mean difference.
     mean: f64,
-    /// The root of the mean square.
+    /// The root of the mean square of the differences.
     rms: f64,
-    /// The largest.
+    /// The largest difference.
     largest: f64,
-    /// The name of the track with the largest.
+    /// The name of the track with the largest difference.
     track: String,
-    /// When it is, seconds, on the clock of the first clip.
+    /// The time of the largest difference, seconds, on the clock of the first clip.
     time: f64,
-    /// The same in frames of the first clip, from 0 at its first key; None where it has no rate.
+    /// The frame of the largest difference, counted in the first clip from 0 at its first key; None if it has no rate.
     frame: Option<f64>,
 }
 
@@ -154,13 +154,13 @@ impl ChannelDifference {
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointDifference {
-    /// Its name.
+    /// The name of the track.
     track: String,
-    /// Degrees.
+    /// The differences of rotations, degrees.
     rotation: ChannelDifference,
-    /// Lengths; None where neither clip moves.
+    /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
-    /// Lengths of the differences of scales; None where neither clip scales.
+    /// The differences of scales, as lengths; None if neither clip has scales.
     scale: Option<ChannelDifference>,
 }
 
@@ -227,21 +227,21 @@ impl ChannelDifference {
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ClipDifference {
-    /// How many tracks both have.
+    /// The number of tracks that both clips have.
     tracks: usize,
-    /// The names of those that one alone has: of the first clip, and of the second.
+    /// The names of the tracks that only one clip has: a list for the first clip, and one for the second.
     missing: (Vec<String>, Vec<String>),
-    /// Samples of each track.
+    /// The number of samples of each track.
     samples: usize,
-    /// First and last time, seconds.
+    /// The first and the last time, seconds.
     span: (f64, f64),
-    /// Rotations whose bits are the same.
+    /// The number of rotations whose bits are the same.
     identical: u64,
-    /// Degrees.
+    /// The differences of rotations, degrees.
     rotation: ChannelDifference,
-    /// Lengths; None where neither clip moves.
+    /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
-    /// Lengths of the differences of scales; None where neither clip scales.
+    /// The differences of scales, as lengths; None if neither clip has scales.
     scale: Option<ChannelDifference>,
     /// The differences of each track, in the order of the first clip.
     joints: Vec<JointDifference>,
@@ -333,31 +333,31 @@ impl PathStatistics {
 #[pyclass(frozen, get_all, eq, weakref, module = "tumble", from_py_object)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathErrors {
-    /// Which clip's poses are compared, 0 or 1: the one with fewer.
+    /// The index of the clip whose poses are compared, 0 or 1: the clip with fewer poses.
     times_of: usize,
-    /// How many are compared.
+    /// The number of poses that are compared.
     poses: usize,
-    /// Those of its poses that have none of the other clip.
+    /// The number of poses that are not compared because they are outside the times of the other clip.
     outside: usize,
-    /// Those of its poses in gaps of the other clip.
+    /// The number of poses that are not compared because they are in gaps of the other clip.
     in_gaps: usize,
     /// First and last time, seconds.
     span: (f64, f64),
-    /// The transform that lays the estimate over the reference: first the scale,
+    /// The scale of the alignment. The alignment scales the estimate, then rotates it, then translates it.
     scale: f64,
-    /// then the rotation, x y z w,
+    /// The rotation of the alignment, x y z w.
     rotation: [f64; 4],
-    /// then the translation.
+    /// The translation of the alignment.
     translation: [f64; 3],
     /// Absolute errors of the positions, lengths.
     ape_translation: PathStatistics,
     /// Absolute errors of the rotations, degrees.
     ape_rotation: PathStatistics,
-    /// Relative errors of the positions, lengths; None where they were not asked for.
+    /// Relative errors of the positions, lengths; None without `rpe`.
     rpe_translation: Option<PathStatistics>,
-    /// Relative errors of the rotations, degrees; None where they were not asked for.
+    /// Relative errors of the rotations, degrees; None without `rpe`.
     rpe_rotation: Option<PathStatistics>,
-    /// How many steps the relative errors are of.
+    /// The number of steps for which relative errors are computed.
     rpe_count: usize,
 }
 
@@ -402,12 +402,11 @@ fn of_compare(error: CompareError) -> PyErr {
 /// Compares two clips, or two arrays: the largest and the mean difference, and where it is.
 ///
 /// `compare(first, second, *, fps=None, at=None, start=None, end=None, world=False, engine=None)`
-/// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or
-/// at `fps` (from `start` to `end`), or at the times `at`. Tracks are matched by name, or by their order if the names
-/// differ. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`,
-/// whose `rotation` is in degrees.
-/// Arrays of the same shape are compared number by number, and by angles if they contain rotations. Returns an
-/// `ArrayDifference`.
+/// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or at `fps`
+/// (from `start` to `end`), or at the times `at`. Tracks are matched by equal names, or by index if neither clip has
+/// names. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`, whose
+/// `rotation` is in degrees. Arrays of the same shape are compared number by number, and by angles if they contain
+/// rotations. Returns an `ArrayDifference`.
 ///
 /// >>> import tumble
 /// >>> one = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])

@@ -331,7 +331,7 @@ impl Crowd {
         Ok(array)
     }
 
-    /// The second of its clip at which each instance stands in a layer, (instances,), float64.
+    /// The time in its clip that each instance plays in a layer, seconds: (instances,), float64.
     ///
     /// >>> import tumble
     /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])

@@ -15,9 +15,9 @@ use crate::errors::{device, guarded};
 use crate::output::{array_of, filled_bytes, type_name};
 
 /// A result in the memory of an NVIDIA card, made by `Engine.evaluate(…, device_array=True)` there:
-/// `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` take it without a copy, and whatever knows
-/// `__cuda_array_interface__`. The card may still be writing it; the stream that takes it waits for that, the host
-/// does not. All that import it share its memory, which is freed after the last of them.
+/// `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` import it without a copy, and so do libraries
+/// that use `__cuda_array_interface__`. The card may still be writing the result. The stream that imports it waits for
+/// the card; your Python code does not. All imported tensors share its memory, which is freed after the last of them.
 ///
 /// >>> import tumble, torch  # doctest: +SKIP
 /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])  # doctest: +SKIP
@@ -76,7 +76,7 @@ impl DeviceArray {
 
 #[pymethods]
 impl DeviceArray {
-    /// The lengths of the axes, as those of the array of NumPy's would be.
+    /// The shape, as of a NumPy array.
     #[getter]
     fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.shape)
@@ -154,7 +154,7 @@ impl DeviceArray {
         Ok(interface)
     }
 
-    /// A copy on the host: an array of NumPy's of the same shape and type.
+    /// Copies the result to the host: a NumPy array of the same shape and type.
     ///
     /// >>> tumble.Engine("vulkan").evaluate(clip, fps=24, device_array=True).numpy()  # doctest: +SKIP
     fn numpy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -109,8 +109,8 @@ pub(crate) fn rotations_of_six<'py>(
 }
 
 /// The headings of `quaternions` (…, 4), float64 (…), rad from -π to π about the axis that points `up`, "y" or "z". By
-/// the twist about that axis, or by the direction on the ground of the body's `axis`, "x", "y" or "z". With z up the
-/// heading of +x is 0, with y up that of +z.
+/// default it is the twist about that axis; with `axis` "x", "y" or "z", it is the direction of this axis of the body
+/// on the ground. With z up the heading of +x is 0, with y up that of +z.
 ///
 /// >>> import tumble
 /// >>> tumble.features.heading([[0.8, 0, 0, 0.6]], order="wxyz", up="z").round(3)
@@ -139,8 +139,8 @@ fn axis_of(axis: &Bound<'_, PyAny>) -> PyResult<usize> {
 }
 
 /// Which bodies touch the ground: bool (…), of `positions` and `velocities` (…, 3). A body touches it while it is lower
-/// than `height` (metres) and slower than `speed` (m/s). `window`: of the first axis, frames; each value is replaced by
-/// what most of so many frames around it are.
+/// than `height` (metres) and slower than `speed` (m/s). `window`: a number of frames, along the first axis; each value
+/// is replaced by the majority of this many frames around it.
 ///
 /// >>> import tumble
 /// >>> tumble.features.contacts([[0.0, 0.0, 0.02]], [[0.1, 0.0, 0.0]], up="z", height=0.05, speed=0.2)
@@ -222,8 +222,9 @@ fn exchanged<T: Copy>(rows: Vec<T>, pairs: Option<&[usize]>) -> Vec<T> {
         .collect()
 }
 
-/// Positions or velocities (…, bodies, 3), mirrored at the plane through the origin across `axis`, "x", "y" or "z", the
-/// axis from left to right. `pairs`: the partner of each body (`mirror_pairs`), whose place it takes.
+/// Positions or velocities (…, bodies, 3), mirrored at the plane through the origin that is perpendicular to `axis`,
+/// "x", "y" or "z", the axis from left to right. `pairs`: the partner of each body (`mirror_pairs`), with which it is
+/// exchanged.
 ///
 /// >>> import tumble
 /// >>> tumble.features.mirrored_positions([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], axis="y", pairs=[1, 0])

@@ -91,17 +91,17 @@ impl Reduction {
     }
 }
 
-/// Takes keys out of a clip: the fewest whose curves stay near all samples.
+/// Removes keys from a clip. The curves of the remaining keys are within a tolerance of all samples.
 ///
 /// `reduce(clip, *, tolerance=0.1, distance=None, shell=0.0, curve="linear", together=False, fps=None,
 /// engine=None)`
 ///
-/// The keys are the samples, or the frames of `fps`. At each of them every joint stays within the angle
-/// of `tolerance`, degrees, and the distance `distance` (None: what the angle amounts to at the end of the
-/// longest chain of joints): in the world where the clip has a skeleton, else each track for itself. That it
-/// does is found by evaluating the keys that stay. `shell`: points so far from each joint stay within the
-/// distance too. `curve`: "linear" (arcs and straight lines), "bessel-overhauser", or "cubic", glTF's.
-/// `together`: all tracks keep keys at the same times, as most formats but glTF hold them.
+/// The samples are the keys of the clip, or its frames at `fps`. At each sample, every joint is within the angle
+/// `tolerance`, degrees, and the distance `distance` (None: the arc of this angle at the end of the longest chain of
+/// joints). If the clip has a skeleton, this is measured in the world, otherwise for each track. It is checked by
+/// evaluating the remaining keys. `shell`: points at this distance from each joint are within `distance` too. `curve`:
+/// "linear" (arcs and straight lines), "bessel-overhauser", or "cubic", glTF's. `together`: all tracks keep keys at the
+/// same times, as most formats other than glTF require.
 ///
 /// >>> import numpy as np, tumble
 /// >>> half = np.linspace(0.0, 0.5, 101)

@@ -437,10 +437,10 @@ impl Surface {
     ///
     /// `route(start, goal, *, by=None, avoid=None, clearance=0.0, finest=None, max_slope=None, up=(0, 1, 0))`
     ///
-    /// `by`: of meshes "exact", the shortest one (the default), "plane", "greedy" or "edges"; of nets "line"
-    /// (the default) or "facets:N". `avoid`: a mesh of obstacles, from which routes stay `clearance` away;
-    /// `finest`: the longest edge at the rim of what is closed by that (a hundredth of the size). `max_slope`:
-    /// the steepest slope that is walked, degrees against `up`.
+    /// `by`: of meshes "exact", the shortest one (the default), "plane", "greedy" or "edges"; of nets "line" (the default)
+    /// or "facets:N". `avoid`: a mesh of obstacles, from which routes stay `clearance` away; `finest`: the longest edge
+    /// along the boundary of the area that obstacles close (default: a hundredth of the mesh's size). `max_slope`: the
+    /// steepest slope that is walked, degrees against `up`.
     ///
     /// >>> import numpy as np, tumble
     /// >>> roof = tumble.Surface([[0, 0, 0], [2, 0, 0], [0, 1, 1], [2, 1, 1], [0, 0, 2], [2, 0, 2]],
@@ -558,7 +558,8 @@ impl Surface {
 
 #[pymethods]
 impl Route {
-    /// From the start to the goal, (n, 3), float64; straight between them. One where the two are the same.
+    /// The points from the start to the goal, (n, 3), float64, connected by straight lines; a single point if start and
+    /// goal are the same.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array(py, &self.found.points)

@@ -16,7 +16,7 @@ use crate::options::EvaluationKeywords;
 use crate::output::{array, filled};
 use crate::run::work;
 
-/// Evaluates a clip at one time after another, for loops that need a pose now. Made by `Clip.sampler`.
+/// Evaluates a clip at one time after another, for loops that need one pose at a time. Made by `Clip.sampler`.
 ///
 /// Every value has the bits that `Clip.evaluate` gives at the same times. Times may be in any order; it is
 /// fastest if most are near the one before. Threads may share a sampler, but wait for each other; a copy
@@ -87,8 +87,8 @@ impl Sampler {
         self.clip.motion.set.track_count()
     }
 
-    /// The memory that the clip takes for each key, bytes: 16 and more where its keys are kept, as large clips do whose
-    /// samples can be computed from these, else 68 or 212 and more.
+    /// The memory that the clip takes for each key, in bytes. It is 68 or 212 and more if the clip keeps segments, and 16
+    /// and more if it keeps its keys instead, as large clips can do.
     ///
     /// >>> import tumble
     /// >>> sampler = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]]).sampler(method="slerp")

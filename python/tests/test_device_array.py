@@ -49,7 +49,7 @@ def exporting(of_all=False):
         try:
             evaluate(engine)
         except tumble.DeviceError as error:
-            if "cannot hand the memory of results to others" in str(error):
+            if "cannot share the memory of results with other APIs" in str(error):
                 continue
         found.append(engine)
     return found

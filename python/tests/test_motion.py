@@ -280,7 +280,7 @@ def test_source_fps_is_for_files_that_state_no_rate(tmp_path):
     stated, silent = tmp_path / "stated.npz", tmp_path / "silent.npz"
     np.savez(stated, **body, mocap_framerate=30.0)
     np.savez(silent, **body)
-    with pytest.warns(tumble.InputWarning, match="says 30 frames a second, which is used"):
+    with pytest.warns(tumble.InputWarning, match="states 30 frames a second, which is used"):
         library = tumble.MotionLibrary.load([stated, silent], source_fps=120)
     assert library.lengths.tolist() == [1.0, 0.25]
     with pytest.warns(tumble.InputWarning, match="override_fps it is read at 120"):

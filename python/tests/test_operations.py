@@ -424,7 +424,7 @@ def test_what_cannot_be_followed(rng, engine):
             engine.follow(when, where, fps=10, **options)
     with pytest.raises(tumble.InputError, match="give `fps`"):
         engine.follow(times, points)
-    with pytest.warns(tumble.InputWarning, match="stands still"):
+    with pytest.warns(tumble.InputWarning, match="does not move"):
         engine.follow(times[:2], np.zeros((2, 3)), fps=10)
 
 

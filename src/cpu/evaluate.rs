@@ -47,7 +47,7 @@ pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     count: usize,
     lines: StreamingLines<'_>,
 ) {
-    // The evaluation starts where the line does; the rotations that are there already stay.
+    // Evaluation starts at the beginning of the cache line. The rotations that are already in the line are kept.
     let (_, there) = lines.begun;
     let (first, count) = (first - there as f32, there + count);
     frames_in_vectors::<L, S>(segment, affine, first, count, lines);
@@ -169,7 +169,7 @@ struct ListedDistances<'a, S>(&'a [f32], PhantomData<S>);
 impl<L: Lanes, S: Evaluate> Distances<L> for ListedDistances<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        // The loop asks for parameters after its last iteration; their values do not count.
+        // The pipelined loop also reads parameters after its last iteration; their values have no effect.
         let Some((vector, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
             return L::all(0.0);
         };

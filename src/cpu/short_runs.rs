@@ -48,7 +48,7 @@ impl<'a> ShortRuns<'a> {
         };
         let limit = match clip.interpolation.form() {
             Form::Arc => SAMPLES_OF_AN_ARC,
-            // One by one, as they are in runs.
+            // Polynomials are evaluated one sample at a time, as in runs.
             Form::Polynomial => SAMPLES_ONE_BY_ONE,
         };
         let is_short = samples.len() > SAMPLES_ONE_BY_ONE

@@ -153,7 +153,7 @@ impl ClipTables {
         if interpolation.quantity != Quantity::Rotation {
             return Err(CrowdError::NotRotations);
         }
-        // Instances say how they go on.
+        // The wrap mode is a property of the instances.
         (interpolation.before, interpolation.after) = (WrapMode::Hold, WrapMode::Hold);
         let joints = offsets.len();
         let (start, end) = set.time_span().unwrap_or((0.0, 0.0));
@@ -269,7 +269,7 @@ impl ClipTables {
             if curve.form != FORM_CONSTANT {
                 let bytes: &[u8] = bytemuck::cast_slice(&curve.spans);
                 base = match last {
-                    // Mostly all curves have the same spans.
+                    // Usually all curves have the same spans.
                     Some((spans, base)) if bytes == bytemuck::cast_slice::<_, u8>(spans) => base,
                     _ => *known.entry(bytes.to_vec()).or_insert_with(|| {
                         self.push_base(&curve.spans);
@@ -282,7 +282,7 @@ impl ClipTables {
             sides.entry(side).or_default().push((index, curve));
         }
         if self.bases.len() == first_base {
-            // Entries always stand somewhere.
+            // Every entry needs a time base, so there is always one.
             self.push_base(&[CrowdSpan::zeroed()]);
         }
         let first_channel = self.channels.len();

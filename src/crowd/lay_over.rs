@@ -47,7 +47,8 @@ impl Over<'_> {
         let mut first = 0;
         while first < output.len() {
             let vectors = (output.len() - first).div_ceil(L::COUNT);
-            // Few ways, for each is compiled for each width. The widest vectors have as many joints as most skeletons.
+            // Only a few variants, because each is compiled for each width. The widest vectors have enough lanes for
+            // most skeletons.
             if L::COUNT == MAX_LANES && vectors <= 2 {
                 self.some::<L, 2>(first, output);
                 first += 2 * L::COUNT;
@@ -125,7 +126,7 @@ fn slerp<L: Lanes, const VECTORS: usize>(
     let (sum, difference) = chord(from, to);
     let square = dot(difference, difference);
     let whole = dot(sum, sum);
-    // Where the square is 0 so is the difference, which the large number here does not change.
+    // If the square is 0, the difference is 0 too, and multiplying it by this large number changes nothing.
     let (inverse, to_unit) = (reciprocal_root(square), reciprocal_root(whole));
     let (small, large) = (root_by(square, inverse), root_by(whole, to_unit));
     if (small - large).any_at_least(0.0) {

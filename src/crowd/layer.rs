@@ -200,7 +200,7 @@ mod tests {
                 true => 2 * i64::from(period) - along.time,
                 false => along.time,
             };
-            // A mirrored time between two ticks is cut to the tick below, on the way back too.
+            // A mirrored time between two ticks is rounded down, also while the clip plays backwards.
             let back = i64::from(wrap == WrapMode::Mirror && along.time >= i64::from(period));
             let off = expected - i64::from(found);
             prop_assert!((0..=back).contains(&off), "{found}, {along:?}");

@@ -99,7 +99,7 @@ impl InLanes for InstancesTask<'_, '_> {
         let (found, layered) = self.rotations.split_at_mut(scene.library.joint_count());
         for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
             let is_all = scene.values == CrowdValues::Rotations;
-            // One call: its many instructions are compiled where it stands.
+            // A single call for both cases, because the function is inlined and has many instructions.
             let into = if is_all { &mut *output } else { &mut *found };
             rotations::<L>(&context, tables, instance, layered, into);
             if !is_all {
@@ -121,7 +121,7 @@ fn matrices(
     let (matrices, _) = output.as_chunks_mut::<3>();
     for step in FrameStep::of(scene.values.into()) {
         match step {
-            // They are there.
+            // The caller has computed these steps already.
             FrameStep::Positions | FrameStep::Rotations => {}
             FrameStep::Locals => {
                 for ((joint, &rotation), matrix) in (0..).zip(found).zip(&mut *matrices) {

@@ -620,7 +620,7 @@ impl Joint {
         let [x, y, z, w] = before.rotation;
         let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]);
         let sine = (x * x + y * y + z * z).sqrt();
-        // The shorter way round; at an angle of 0 the limit.
+        // The shorter arc; the limit if the angle is 0.
         let angle = 2.0 * arc_tangent(sine, w.abs());
         let scale = if sine > 0.0 { angle / sine } else { 2.0 };
         let scale = if w < 0.0 { -scale } else { scale };
@@ -779,7 +779,7 @@ impl ClipMoment<'_> {
         }
         let (span, s, rate) = self.along(channel);
         let (rotation, slope) = match form {
-            // An arc turns as fast everywhere as in its middle.
+            // The angular velocity of an arc is the same everywhere.
             FORM_ARC => {
                 let first = channel.first + span * channel.count * 2;
                 let [middle, tangent] =

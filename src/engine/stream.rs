@@ -28,7 +28,7 @@ impl Engine {
         let plan = self.plan(request, layout, Encoding::F32, Some(chunk));
         let whole = Window::of(request.tracks.clone(), request.samples.clone(), layout);
         let (windows, quantity) = (whole.cut(chunk), request.interpolation.quantity);
-        // Nothing comes before an error that could be known.
+        // Errors that can be found in advance are returned before the first chunk.
         request.check().map_err(Error::from)?;
         match plan.chunks {
             Chunks::PreparedOnce => {

@@ -34,7 +34,8 @@ pub(crate) fn evaluate(
     let whole = Window::of(request.tracks.clone(), request.samples.clone(), plan.layout);
     let mut pieces = VecDeque::from(plan.pieces.clone());
     let are_several = pieces.len() > 1;
-    // The memory of a piece is used by the next one: fresh memory costs more than the work in it.
+    // The next piece reuses the memory of the last one, because the first access to new memory takes longer than the
+    // computation.
     let mut spare = None;
     let mut scratch = Vec::new();
     while let Some(piece) = pieces.pop_front() {

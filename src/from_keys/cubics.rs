@@ -112,7 +112,7 @@ impl CubicBlock {
     }
 
     pub(super) fn flush(&mut self, output: &mut OutputIter<'_>) {
-        // Unused lanes are evaluated too; marked as held, they do not count as unresolved.
+        // Unused lanes are evaluated too. They are marked as held, so that they do not count as unresolved.
         self.held[self.count..].fill(1.0);
         in_lanes(self);
         for (&rotation, value) in self.rotations[..self.count].iter().zip(output) {

@@ -146,7 +146,7 @@ impl IntervalPlan {
             key + 1 + u32::from(at_end.kind == KEY_INNER && !weights.is_empty()),
         ];
         if lane == 0 {
-            // Lanes that stay unused have the keys of the first.
+            // Unused lanes get the keys of the first lane.
             self.vectors.push(IntervalLanes::new(
                 keys.map(|key| [key; MAX_LANES]),
                 [at_start, at_end],

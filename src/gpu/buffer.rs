@@ -109,7 +109,8 @@ impl Buffer {
             Residence::Upload | Residence::Direct | Residence::Device
         );
         let is_texels = device.reads_texels && is_read;
-        // Both families may use what is copied on another queue, without a change of owners.
+        // A buffer that is copied on another queue is shared by both families, so that its ownership need not be
+        // transferred.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
         let families = [QueueLane::Kernels, QueueLane::Copies].map(|lane| device.family(lane));
         let families = (is_copied && families[0] != families[1]).then_some(families);
@@ -129,7 +130,7 @@ impl Buffer {
         };
         buffer.is_incoherent = kind.mapped && !physical.is_coherent(memory_type);
         if buffer.is_incoherent {
-            // A range that is made visible in one buffer must not be part of another.
+            // Flushing works on whole atoms, so no two buffers may share an atom.
             let atom = physical.non_coherent_atom;
             needs.alignment = needs.alignment.max(atom);
             needs.size = needs.size.next_multiple_of(atom);

@@ -136,7 +136,7 @@ impl MachineClip for VulkanClip {
     }
 
     fn replace(&mut self, data: ClipData) -> Result<(), EvaluateError> {
-        // They are of the other tracks.
+        // The kept lists are for the old tracks.
         self.lists.forget();
         self.data = Arc::new(data);
         let old = lock(&self.buffers).take();
@@ -161,8 +161,8 @@ pub struct ClipTarget {
     bound: u64,
     /// The length of the result, bytes.
     bytes: u64,
-    // The sets lead to it. The caller who records promises that no work that uses it is in flight when the target is
-    // dropped.
+    // The descriptor sets refer to it. The caller guarantees that no work that uses it is in flight when the target
+    // is dropped.
     _segments: Arc<ClipBuffers>,
 }
 
@@ -245,8 +245,8 @@ impl ClipTarget {
         unsafe { self.record_between(commands, offset, CommandScopes::default()) }
     }
 
-    /// As [`ClipTarget::record`], with barriers for some users of the result's memory alone: the evaluation waits for
-    /// those before it, and those after it see the result.
+    /// As [`ClipTarget::record`], with barriers only for the commands that use the result's memory (`scopes`): the
+    /// evaluation waits for earlier ones, and later ones see the result.
     ///
     /// # Errors
     /// As for [`ClipTarget::record`].

@@ -59,7 +59,7 @@ pub(crate) struct DeviceCrowd {
 impl CrowdTables {
     /// Copies the tables to the device.
     fn new(engine: &VulkanEngine, source: &CrowdSource<'_>) -> Result<Self, VulkanError> {
-        // Behind the links, where each level begins and ends.
+        // After the links, the first and the last index of each level.
         let mut links = source.links.to_vec();
         links.extend(source.levels.windows(2).map(|level| CrowdLink {
             joint: level[0],
@@ -160,8 +160,8 @@ pub struct CrowdTarget {
     frames: Frames,
     /// The recording of a frame, which the next frame fills again.
     work: Mutex<Recorded>,
-    // The sets lead to them. The caller who records promises that no work that uses them is in flight when the target is
-    // dropped.
+    // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
+    // target is dropped.
     _buffers: Vec<Buffer>,
 }
 
@@ -187,7 +187,7 @@ impl CrowdTarget {
             buffers.push(buffer);
             Ok::<_, VulkanError>(resource)
         };
-        // Nothing where instances are evaluated as wholes.
+        // No memory for positions if whole instances are evaluated.
         let position_bytes = match kernels.whole {
             Some(_) => 0,
             None => shape.position_bytes(),

@@ -256,7 +256,7 @@ impl LogicalDevice {
     /// Marks the device as hung: its objects are not destroyed any more, because they may still be in use.
     pub(crate) fn mark_hung(&self) {
         if !self.hung.swap(true, Ordering::Relaxed) {
-            // The instance must outlive the device, which stays.
+            // The device is not destroyed, so the instance must not be destroyed either.
             std::mem::forget(Arc::clone(&self.physical.instance));
         }
     }
@@ -294,7 +294,7 @@ impl LogicalDevice {
 
     /// Waits until the driver has released copies that have ended. Errors are ignored.
     pub(crate) fn settle(&self) {
-        // The queue that computes on an application's device is not the engine's to wait for.
+        // On an application's device, the engine must not wait for the compute queue.
         let lanes = match self.owned {
             true => &[QueueLane::Kernels, QueueLane::Copies][..],
             false => &[QueueLane::Copies],
@@ -382,7 +382,7 @@ impl DeviceQueue {
 
     /// Calls `work` while nothing else uses the queue; `None` if the application's lock did not call its argument.
     pub(crate) fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
-        // Always in this order. The application's lock may be one for several queues, so it is the last.
+        // Always lock in this order. The application may use one lock for several queues, so its lock is the last.
         let _engines = self.lock();
         match &self.of_application {
             Some(shared) => shared.run(|| work(self.raw)),

@@ -23,7 +23,7 @@ const TIMEOUT_SECONDS: u64 = 60;
 
 /// The memory of a result, and the semaphore that the device signals when it has written it.
 pub(crate) struct Exported {
-    // Dropped first: no thread waits for it any more when the buffer is freed.
+    // Dropped before the buffer, so that no thread waits for it when the buffer is freed.
     done: Option<Mutex<Semaphore>>,
     /// The semaphore's value when the last submitted work has ended.
     submitted: AtomicU64,
@@ -84,7 +84,7 @@ impl Exported {
         let info = vk::SemaphoreWaitInfo::default()
             .semaphores(&semaphores)
             .values(&values);
-        // A device that has hung is not waited for again.
+        // If the device has hung, do not wait for it a second time.
         let seconds = TIMEOUT_SECONDS * u64::from(device.may_destroy());
         // SAFETY: a timeline semaphore of this device, which has Vulkan 1.2.
         match unsafe { device.raw.wait_semaphores(&info, seconds * 1_000_000_000) } {
@@ -101,8 +101,8 @@ impl Exported {
 
 impl Drop for Exported {
     fn drop(&mut self) {
-        // The memory is freed next, and no other code waits for the work before that. That of a lost device has ended; after
-        // another error it may not have.
+        // The memory is freed next, so this must wait for the work. The work of a lost device has ended; after
+        // another error it may still run.
         if let Err(error) = self.wait()
             && !error.is_lost()
         {

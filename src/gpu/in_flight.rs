@@ -147,7 +147,7 @@ impl<U> InFlight<U> {
     ) -> Result<(), VulkanError> {
         if let Some(mut spent) = self.results.wait()? {
             if self.kept.is_some() {
-                // It may have ended long ago.
+                // The work may have ended long before this call.
                 spent.submitted = (spent.finished)
                     .checked_sub(spent.on_device)
                     .unwrap_or(spent.finished);

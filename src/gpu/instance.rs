@@ -46,7 +46,7 @@ impl Instance {
 
     /// As `new`, for an application that requests this version of Vulkan.
     pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
-        // So say loaders that find no driver.
+        // Loaders return these errors if they find no driver.
         let is_absence = |error: &VulkanError| {
             matches!(error, VulkanError::Call { result, .. }
                 if *result == vk::Result::ERROR_INCOMPATIBLE_DRIVER)
@@ -75,7 +75,7 @@ impl Instance {
         let has_extension = |layer: Option<&CStr>, name: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
             let found = unsafe { entry.enumerate_instance_extension_properties(layer) };
-            // So loaders say that a driver's manifest (VK_DRIVER_FILES) is no JSON.
+            // Loaders return this if a driver's manifest (VK_DRIVER_FILES) is not valid JSON.
             if found.as_ref().err() == Some(&vk::Result::ERROR_OUT_OF_HOST_MEMORY) {
                 return Err(VulkanError::NoDevice);
             }

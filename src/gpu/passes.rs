@@ -56,8 +56,8 @@ pub struct PassTarget {
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     bytes: u64,
-    // The sets lead to them. The caller who records promises that no work that uses them is in flight when the target is
-    // dropped.
+    // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
+    // target is dropped.
     _buffers: Vec<Buffer>,
 }
 
@@ -181,7 +181,7 @@ impl PassTarget {
         const POSES: &str = "poses";
         let mut dispatches: Vec<([Option<Slice>; 4], [usize; 2])> = Vec::new();
         match job {
-            // Kernels are not dispatched over nothing.
+            // Nothing is dispatched for 0 values.
             _ if count == 0 => bytes = 0,
             PassJob::Blend(layers) => {
                 let input = parts.layers(layers, size)?;
@@ -403,8 +403,8 @@ impl PassRunner for VulkanEngine {
         let (limit, radius) = (self.window().max(2), pass.weights.len());
         let detail = usize::from(pass.are_rotations);
         let stride = all.samples - 1 + 2 * radius;
-        // Between rows that are smoothed at once the kernel runs over the values beyond their ends too:
-        // more than the rows themselves where it is wider than they are long.
+        // Rows that are smoothed together are separated by the values beyond their ends. If the kernel is wider than
+        // the rows are long, these are more values than the rows have.
         let each = match 2 * radius > all.samples {
             true => 1,
             false => (limit / stride).max(1),
@@ -417,7 +417,7 @@ impl PassRunner for VulkanEngine {
                 .iter()
                 .flat_map(|row| (0..row.count).map(|i| row.get(i)));
             let values: Vec<[f32; 4]> = samples.collect();
-            // A step from one row to the next is found too, and not used.
+            // The step from one row to the next is computed too, and ignored.
             let mut steps = vec![[0.0; 4]; values.len() - 1];
             for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
                 let values = &values[first..=first + output.len()];

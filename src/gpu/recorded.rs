@@ -177,9 +177,9 @@ pub enum CommandUsers {
     Host,
 }
 
-/// Between which of an application's commands a target is recorded. Its commands wait for those before them and
-/// their writes, and those after them see its results. Fewer users are waited for in less time: all commands, the
-/// default, wait for drawing, too.
+/// The commands of an application that a recorded target is ordered with. The target waits for the earlier commands and
+/// their writes, and the later ones see its results. Waiting for fewer kinds of commands takes less time; by default the
+/// target waits for all commands, also for drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CommandScopes {
     /// The users before it of its inputs and of the memory of its result.

@@ -194,7 +194,7 @@ impl Submission {
         self.device.check_process()?;
         let raw = &self.device.raw;
         let fences = [self.fence];
-        // A device that has hung is not waited for again.
+        // If the device has hung, do not wait for it a second time.
         let seconds = TIMEOUT_SECONDS * u64::from(self.device.may_destroy());
         let timeout = seconds * 1_000_000_000;
         // SAFETY: the fence belongs to this device.
@@ -309,8 +309,8 @@ impl Semaphore {
 impl Drop for Semaphore {
     fn drop(&mut self) {
         if self.device.may_destroy() {
-            // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
-            // semaphores let go of them a moment after they signal the fence.
+            // A fence shows that the copy has ended. But Mesa's drivers that emulate timeline semaphores still use
+            // them for a moment after they signal the fence.
             if !self.is_exported {
                 self.device.settle(); // timelines that can be exported are no such
             }

@@ -106,7 +106,7 @@ impl Cache {
 #[cfg(unix)]
 fn is_trusted(metadata: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
-    // The folder itself belongs to root where the process must not be dumped.
+    // `/proc/self` belongs to root if the process must not be dumped, so its status is read instead.
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     is_private(metadata.uid(), metadata.mode(), effective_user(&status))
 }
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(cache.read("kernels", 5), None);
         assert!(cache.write("nothing", b""));
         assert_eq!(cache.read("nothing", 0).unwrap(), b"");
-        // No part is left behind.
+        // No temporary file is left.
         let path = cache.path("kernels").unwrap();
         let names = fs::read_dir(path.parent().unwrap()).unwrap();
         assert_eq!(names.count(), 2);
@@ -289,7 +289,7 @@ mod tests {
         fs::create_dir(&path).unwrap();
         assert_eq!(cache.read("one", 100), None);
         assert!(!cache.write("one", b"in the place of a folder"));
-        // Where nothing can be written nothing happens.
+        // If nothing can be written, this is not an error.
         let nowhere = Cache::within(Path::new("/dev/null/tumble"));
         assert!(!nowhere.write("one", b"") && nowhere.read("one", 1).is_none());
         let off = Cache { folder: None };

@@ -191,7 +191,7 @@ pub enum VulkanError {
     },
     /// The device cannot export the memory of results.
     #[error(
-        "{device} cannot hand the memory of results to others: {lacks}; evaluate into the host's memory instead"
+        "{device} cannot share the memory of results with other APIs: {lacks}; evaluate into the host's memory instead"
     )]
     NoExport {
         /// The device's name.

@@ -113,9 +113,9 @@ pub struct EngineOptions {
     /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
     /// set. By default there is none. Larger sets are prepared piece by piece.
     pub memory: Option<u64>,
-    /// The segments, bytes, that a clip of the CPU keeps although its samples can be computed from its keys, which take an
-    /// eighth of the memory or less. By default there is no limit but `memory`, because segments are faster in bulk: a
-    /// program with many clips in memory gives one, such as 1 MiB.
+    /// The limit, in bytes, for the segments of a clip on the CPU. A clip with larger segments keeps its keys instead, if
+    /// its samples can be computed from them; keys take an eighth of the memory or less. By default only `memory` is the
+    /// limit, because segments are faster for many samples. A program with many clips in memory sets a limit such as 1 MiB.
     pub kept_segments: Option<u64>,
     /// The number of worker threads of the CPU. By default all engines of the process share a pool of as many threads
     /// as the environment variable `RAYON_NUM_THREADS` says, or one for each core.

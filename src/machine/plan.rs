@@ -220,7 +220,7 @@ impl Plan {
         stream: Option<Stream>,
         limits: &Limits,
     ) -> Self {
-        // A single sample of each track is a row too.
+        // With a single sample per track, both layouts are the same.
         let layout = layout.of(request.samples.len());
         let is_of_rows = layout == Layout::TrackMajor;
         let has_rows = |stream: &Stream| is_of_rows && request.samples.len() <= stream.chunk;

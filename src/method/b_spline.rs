@@ -84,8 +84,8 @@ fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], ends: Ends) {
         if matches!(ends, Ends::Loop) && stretch.track_intervals > 1 {
             continue; // the context already has the neighbours across the seam
         }
-        // Two keys turn at constant velocity. With frozen ends the outer intervals stand still, and
-        // any continuation will do.
+        // Two keys rotate at constant velocity. With frozen ends the outer intervals do not move, so any continuation
+        // gives the same curve.
         let repeats_interval = stretch.track_intervals == 1 || matches!(ends, Ends::Frozen);
         let before = |lane| {
             if repeats_interval {

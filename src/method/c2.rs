@@ -108,7 +108,7 @@ fn velocities(
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
         keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
-    // The caller asks again whether it was stopped.
+    // If the work was stopped, the caller finds this out itself.
     let windows = windows.take_while(|_| !stop::is_stopped());
     windows.flat_map(in_window).collect()
 }
@@ -138,7 +138,7 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
         let previous = if key == 0 { last - 1 } else { key - 1 };
         let nearby = [previous, key, key + 1].map(|key| velocities[key]);
         let bend = before.bend(nearby[1]) * equation.bend_scale;
-        // Not a number is a jump.
+        // NaN counts as a jump.
         let is_continuous =
             (equation.residual(nearby) + bend).length() <= JUMP * equation.size(nearby);
         if !is_continuous {
@@ -595,7 +595,8 @@ impl Newton<'_> {
             if largest > CONTRACTION * previous && largest > ROUNDING {
                 return false;
             }
-            // The quotient of the last step and the square of the one before it goes on.
+            // Newton's iteration converges quadratically: the quotient of a step and the square of the step before it
+            // stays the same.
             let rest = largest * largest * (largest / (previous * previous));
             if largest <= CONVERGED && (rest <= NOTHING || previous <= CONVERGED) {
                 return true;

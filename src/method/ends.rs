@@ -36,7 +36,7 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[TrackStret
     let [start, end] = EndCondition::both(ends);
     for stretch in stretches {
         if let (Some(lane), 1) = (stretch.first(), stretch.track_intervals) {
-            // Two keys: the handles of constant velocity.
+            // With only two keys, the handles are those of constant velocity.
             let log = at(&intervals.logs, lane);
             let handle = R::end(log, [0.0; 3], EndHandle::Velocity(log));
             put(&mut intervals.outgoing, lane, handle);

@@ -51,7 +51,7 @@ pub enum OptionValueError {
     #[error(transparent)]
     Name(#[from] UnknownNameError),
     /// The option is a number, and the text is none.
-    #[error("{option} is `{text}`, no number")]
+    #[error("{option} is `{text}`, which is not a number")]
     NotNumber {
         /// The name of the option.
         option: &'static str,

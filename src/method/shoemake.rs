@@ -48,7 +48,7 @@ impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
             A::Number::all(0.0),
             A::Number::all(1.0),
         );
-        // After half a turn there and back the sum is 0: there is no bisector, and the handle is 0.
+        // After half a turn and back, the sum is 0: there is no bisector, so the handle is 0.
         let scale = norm.up_to(none, zero, one / norm);
         let w = norm.up_to(none, one, both[3] * scale);
         let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];

@@ -205,8 +205,8 @@ impl<'a> VectorCurves<'a> {
             [_, slope2, bend2, cube2],
             [_, _, _, value3],
         ] = basis;
-        // The step outside an end, from this interval's basis function's bend and slope there, and the slope of
-        // that step's.
+        // The step outside an end is computed from the second and first derivative of this interval's basis function
+        // there, and from the first derivative of the basis function of that step.
         let outside = |bend: f64, inner_slope: f64, slope: f64, next: usize| match self.ends {
             Ends::Natural => rise * (bend / slope),
             Ends::Clamped { .. } => rise * (-inner_slope / slope),

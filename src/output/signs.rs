@@ -35,7 +35,7 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
 pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     let after = rotations.get(tracks..).unwrap_or_default();
     if tracks != 1 {
-        // Without a branch for each: lists are long, and seldom jump.
+        // No branch for each rotation, because lists are long and signs seldom change.
         let mut blocks = rotations.chunks(BLOCK).zip(after.chunks(BLOCK));
         return blocks.any(|(before, after)| jump(before, after));
     }
@@ -91,14 +91,15 @@ impl InLanes for NearBlocks<'_> {
     #[inline(always)]
     #[allow(clippy::disallowed_methods)] // the length of a sum, with room for its rounding
     fn run<L: Lanes>(&mut self) {
-        // Each block with the rotation behind it, with which the next one begins.
+        // A block is read with the first rotation of the next block, because signs are compared with the next
+        // rotation.
         while let Some(block) = self
             .rotations
             .get(self.count * BLOCK..)
             .and_then(|rest| rest.first_chunk::<{ BLOCK + 1 }>())
         {
             let components: &[f32] = bytemuck::cast_slice(&block[..BLOCK]);
-            // Those of four rotations side by side.
+            // The sums of four rotations side by side.
             let mut sums = [0.0; 16];
             for next in components.as_chunks::<16>().0 {
                 for (sum, component) in sums.iter_mut().zip(next) {

@@ -234,7 +234,7 @@ impl BodyOnPath {
         let normals: Vec<Option<Polynomial>> = (self.stretches.iter())
             .map(|part| self.normal(part))
             .collect();
-        // On straight parts the roll is spread over the length.
+        // On straight parts, where the normal is undefined, the roll changes evenly over the length.
         if normals.iter().any(Option::is_none) && self.timed_path.lengths.is_empty() {
             self.timed_path.measure();
         }
@@ -277,7 +277,7 @@ impl BodyOnPath {
                 let first = self.timed_path.lengths.at(start.interval, start.from);
                 let last = self.timed_path.lengths.at(arrival.interval, arrival.to);
                 points = match before {
-                    // A flip by 180° is undone, so that at most 90° are left.
+                    // A flip by 180° is removed, so that a roll of at most 90° remains.
                     Some(_) => {
                         let half = std::f64::consts::PI;
                         let nearer = angle - half * (angle / half).round();

@@ -61,7 +61,7 @@ impl RelativePieces {
         let mut done = 0;
         while done < waiting.len() {
             if stop::is_stopped() {
-                // The preparation checks again when this returns.
+                // If the work was stopped, the preparation finds this out when this returns.
                 (pieces, counts) = (Vec::new(), vec![0; stretches.len()]);
                 break;
             }

@@ -67,7 +67,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     let mut block: Vec<PendingSpan> = Vec::with_capacity(MAX_LANES);
     let mut block_spans: Vec<Span> = Vec::with_capacity(MAX_LANES);
     let mut lanes = Box::new(FittedLanes::zeroed());
-    // The preparation checks again when this returns.
+    // If the work was stopped, the preparation finds this out when this returns.
     while !waiting.is_empty() && !stop::is_stopped() {
         block.clear();
         block.extend(waiting.drain(waiting.len().saturating_sub(MAX_LANES)..));
@@ -92,7 +92,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
                 || counts[index] == MAX_PIECES
                 || middle <= span.from
                 || middle >= span.to;
-            // A time is known within its own rounding, which is more of a shorter span.
+            // Times are rounded, and the rounding is a larger part of a shorter span.
             let (start, end) = bodies[span.path as usize].timed_path.span();
             let hidden_error = TIME_ROUNDING * start.abs().max(end.abs()) / width;
             let source = if lanes.fits(lane, hidden_error) {
@@ -170,7 +170,7 @@ impl InLanes for InFit<'_> {
                     }
                     continue;
                 }
-                // The sign with which it is nearer to the middle.
+                // Choose the sign that is nearer to the middle.
                 let cosine = dot(*value, middle);
                 is_too_long = L::Doubles::all(MIN_HALF_ANGLE_COSINE).up_to(
                     magnitude(cosine),

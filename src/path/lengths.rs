@@ -34,7 +34,7 @@ impl Lengths {
             ends.sort_by(f64::total_cmp);
             let mut marks = vec![(0.0, total)];
             if stop::is_stopped() {
-                // The preparation checks again when this returns.
+                // If the work was stopped, the preparation finds this out when this returns.
                 marks.push((1.0, total));
                 lengths.marks.push(marks);
                 continue;

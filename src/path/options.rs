@@ -299,7 +299,7 @@ pub enum FollowError {
 #[non_exhaustive]
 pub enum FollowWarning {
     /// The body stands still on the whole path, so it has no direction.
-    #[error("track {track} stands still; it looks along +z")]
+    #[error("track {track} does not move; it faces +z")]
     StandsStill {
         /// The track's index in the set.
         track: usize,

@@ -100,7 +100,7 @@ impl Polynomial {
             }
             before = after;
         }
-        // A zero so near to an end is the end's.
+        // A zero this near to an end is moved to the end.
         let snapped = [0.0, 1.0].into_iter().find(|end| (best - end).abs() < 1e-9);
         (least <= tolerance).then_some(snapped.unwrap_or(best))
     }

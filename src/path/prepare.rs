@@ -131,7 +131,7 @@ fn body_on(
     }
     let timed_path = TimedPath::new(path, follow);
     stop::check()?;
-    // The body that others look at looks along its own path.
+    // A body that others face does itself face along its path.
     let direction = match follow.direction {
         Direction::Track(target) if target == track => Direction::Tangent,
         direction => direction,
@@ -278,7 +278,7 @@ impl PathPreparation<'_> {
                     SampleKind::Vector => {
                         vectors::add(prepared, track, self.paths[path], &of_keys);
                     }
-                    // A body that never moves looks along +z.
+                    // A body that never moves faces along +z.
                     SampleKind::Rotation => {
                         let values = [follow.body_axes().to_array(); 2];
                         add_part(prepared, track, times, &[], values, true);

@@ -138,7 +138,7 @@ impl<'a> Sampler<'a> {
                         .parameter(stretch.interval, time)
                         .clamp(stretch.from, stretch.to)
                 } else {
-                    // A path without length is stood on.
+                    // On a path without length, the body stays at its start.
                     stretch.from
                 };
             }

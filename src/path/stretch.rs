@@ -117,11 +117,11 @@ pub(crate) fn stretches(
     let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..timed_path.curves.len() {
         if stop::is_stopped() {
-            // The preparation checks again when this returns.
+            // If the work was stopped, the preparation finds this out when this returns.
             return Vec::new();
         }
         let slope = &timed_path.slopes[interval];
-        // Where the direction is that of a polynomial, this without its zeros.
+        // If the direction is a polynomial: the polynomial divided by its zeros.
         let divided = match direction {
             Direction::Tangent if slope.size() > 0.0 => Some(timed_path.divided[interval].clone()),
             Direction::Point(point) => {
@@ -137,7 +137,7 @@ pub(crate) fn stretches(
         if let Some((zeros, _)) = &divided {
             cuts.extend(zeros);
         }
-        // At given speeds, a body's motion is not smooth where its curve stops.
+        // At constant or eased speed, the motion is not smooth at points where the curve stops.
         if timed_path.speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
             cuts.extend(&timed_path.divided[interval].0);
         }

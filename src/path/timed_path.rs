@@ -234,6 +234,6 @@ impl TimedPath {
 pub(crate) fn diagonal(points: impl Iterator<Item = DVec3> + Clone) -> f64 {
     let smallest = points.clone().fold(DVec3::INFINITY, DVec3::min);
     let largest = points.fold(DVec3::NEG_INFINITY, DVec3::max);
-    // Less than 0 where there is no point.
+    // Without points, the difference is negative: the size is then 0.
     (largest - smallest).max(DVec3::ZERO).length()
 }

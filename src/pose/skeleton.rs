@@ -63,7 +63,7 @@ impl Skeleton {
             order.append(&mut children[track]);
             next += 1;
         }
-        // Tracks that no root leads to form a circle, or hang from one.
+        // Tracks that cannot be reached from a root form a circle, or are below one.
         if let Some(track) = children.iter().position(|left| !left.is_empty()) {
             return Err(SkeletonError::Cycle { track });
         }

@@ -125,7 +125,8 @@ fn prepare(
             preparation.only_for(timeline, set);
         }
         let keys = match &batch {
-            // As many as have a sample; these lists are not kept.
+            // The number of segments is not known: only intervals with a sample are prepared. These lists are
+            // discarded, so nothing is reserved.
             Batch::Intervals { .. } if preparation.leaves_intervals_out() => 0,
             batch => batch.keys(set),
         };
@@ -133,7 +134,7 @@ fn prepare(
         stop::during(stop.clone(), || {
             preparation.push(&mut prepared, set, batch.intervals(set))
         })?;
-        // A part's track counts from the first of the tracks asked for.
+        // The track of a part is relative to the first requested track.
         for part in &mut prepared.parts {
             part.track -= first_track;
         }
@@ -193,7 +194,7 @@ impl ClipData {
             (Channel::Scale, ScalarQuantity::Value) => Vec3::ONE,
             _ => Vec3::ZERO,
         };
-        // Where a track without vectors is held.
+        // A track without vectors gets a single key, which is held.
         let still = VectorTrack {
             times: vec![0.0],
             keys: vec![rest],

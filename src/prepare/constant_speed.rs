@@ -120,7 +120,7 @@ fn retime_track(
             return;
         }
         if from < to {
-            // Where no f64 is the key's time, no sample is the key.
+            // If the exact time of the key is not an f64, no sample is at the key.
             let key = if ends[0] == 0.0 { key } else { NONE };
             fitting.queue_curve(prepared, curve, from, key);
         }

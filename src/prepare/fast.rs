@@ -104,9 +104,9 @@ impl FastPreparation {
             let within = [LONGEST_DEGREE_8, LONGEST_WHOLE, LONGEST_DIRECT]
                 .map(|longest| usize::from(squared_extent <= longest as f32));
             let is_small = self.small_angle.is_valid[lane];
-            // NaN is within nothing, and left over.
+            // NaN fails all comparisons, so its list is LEFT_OVER.
             let list = usize::from(!is_small) * (LEFT_OVER - within.iter().sum::<usize>());
-            // Where no f64 is at the middle, another cut is found.
+            // If no f64 is exactly at the middle, the interval is divided elsewhere.
             let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
             let middle = start + (end - start) * 0.5;
             let off = ((middle - start) - (end - middle)).abs();

@@ -117,7 +117,7 @@ impl Preparation {
             Strategy::Arcs(arcs) => arcs.finish(prepared),
             Strategy::Smooth(smooth) => smooth.finish(prepared),
         }
-        // Work that was stopped leaves something that must not be used.
+        // After a stop, the result is incomplete and must not be used.
         Ok(stop::check()?)
     }
 }
@@ -273,7 +273,7 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
             from,
             to,
         } => {
-            // As many tracks together as their keys in the span allow.
+            // A batch gets as many tracks as its limits of tracks and keys allow.
             let (mut start, mut keys) = (tracks.start, 0);
             let span = |tracks| Batch::Span { tracks, from, to };
             for (track, intervals) in whole.intervals(set) {

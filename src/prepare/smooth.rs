@@ -117,7 +117,7 @@ impl SmoothPreparation {
             _ => Vec::new(),
         };
         let mut from = intervals.start;
-        // The caller asks again whether it was stopped.
+        // If the work was stopped, the caller finds this out itself.
         while from < intervals.end && !stop::is_stopped() {
             if self.intervals.count + context >= LANES {
                 self.flush(prepared);

@@ -177,7 +177,7 @@ pub(crate) fn add_rates(
     let outside = |mode: WrapMode, at_end: u32| match mode {
         WrapMode::Hold => still,
         WrapMode::Extrapolate if request.quantity == ScalarQuantity::Acceleration => still,
-        // In copies of the track its ends have the values of its curve.
+        // At the ends of a copy, the values are those of the curve, not of the keys.
         WrapMode::Extrapolate | WrapMode::Loop | WrapMode::Mirror => at_end,
     };
     let held = [

@@ -53,7 +53,7 @@ fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
             if can_miss(&indices, i, worst_of_each) {
                 indices.remove(i);
             }
-            // Behind a key that is out the next one stays for this round.
+            // After a removed key, the next key is kept in this round.
             i += 1;
         }
         if indices.len() == before {
@@ -64,14 +64,14 @@ fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
 
 /// Whether the curve stays near to all samples without this key.
 fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
-    // One key more on each side than the curve that changes: its tangents depend on those.
+    // One key more on each side than the changed part of the curve, because its tangents depend on these keys.
     let first = key.saturating_sub(REACH + 1);
     let end = (key + REACH + 2).min(keys.len());
     let kept: Vec<usize> = (first..end)
         .filter(|&k| k != key)
         .map(|k| keys[k])
         .collect();
-    // Cut ends are not those of the curve, and their intervals do not change.
+    // The ends of this part are not ends of the whole curve; the intervals there do not change.
     let skipped = usize::from(first > 0);
     let count = kept.len() - 1 - usize::from(end < keys.len());
     worst_of_each(&kept, skipped..count)
@@ -93,9 +93,9 @@ impl<T: Value> ReductionTask<'_, T> {
             for i in keys[interval] + 1..keys[interval + 1] {
                 let apart = self.samples[i].apart(curve(self.times[i]));
                 let part = match apart <= self.tolerance {
-                    // Also where both are 0.
+                    // `min` also turns 0 / 0, which is NaN, into 1.
                     true => (apart / self.tolerance).min(1.0),
-                    // NaN is not near.
+                    // NaN counts as too far away.
                     false => (apart / self.tolerance).max(1.0).next_up(),
                 };
                 if part > worst.1 {

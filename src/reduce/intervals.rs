@@ -89,7 +89,7 @@ impl<T: Value> ReductionTask<'_, T> {
         // A cubic could pass all samples and stray between them. Neighbours are always joined.
         if is_cubic && to > from + 1 {
             for i in from..to {
-                // Samples say as little as the difference between the two.
+                // The difference between both shows how much is unknown between samples.
                 let [straight, smooth] = self.middle(i);
                 let (middle, slack) = (straight.towards(smooth, 0.5), 0.5 * straight.apart(smooth));
                 let curve = cubic(f64::midpoint(part(i), part(i + 1)));
@@ -106,7 +106,7 @@ impl<T: Value> ReductionTask<'_, T> {
                 false => start.towards(end, part(i)),
             };
             let apart = sample.apart(curve);
-            // NaN is not near.
+            // NaN counts as too far away.
             if apart.is_nan() || apart > limit {
                 return None;
             }

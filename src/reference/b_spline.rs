@@ -29,11 +29,11 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
         let solved = if at_end { third } else { first };
         match ends {
             _ if last == 0 => step(0),
-            // Across the seam.
+            // In a loop, the step beyond an end is the step at the other end.
             Ends::Loop => step(last - outermost),
             Ends::Parabolic => parabola(track, outermost, next),
             Ends::Natural => {
-                // The second derivatives of the two factors that bend there cancel.
+                // Two factors have a second derivative at the end; for a natural end their sum is 0.
                 let second = basis.second_derivatives(t);
                 step(outermost) * (-second[1] / second[outer])
             }

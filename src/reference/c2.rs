@@ -89,7 +89,7 @@ impl<'a> System<'a> {
     fn new(intervals: &'a [C2Interval], [start, end]: [Option<DVec3>; 2]) -> Self {
         let last = intervals.len();
         let secant = |i: usize| 2.0 * intervals[i].whole / intervals[i].duration;
-        // Beside long steps Bessel's mean.
+        // A key next to a long step gets Bessel's mean, because the equations may have no solution there.
         let set = (0..=last).map(|key| {
             let near = key.saturating_sub(1)..last.min(key + 1);
             let is_long = near
@@ -246,7 +246,8 @@ impl<'a> System<'a> {
                 return None;
             }
             velocities = next;
-            // The quotient of the last step and the square of the one before it goes on.
+            // Newton's iteration converges quadratically: the quotient of a step and the square of the step before it
+            // stays the same.
             let rest = largest * largest * (largest / (previous * previous));
             if largest <= 1e-8 && (rest <= 1e-15 || previous <= 1e-8) {
                 return Some(velocities);

@@ -119,8 +119,8 @@ impl ReferenceCurve {
         };
         match &self.lengths {
             Some(lengths) => {
-                // A segment may start or end at rest, without a direction: that next to it is
-                // taken.
+                // At rest, at the start or end of a segment, there is no direction; use the direction slightly
+                // inside.
                 let moving = t.clamp(1e-6, 1.0 - 1e-6);
                 let direction = self.segments[i].velocity(moving).normalize_or_zero();
                 direction * (lengths.total() / self.duration())

@@ -84,7 +84,7 @@ impl HandleRule {
         let whole = logarithm(track.difference(i));
         let at_end = |other: DVec3, clamped: Option<DVec3>, rest: DQuat| match (ends, clamped) {
             (Ends::Secant, _) => (self.by_rate)(whole, whole),
-            // Half of the angle that the end turns by in the whole interval.
+            // Half of the angle by which the velocity at the end rotates in the whole interval.
             (_, Some(velocity)) => (self.by_rate)(velocity / 2.0 * track.step(i), whole),
             (Ends::Natural, None) => (self.natural)(logarithm(rest), other),
             _ => (self.parabolic)(whole, other),
@@ -221,7 +221,8 @@ pub(crate) const SHOEMAKE: Definition = by_handles!(
     HandleRule {
         parabolic: |whole, other| {
             let handle: DVec3 = 2.0 * whole - other;
-            // No arc leads to the opposite of a quaternion more than any other: the rotation itself then.
+            // Opposite quaternions are the same rotation and determine no arc between them, so the handle is the
+            // rotation itself.
             match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs()
                 < 1e-5
             {

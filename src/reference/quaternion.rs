@@ -74,7 +74,7 @@ pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     let chord = |q: DQuat| inner(q, q).sqrt();
     let angle = 2.0 * libm::atan2(chord(b - a), chord(b + a));
     if angle < 1e-8 {
-        // Both weights' limits: the arc is straight to f64 rounding.
+        // The limit of both weights for small angles: within f64 rounding, the arc is a straight line.
         return normalise(a * (1.0 - t) + b * t);
     }
     let sine = libm::sin(angle);

@@ -186,7 +186,7 @@ impl VectorCurve {
                     + q * ((at - x) * (at - z) / ((y - x) * (y - z)))
                     + r * ((at - x) * (at - y) / ((z - x) * (z - y)));
             }
-            // The quantity that must vanish is linear in the outer point.
+            // The end condition is linear in the outer point, so two evaluations solve it.
             let knots = knots_of(interval);
             let off = |candidate: DVec3| {
                 let [_, slope, bend] = match at_end {

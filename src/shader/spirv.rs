@@ -200,9 +200,9 @@ pub fn without_decorations(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     Ok(module[..HEADER_WORDS].iter().chain(kept).copied().collect())
 }
 
-/// A module whose workgroups have `to` invocations along x instead of `from`. Products and shifts of a constant of that
-/// value are those of the number of invocations, and workgroup memory grows or shrinks with it. Other uses of equal
-/// constants, such as masks, stay.
+/// A module whose workgroups have `to` invocations along x instead of `from`. Constants that are `from` are changed where
+/// they are factors or shifts, because they are numbers of invocations there; the size of workgroup memory changes too.
+/// Other uses of equal constants, such as masks, are not changed.
 ///
 /// # Errors
 /// When the words are not a module, or not one of workgroups of `from`.
@@ -265,7 +265,7 @@ pub fn with_workgroup(module: &[u32], [from, to]: [u32; 2]) -> Result<Vec<u32>, 
     }
 }
 
-/// The module without the operand that marks its stores as not temporal.
+/// The module without the operand `Nontemporal` of its stores.
 ///
 /// # Errors
 /// When the words are not a module.

@@ -48,7 +48,7 @@ impl SmoothingPass<'_> {
         if self.smoothing.ends == SmoothingEnds::Loop {
             return index.rem_euclid(count) as usize;
         }
-        // Mirrored again and again: 0 1 2 2 1 0 0 1 2.
+        // Repeated mirroring: 0 1 2 2 1 0 0 1 2.
         let mirrored = index.rem_euclid(2 * count);
         mirrored.min(2 * count - 1 - mirrored) as usize
     }
@@ -182,7 +182,7 @@ impl SmoothingBlock<'_> {
         let count = self.count + 2 * radius - 1;
         let rounded = count.next_multiple_of(BLOCK);
         for steps in self.steps.iter_mut() {
-            // The last sums read as many as the others.
+            // Padding, because the last sums read as many steps as the others.
             steps.resize(rounded + BLOCK, 0.0);
         }
         let before = self.first as isize - radius as isize;
@@ -280,7 +280,7 @@ impl SmoothingBlock<'_> {
         let before = self.first as isize - radius as isize;
         let steps = &mut self.steps[0];
         steps.resize(4 * count + EACH, 0.0);
-        // The steps that stand in the row, and those before its start and beyond its end.
+        // The steps inside the row, before its start, and after its end.
         let start = (-before).clamp(0, count as isize);
         let end = (row.count as isize - 1 - before).clamp(start, count as isize);
         let (start, end) = (start as usize, end as usize);

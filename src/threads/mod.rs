@@ -189,7 +189,7 @@ impl Threads {
         if let Some(first) = of_first() {
             return Ok(Arc::clone(&first.threads));
         }
-        // No work is done while this is locked: threads are started, and not waited for.
+        // Only for starting threads: no work is done while this is locked.
         let mut forked = lock(&self.forked);
         let there = of_first().or(forked.as_ref().filter(|pool| pool.process == process));
         if let Some(pool) = there {

@@ -71,7 +71,7 @@ impl FrameRate {
     #[inline(always)]
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
         let frames = seconds * self.frames as f64;
-        // Most rates are whole, and a division takes longer than all else here.
+        // Most rates are whole numbers. The comparison saves a division, which would take longer than the rest.
         if self.seconds == 1 {
             frames
         } else {

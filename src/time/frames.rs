@@ -126,7 +126,7 @@ impl SampleTimes {
                 if end < start {
                     return Err(SampleTimesError::ReversedRange { start, end });
                 }
-                // Times that were rounded to f64 may have moved by a step of it.
+                // Rounding to f64 may move a time by one step.
                 let step = f64::EPSILON * start.abs().max(end.abs());
                 let tolerance = rate.frames_in(step).clamp(LAST_FRAME_TOLERANCE, 0.5);
                 let count = (rate.frames_in(end - start) + tolerance).floor() + 1.0;

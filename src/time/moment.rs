@@ -174,7 +174,7 @@ impl Period {
 
     fn find_uncounted(&self, from_first: Moment) -> InCopy {
         let (length, twice) = (self.length.high, 2.0 * self.length.high);
-        // Remainders are exact, however large the quotient is.
+        // A remainder is exact, even if the quotient is too large to be counted.
         let into = (from_first.high.rem_euclid(twice) + from_first.low.rem_euclid(twice)) % twice;
         let is_odd = into >= length;
         let into = if is_odd { into - length } else { into };
@@ -235,7 +235,7 @@ mod tests {
                     let found = period.find(time, 0.0);
                     let (number, into) = (exact.div_euclid(length), exact.rem_euclid(length));
                     let off = found.into.seconds() - into as f64 / 1001.0 / f64::from(1 << 20);
-                    // Where copies are not counted, steps of f64 are longer than they.
+                    // If copies are not counted, they are shorter than a step of f64.
                     let bound = 1e-15 * (last - first).max(found.number.map_or(1e3, |_| 0.0));
                     let whole = last - first;
                     assert!(

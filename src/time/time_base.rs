@@ -54,7 +54,7 @@ impl TimeBase {
         if behind.abs() <= exact_limit {
             return behind as f64 / NANOSECONDS as f64;
         }
-        // Whole seconds are exact, and a part of one then is nearly so.
+        // Whole seconds are exact; the remaining part of a second has only the rounding of a small number.
         (behind.div_euclid(unit)) as f64 + behind.rem_euclid(unit) as f64 / NANOSECONDS as f64
     }
 

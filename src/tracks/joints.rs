@@ -389,7 +389,7 @@ impl Joints {
             };
         }
         let name = self.names[joint].clone();
-        // A name that has its equal in this clip is the name of another joint.
+        // A name that also exists in this clip belongs to another joint, so it is not suggested.
         let mut lone = (other.names.iter()).filter(|near| !self.names.contains(near));
         JointMatchError::Missing {
             near: lone.find(|near| are_near(&name, near)).cloned(),
@@ -451,7 +451,7 @@ fn are_near(name: &str, other: &str) -> bool {
         true => (name, other),
         false => (other, name),
     };
-    // Names of one or two letters end many others.
+    // Many names end in a name of one or two letters, so such short names are not suggested.
     long == short || short.len() > 2 && long.ends_with(&short)
 }
 
@@ -480,7 +480,7 @@ mod tests {
             Joints::named(["hand", "hip", "arm"]).with_parents(vec![Some(2), None, Some(1)]);
         assert_eq!(first.order_of(&second, LABELS).unwrap(), [1, 2, 0]);
         assert_eq!(second.order_of(&first, LABELS).unwrap(), [2, 0, 1]);
-        // Tables do not say parents.
+        // Tables contain no parents.
         let table = Joints::named(["arm", "hand", "hip"]);
         assert_eq!(first.order_of(&table, LABELS).unwrap(), [2, 0, 1]);
     }
@@ -490,7 +490,7 @@ mod tests {
         let unnamed = |count: usize| Joints::named(vec![""; count]);
         assert_eq!(unnamed(2).order_of(&unnamed(2), LABELS).unwrap(), [0, 1]);
         refused(&unnamed(2), &unnamed(3), "b: 3 tracks; a has 2 joints");
-        // Files that need names write these.
+        // Formats that require names write these for joints without names.
         let written = Joints::named(["box2", "box1"]);
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
         let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
@@ -610,7 +610,7 @@ mod tests {
         ] {
             refused(&first, &second, text);
         }
-        // Where all names are the same in the same order, the order tells the joints apart.
+        // If all names are the same in the same order, joints with equal names are matched by their order.
         let twice = chain(&["hip", "hand", "hand"]);
         assert_eq!(twice.order_of(&twice.clone(), LABELS).unwrap(), [0, 1, 2]);
     }

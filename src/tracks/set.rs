@@ -394,7 +394,7 @@ impl TrackSet {
     pub(crate) fn widen_span(&mut self, times: &[f64]) {
         let track_span = (times[0], times[times.len() - 1]);
         let (first, last) = self.span.unwrap_or(track_span);
-        // Not by `min` and `max`: of zeros with two signs processors choose differently.
+        // Not `min` and `max`: for zeros with different signs, their result depends on the processor.
         let first = if track_span.0 < first {
             track_span.0
         } else {

@@ -179,7 +179,7 @@ mod tests {
             rotation(250.0, -1.0),
         ];
         assert_eq!(continued(&keys), [1.0, -1.0, -1.0, 1.0, -1.0]);
-        // Half a turn apart: the sign given counts.
+        // At exactly half a turn, the stored sign is used.
         let half = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
         assert_eq!(continued(&half), [1.0, 1.0]);
         assert_eq!(continued(&[half[0], half[1].map(|c| -c)]), [1.0, 1.0]);

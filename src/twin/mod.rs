@@ -9,8 +9,8 @@ pub(crate) mod crowd_entries;
 pub(crate) mod crowd_layers;
 pub(crate) mod crowd_matrices;
 pub(crate) mod crowd_times;
-// Each statement and each operation of the shaders is one here, whether Rust needs it or has a shorter way to say it;
-// tests alone run the kernels that read texel buffers.
+// Each statement and operation of the shaders becomes one in Rust, even if it is not needed or could be shorter.
+// Kernels that read texel buffers are run only in tests.
 #[cfg(feature = "vulkan")]
 #[allow(
     dead_code,
@@ -146,7 +146,7 @@ pub(crate) trait Parameters<L> {
     fn next(&mut self) -> L;
 }
 
-// They compare kernels, too, which are there with Vulkan alone.
+// These tests also compare kernels, which exist only with the feature `vulkan`.
 #[cfg(all(test, feature = "vulkan"))]
 #[path = "../../tests/twins/mod.rs"]
 mod tests;

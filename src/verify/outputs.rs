@@ -80,7 +80,7 @@ pub(crate) fn verify(
             max_error: rate_error(set, interpolation, timeline, &found)?,
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => RATE_BOUND,
-                // At constant speed a curve changes direction fast where it was slow as keyed.
+                // At constant speed, the direction changes fast at times at which the keyed curve was slow.
                 (Speed::Constant, Quantity::Velocity(_)) => 1e-5,
                 (Speed::Constant, _) => 1e-3,
             },
@@ -187,7 +187,7 @@ fn rate_error(
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
             let error_at = |time: f64| (found - expected(time)).length();
             error = error.max(keys.least_error(time, error_at));
-            // Samples may all lie on keys, where a rate can be 0 and large between them.
+            // All samples may be at keys, where a velocity can be 0 although it is large between them.
             for near in within_interval(times, time).into_iter().chain([time]) {
                 largest = largest.max(expected(near).length());
             }

@@ -63,7 +63,7 @@ pub fn round(
     seed: u64,
     number: u64,
 ) -> Result<RandomRound, GoldenError> {
-    // Neighbouring seeds and rounds have nothing in common.
+    // Mixed, so that neighbouring seeds and rounds give unrelated sequences.
     let mut random =
         SeededRandom(seed.rotate_left(32) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     random.next();
@@ -271,7 +271,7 @@ fn frames(random: &mut SeededRandom, set: &TrackSet) -> SampleTimes {
     let tracks = set.track_count().max(1);
     let samples = (random.pick(&[10_000, 100_000, 400_000]) / tracks).max(1);
     let (low, high) = (start - 0.3, end + 0.3);
-    // So many frames a second that the whole set has so many samples; usual rates sample a part of it.
+    // At this rate, the whole set has `samples` samples. At a usual rate, only a part of the time is sampled.
     let filling = (samples as f64 / (high - low)).clamp(1.0, 50_000.0) as u32;
     match random.below(6) {
         0 => {

@@ -227,7 +227,8 @@ pub fn renderer(
         copy_queue_family: None,
         validation_messages: Vec::new(),
     };
-    // Under the layer every call takes longer, and methods differ on the host.
+    // Under the validation layer every call takes longer. Two methods are enough, because methods differ only on the
+    // host.
     let methods = [method::SLERP, method::C2, method::BESSEL_OVERHAUSER];
     let methods = if validation { &methods[..2] } else { &methods };
     buffer_to_buffer(&mut renderer, &cpu, seed, methods, &mut report)?;

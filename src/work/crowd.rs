@@ -445,7 +445,7 @@ mod tests {
             steps(rotations, false, &unchanged()),
             "^D|D|D|D[Kernel>Any]"
         );
-        // As wholes: the windows need nothing of each other.
+        // With whole instances, windows do not depend on each other.
         assert_eq!(steps(half, true, &unchanged()), "^DD[Kernel>Any]");
     }
 

@@ -176,7 +176,7 @@ impl Uses {
             Access::Read => writes,
             Access::ReadWrite => self.reads.latest(writes),
             Access::Write => {
-                // Others of its kind write other parts, unless they read them too.
+                // Steps that only write a resource write different parts of it, so they need no barrier between them.
                 match by {
                     By::Kernel => writes.kernel = self.updated,
                     By::Copy | By::Host => writes.copy = 0,

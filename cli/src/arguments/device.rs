@@ -160,8 +160,7 @@ impl DeviceArguments {
         }
         if self.allow_inexact && matches!(self.device, DeviceChoice::Cpu | DeviceChoice::Auto) {
             return Err(Failure::usage(
-                "--allow-inexact is for a Vulkan device that is asked for; give it too: --device \
-                 vulkan, or a name (`tumble devices`)",
+                "--allow-inexact needs a Vulkan device: add --device vulkan, or a name (`tumble devices`)",
             ));
         }
         self.open_any()

@@ -60,7 +60,7 @@ impl GlobalArguments {
         if let Some(count) = self.threads
             && !tumble::set_thread_count(count)
         {
-            // Only where this process ran a command before, as the Python package does.
+            // Happens only if this process ran a command before, as the Python package does.
             words::note("--threads has no effect: the threads of this process are running already");
         }
     }

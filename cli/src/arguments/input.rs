@@ -283,8 +283,7 @@ fn directory_failure(path: &Path) -> Failure {
     let mut endings: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
     endings.sort_unstable();
     let message = format!(
-        "is a directory without a file of a format that is read ({}); give its files one by one if their names \
-         end otherwise",
+        "is a directory without files in readable formats ({}); if its files have other endings, name them",
         endings.join(", ")
     );
     refuse(Code::NotAFile, message)
@@ -329,7 +328,7 @@ impl UnreadFiles {
 
     fn add(&mut self, path: &Path) {
         let name = path.file_name().unwrap_or_default();
-        // The manifest of a directory of results is a file of Tumble's.
+        // Skip the manifest of a directory of results: it is not an input.
         if name == entry::NAME {
             return;
         }
@@ -553,7 +552,7 @@ impl GatheredInputs {
                 words::warning(&match name == kept {
                     true => format!("{name}: named twice; it is processed once"),
                     false => {
-                        format!("{name}: is the same file as {kept}, which alone is processed")
+                        format!("{name}: is the same file as {kept}, and is processed once")
                     }
                 });
             }
@@ -602,7 +601,7 @@ impl GatheredInputs {
             false => matches(path),
         };
         self.many |= !matching.is_empty();
-        // Opening a file that is not there reports it.
+        // A file that does not exist is reported when it is opened.
         let all = match matching.is_empty() {
             true => alone(),
             false => matching,

@@ -299,7 +299,7 @@ impl ResultDescription<'_> {
 }
 
 fn sequence(result: &ResultDescription<'_>) -> Option<String> {
-    // Files of angles have them whatever `--quantity` is (BVH).
+    // BVH stores Euler angles, whatever `--quantity` is.
     let is_angles = result.kind.is_clip() && result.format.takes(FormatOption::Sequence);
     let applies = result.output.is_euler() || is_angles;
     result.unless(applies, "sequence", "--quantity euler, or BVH")
@@ -337,7 +337,7 @@ fn order(result: &ResultDescription<'_>) -> Option<String> {
             format.name
         )),
         ResultKind::Robot => Some(
-            "--order is for other results: the layout of a robot's motion has an order; leave it out".to_owned(),
+            "the layout of a robot's motion has a fixed order of quaternion components; leave out --order".to_owned(),
         ),
         ResultKind::Rotations | ResultKind::Poses => None,
     }
@@ -376,7 +376,7 @@ fn encoding(result: &ResultDescription<'_>) -> Option<String> {
             result.output.name()
         )),
         ResultKind::Motion | ResultKind::Baked | ResultKind::Robot => Some(format!(
-            "--encoding is for rotations as they come (NPY); {} has its own; leave it out",
+            "--encoding is for quaternions in NPY; {} has a fixed encoding; leave it out",
             format.name
         )),
     }

@@ -162,7 +162,7 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
         .strip_prefix("eased:")
         .and_then(|parts| parts.split_once(','));
     match (text, parts) {
-        // `keys` is its older name, which manifests have.
+        // `keys` is the older name, which manifests may contain.
         ("as-keyed" | "keys", _) => Ok(PathSpeed::Keys),
         ("constant", _) => Ok(PathSpeed::Constant),
         (_, Some((start, end))) => match (start.parse(), end.parse()) {

@@ -54,7 +54,7 @@ pub(crate) struct ReadingArguments {
     #[arg(long, value_name = "UNIT", value_parser = time_unit())]
     time_unit: Option<TimeUnit>,
     /// The order of a quaternion's components in TUM and EuRoC files, and in files of robots' motion, that
-    /// have another one than these formats
+    /// do not follow their format
     #[arg(long, value_name = "ORDER", value_parser = component_order())]
     source_order: Option<ComponentOrder>,
     /// Skip keys with missing numbers in tables, trajectories and logs (blank cells, nulls, NaN): the

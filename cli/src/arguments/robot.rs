@@ -42,7 +42,7 @@ pub(crate) struct DialectArguments {
     /// The point of a body whose velocity is written [default: that of the dialect]
     #[arg(long, value_name = "POINT", requires = "dialect", value_parser = velocity_at())]
     velocity_at: Option<VelocityPoint>,
-    /// How velocities follow from the curves
+    /// How velocities are computed
     #[arg(long, value_name = "HOW", requires = "dialect", default_value_t, value_parser = velocities())]
     velocities: VelocitySource,
     /// What to do with joints outside the limits of --robot
@@ -300,7 +300,7 @@ impl DialectArguments {
         let (name, tree) = (&*work.name, &robot.tree);
         let Some(rate) = rate else {
             let message = format!(
-                "{} has frames of one rate, and the samples are none; give --fps (`tumble eval`)",
+                "{} stores frames of one rate, and the samples have no rate; give --fps (`tumble eval`)",
                 dialect.name
             );
             return Err(Failure::input(

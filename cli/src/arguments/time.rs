@@ -521,7 +521,8 @@ impl SampleChoice {
             } => return in_frames(rate.of(clip), [*start, *end], clip, outside, name),
             Self::Times(times) => at(times.iter().map(|&time| clip.time_in_set(time)).collect()),
             Self::Keys(keys) => {
-                // Each clip has its own time offset, in whole seconds.
+                // The times of another clip are relative to its time offset, so they are shifted to the offset of
+                // this clip.
                 let shift = (keys.from - clip.time_offset) as f64;
                 let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
                 let common = outside.check_common(&times, clip);
@@ -560,14 +561,15 @@ pub(crate) fn in_frames(
 
 fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name: &str) {
     let (first, last) = clip.set.time_span().unwrap_or((0.0, 0.0));
-    // With an explicit option the user knows what tracks do there; `kept` prints how many times are left out.
+    // With an explicit option the user has chosen what happens outside the keys, so there is no warning; `kept`
+    // prints how many times are left out.
     let [is_default_before, is_default_after] = outside.is_default();
     if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(
             "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             --before and --after say what tracks do outside them (by default they hold their first and last key)"
+             --before and --after select the values outside them (by default the first and the last key)"
         ));
     }
 }

@@ -70,7 +70,7 @@ impl Selector {
         }
         match &self.meaning {
             SelectorKind::Name => Vec::new(),
-            // A range that is not there as a whole is a mistake.
+            // A range must exist completely; a part of one is probably a mistake.
             SelectorKind::Range(_, last) if *last >= names.len() => Vec::new(),
             SelectorKind::Range(first, last) => (*first..=*last).collect(),
             SelectorKind::Pattern(pattern) => all()

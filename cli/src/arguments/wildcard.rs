@@ -73,7 +73,7 @@ impl Wildcard {
                     at += 1;
                 }
                 _ => match &mut star {
-                    // The star takes one more.
+                    // Let the star match one more character.
                     Some((behind, end)) => {
                         *end += 1;
                         (part, at) = (*behind, *end);
@@ -166,7 +166,7 @@ impl PathPattern {
             _ => None,
         });
         let names: Vec<_> = names.collect();
-        // The parts of the pattern that are left at each name, of those that begin at any of the names before.
+        // For each part of the pattern, whether the names so far match the parts before it.
         let mut open = vec![false; self.names.len() + 1];
         for name in &names {
             open[0] = true;

@@ -253,7 +253,7 @@ mod tests {
             hashes[0] != hashes[1] && hashes[1] != hashes[2],
             "{hashes:?}"
         );
-        // The files of an input beyond the limits are not looked for.
+        // An input above the limits is not searched for files that it refers to.
         let limits = Limits {
             file: 8,
             ..Limits::default()

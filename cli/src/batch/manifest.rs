@@ -255,7 +255,7 @@ impl Manifest {
         let is_orphan = |entry: &ManifestEntry| {
             let whole = entry.whole().0;
             if self.complete.contains(whole) {
-                // Of a file that had several clips, and has one now.
+                // The file had several clips before, and has one now.
                 return entry.output != whole && self.previous.contains_key(whole);
             }
             match self.planned.contains(whole) {
@@ -315,7 +315,7 @@ impl Manifest {
                 Ok(true) => {
                     let removed = self.opened.remove_file(Path::new(output));
                     removed.map_err(|error| Failure::writing(&shown.to_string(), &error))?;
-                    // The first that is not empty stays, and those above it.
+                    // Stop at the first directory that is not empty: it and its parents are kept.
                     let parents = Path::new(output).ancestors().skip(1);
                     let mut parents = parents.filter(|parent| parent.file_name().is_some());
                     while parents
@@ -463,7 +463,7 @@ impl ResultRecorder for Manifest {
     }
 
     fn begin(&mut self, start: BatchStart<'_>) -> Result<(), Failure> {
-        // An input that is gone has not failed any more.
+        // Forget the failure of an input that was deleted.
         let mut forgotten = Vec::new();
         let prune = self.prune;
         for (input, result) in &start.inputs {

@@ -162,7 +162,7 @@ pub(crate) fn plan(
             }
             let destination = Destination::new(out, options.overwrite, &paths)?;
             let format = choose(out, options.format)?;
-            // The surest check is to try.
+            // Writing a file is the only reliable check.
             destination.check_writable()?;
             destination.refuse_terminal(format)?;
             OutputPlan {

@@ -145,7 +145,8 @@ impl ClipWork {
         let (name, target) = (&self.name, &self.target);
         let on_device = device.map_or(String::new(), |device| format!(", on {device}"));
         let spent = words::duration(self.input.started.elapsed());
-        // Files of clips have what the input's has; arrays and tables of rotations are something else.
+        // Sizes are compared only for files of clips: arrays and tables of rotations have other content than the
+        // input.
         let sizes = match target.format().write {
             None => self.sizes(&written),
             Some(_) => String::new(),
@@ -685,7 +686,7 @@ impl BatchRecords<'_> {
         warnings: Vec<RecordedWarning>,
     ) -> Result<(), Failure> {
         let name = work.target.name();
-        // A clip may be called as the result that an earlier batch made of another input.
+        // A clip may have the name of a result that an earlier batch made from another input.
         if let Some(entry) = self.previous.entries.get(name)
             && !self.overwrite
         {

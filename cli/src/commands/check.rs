@@ -29,8 +29,8 @@ use crate::threads::on_threads;
 JSON with the SHA-256 of the result, of its input (with the files that it refers to) and of \
 the files that options name, the options, the kernels, the program's version and the device; \
 and a line for each input that failed or has no result yet. The exit code is 0 only if the \
-batch is complete: all inputs have their results, no result has changed, and neither has an \
-input, or a file that an option names, that is found by its path in the manifest. If shards \
+batch is complete: all inputs have their results, and no result, no input and no file that an option \
+names has changed. Inputs that are not found by their paths in the manifest are not checked. If shards \
 are missing in the directory, it checks the results of the complete shards, and prints how \
 many there are.
 
@@ -184,12 +184,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     missing.extend(unfinished(&lines));
     if !missing.is_empty() {
         let missing = missing.join(", ");
-        // Without its first line a manifest is no longer taken for one.
+        // A manifest is recognised by its first line.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
         let remedy = match is_known {
             true if lines.damaged > 0 => {
-                "a result whose line is damaged is a file of somebody else's for `--resume`: `tumble eval … \
-                 --overwrite` makes all results again"
+                "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
+                 makes all results again"
             }
             true if is_made_again => "`tumble eval … --resume` makes them again",
             true => "`tumble eval … --resume` tries them again",

@@ -30,10 +30,10 @@ use crate::messages::words;
 /// Compute features for learning: six numbers of rotations, headings, contacts, mirrors, HumanML3D
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the
-names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the
-curves; of other skeletons they are differences over a thirty-second of a frame. HumanML3D needs metres, y
-up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need
+The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the \
+names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the \
+curves; for other skeletons they are differences over 1/32 of a frame. HumanML3D needs metres, y \
+up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need \
 --body-model.
 
 Examples:
@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     /// A joint that is slower touches the ground, if it is lower too; metres a second
     #[arg(long, value_name = "SPEED", default_value_t = ContactLimits::PROTOMOTIONS.speed)]
     contact_speed: f64,
-    /// Contacts are those of most of so many frames, an odd number
+    /// Replace each contact by the majority of this many frames around it, an odd number
     #[arg(long, value_name = "FRAMES", default_value_t = 1)]
     contact_window: usize,
     /// The axis across the mirror

@@ -214,7 +214,7 @@ fn summarise(
         if index > 0 {
             summary.warnings.clear();
         }
-        // Keys that follow a file's curves are none that a method is asked to join.
+        // Keys that follow the curves of a file are not meant for c2, so there is no warning about c2.
         let follows = arguments.inputs.follows_curves(path);
         let smoothest = Interpolation::from(C2);
         let of_curves = (!follows)

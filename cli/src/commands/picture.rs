@@ -74,7 +74,7 @@ fn with_letters_as_outlines(svg: &str) -> io::Result<String> {
         let path = outlines(&font, text, scale, [x + start, y + down]);
         result += "<path";
         for name in ["fill", "opacity", "transform"] {
-            // Values of the element around it are inherited as they are.
+            // Attributes of the parent element are inherited unchanged.
             if let Some(value) = node.attribute(name) {
                 let _ = write!(result, " {name}=\"{value}\"");
             }

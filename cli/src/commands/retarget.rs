@@ -27,12 +27,12 @@ use crate::messages::words;
 /// Carry motions over to the skeleton of another file
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each joint turns away from its rest pose in the world as its partner of the input does, and the hips move
-as far as the skeleton is high. Nothing is resampled: keys keep their times. Joints are paired by the parts
-of the body that their names mean (VRM, Mixamo, SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA); --bones names the
-pairs of other skeletons. If --onto is glTF and so is the output, it is that file with its meshes and
-materials, and its animations are replaced. Hands and feet are where the lengths of the limbs put them:
---report says how far from the input's. There is no inverse kinematics.
+Each joint rotates away from its rest pose, in world space, as its partner in the input does. The path of the \
+hips is scaled to the size of the skeleton. Nothing is resampled: keys keep their times. Joints are paired by the \
+parts of the body that their names mean (VRM, Mixamo, SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA); --bones pairs the \
+joints of other skeletons. If --onto and the output are glTF, the result is that file with its meshes and \
+materials, and its animations are replaced. Limbs have other lengths, so hands and feet are not where they are in \
+the input; --report contains the distances. There is no inverse kinematics.
 
 Examples:
   tumble retarget take.bvh --onto character.glb -o walking.glb
@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     /// The file with the skeleton: glTF, with or without animations, or the first clip of any other file
     #[arg(long, value_name = "FILE")]
     onto: PathBuf,
-    /// The joints that belong together, as JSON: {\"joint of --onto\": \"joint of the input\", …} [default: by the
+    /// The joints that belong together, as JSON: {"joint of --onto": "joint of the input", …} [default: by the
     /// parts of the body that their names mean]
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,

@@ -160,7 +160,7 @@ impl Arguments {
             }
             let mut found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
-            // On the clock of the file.
+            // Printed times are those of the file's clock.
             let positions = [&mut found.worst, &mut found.first_difference];
             for position in positions.into_iter().flatten() {
                 position.time += clip.time_offset as f64;

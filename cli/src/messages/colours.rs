@@ -58,7 +58,7 @@ pub(crate) fn of_method(method: Method) -> Colour {
     common(method.name).unwrap_or_else(|| {
         let others = METHODS.iter().filter(|other| common(other.name).is_none());
         let index = others.take_while(|&&other| other != method).count();
-        // Behind the last of them they come again, darker.
+        // After the last colour, the list repeats with darker colours.
         let darker = 2 + index / OTHERS.len();
         OTHERS[index % OTHERS.len()].map(|part| (usize::from(part) * 2 / darker) as u8)
     })

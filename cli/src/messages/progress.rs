@@ -141,7 +141,7 @@ impl Progress {
 }
 
 fn bar(label: &'static str, total: u64) -> ProgressBar {
-    // No colours in the template, so `NO_COLOR` holds.
+    // The template contains no colours, so `NO_COLOR` needs no code.
     let style =
         ProgressStyle::with_template("{msg} [{bar:30}] {pos} of {len} {percent}% {eta} left")
             .unwrap_or_else(|_| ProgressStyle::default_bar());

@@ -49,7 +49,7 @@ fn handle_signal(signal: i32) {
         words::line(&format!("interrupted by {name}"));
     }
     let mut state = state();
-    // A second signal means it: do not wait for the writer.
+    // On a second signal, do not wait for the writer.
     if state.writing + state.batches == 0 || state.signal.is_some() {
         end(&state, signal);
     }
@@ -90,7 +90,8 @@ fn wait_for_signals() {
     let heeded = all
         .into_iter()
         .filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    // Before this returns: the first file is opened then, and a thread may take long to start.
+    // The signals are registered here and not in the thread, because a thread may take long to start, and the first
+    // file may be opened before.
     let Ok(mut signals) = Signals::new(heeded) else {
         return;
     };

@@ -80,7 +80,7 @@ pub(crate) fn usage(error: &mut clap::Error, arguments: &[OsString]) {
     for word in arguments {
         let word = word.to_string_lossy();
         let shown = printable(&word);
-        // Also the part behind `--option=`.
+        // The part after `--option=` is also printed safely.
         let parts = word.split('=').zip(shown.split('='));
         for (word, shown) in std::iter::once((&*word, &*shown)).chain(parts) {
             if word != shown {
@@ -120,7 +120,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
         let message = reason(info.payload());
-        // A library's, on broken bytes, which becomes a message about the input.
+        // A panic of a library on damaged bytes, which is reported as an error of the input.
         if is_guarded() {
             return;
         }

@@ -119,7 +119,7 @@ impl<'a> Messages<'a> {
             })
             .collect();
         let blocks = blocks.ok_or_else(wrong)?;
-        // Blocks that lie upon each other would make much of little.
+        // Overlapping blocks could describe much more data than the file contains.
         let total: u64 = blocks.iter().fold(0, |total, &(_, head, body)| {
             total.saturating_add(head).saturating_add(body)
         });

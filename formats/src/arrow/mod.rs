@@ -40,7 +40,7 @@ pub static FORMAT: Format = Format {
     write: Some(WriteResults {
         order: ComponentOrder::Xyzw,
         layout: None,
-        // The frame, the time and the track beside it.
+        // A row also contains the frame, the time and the track.
         rotation_bytes: |encoding| encoding.bytes() as f64 + 20.0,
         rotations: |out, result| write_rotations(result, |table| ArrowSink::new(out, table)),
         poses: |poses, out| write_poses(poses, |table| ArrowSink::new(out, table)),

@@ -114,7 +114,7 @@ impl<R: BufRead> Parser<'_, R> {
             let message = "the file ends without MOTION; is it truncated?".to_owned();
             return Err(self.lines.refuse_end(Code::BvhMotion, message));
         };
-        // The joint that the word stands in; an End Site holds an OFFSET and nothing else.
+        // The joint that contains the word. An End Site contains only an OFFSET.
         let block = self.open.last();
         let (in_joint, outside) = (block.is_some_and(|b| b.joint.is_some()), block.is_none());
         match word.text.to_ascii_uppercase().as_str() {
@@ -240,8 +240,10 @@ impl<R: BufRead> Parser<'_, R> {
                     let (exact, site) = (DVec3::from(offset), DVec3::from(offset).as_vec3());
                     let lost = (site.as_dvec3() - exact).abs().max_element();
                     if exact.abs().max_element() >= SMALL && lost > 0.0 {
+                        // Three digits, without an exponent.
+                        let lost = format!("{lost:.2e}").parse().unwrap_or(lost);
                         let message = format!(
-                            "an End Site is kept in f32, up to {lost:.2e} from its position in the file"
+                            "an End Site is stored in f32, up to {lost} from its position in the file"
                         );
                         self.lines
                             .warn(keyword.column, Code::EndSiteRounded, message);

@@ -176,7 +176,7 @@ impl FrameKeys {
                 true => Vec::new(),
                 false => origins,
             },
-            // The format says nothing, and whatever reads it joins the samples by lines.
+            // The format does not define the interpolation; other programs interpolate linearly.
             channels: (hierarchy.joints.iter())
                 .map(|joint| Channels {
                     rotation: linear(!joint.rotations.is_empty()),
@@ -345,7 +345,7 @@ fn read_row<R: BufRead>(
             Err((code, message)) if tokens(line).count() == columns => {
                 return Err(lines.refuse(column, code, message));
             }
-            // A fault of the whole row explains more.
+            // Report the wrong number of columns instead: it explains more.
             _ => return Err(wrong_count(lines, line, columns)),
         };
         if number.vanished {

@@ -231,7 +231,7 @@ fn node(
     let is_moved = is_root || (0..3).any(moves);
     let has_rest = (has_positions(&channels) || is_moved) && !clip.skeleton.is_empty();
     let offset = if has_rest { rest } else { first };
-    // Coordinates that the file's channels leave to the OFFSET, and that are others now.
+    // Coordinates without a channel in the file, whose OFFSET is no longer right.
     let is_missing = |axis: &usize| {
         !channels.contains(&WrittenChannel::Position(*axis))
             && (is_root || moves(*axis) || first[*axis] != offset[*axis])
@@ -258,7 +258,7 @@ fn node(
     }
     let is_partial = written.is_some() && file_axes.len() < 3;
     if sequence.is_some() || !is_partial || uses_other_axes(sampled, track, axes, &file_axes) {
-        // All three, where the file's first rotation is.
+        // All three rotation channels are written at the position of the file's first one.
         let is_rotation = |channel: &WrittenChannel| matches!(channel, WrittenChannel::Rotation(_));
         let first_rotation = channels.iter().position(is_rotation);
         let is_sorted = file_axes == axes;

@@ -69,7 +69,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     for requested in &plan.columns {
         let values = match requested.need {
             ColumnNeed::Number => ColumnValues::Numbers(ColumnNumbers::F64(Vec::new())),
-            // Whole until a cell is not.
+            // Whole numbers, until a cell with a fraction is read.
             ColumnNeed::Whole | ColumnNeed::Time => {
                 ColumnValues::Numbers(ColumnNumbers::Whole(Vec::new()))
             }
@@ -401,7 +401,7 @@ impl TextCell<'_> {
             ColumnValues::Decimals(times, decimals) => {
                 self.time(text, times, decimals, warnings)?;
             }
-            // Text has no other columns.
+            // CSV never has columns of these types.
             ColumnValues::Numbers(ColumnNumbers::F32(_))
             | ColumnValues::Stamps(..)
             | ColumnValues::Lists { .. } => {}

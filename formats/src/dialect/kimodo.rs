@@ -57,7 +57,7 @@ pub(super) static DIALECT: Dialect = Dialect {
             positions.ok_or_else(|| missing(archive, "posed_joints"))?,
         )?;
         let count = plan.tracks;
-        // Of the skeletons that Kimodo has, this one alone is known by its number of joints.
+        // Kimodo has several skeletons; only this one can be recognised by its number of joints.
         match joints_of_body(count).filter(|_| count == 22) {
             Some((names, parents)) => (plan.names, plan.parents) = (names, parents),
             None => {

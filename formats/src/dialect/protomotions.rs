@@ -126,7 +126,7 @@ fn rows_of(
         }
         let whole = &array.bytes[header.start..];
         let row = whole.len() / rows.max(1);
-        // The rows, and the keys that they become; clips may share rows.
+        // Memory for the rows and for their keys. Clips may share rows, so the file's length is no bound.
         archive.take(count as usize * row, 16)?;
         let first = bytes.len();
         bytes.extend_from_slice(&whole[start as usize * row..][..count as usize * row]);

@@ -131,8 +131,8 @@ impl TextDialect {
         {
             warnings.warn(Code::QuaternionOrder, || {
                 let message = format!(
-                    "the quaternion of the first line is {} {} {} {}, read as x y z w: a robot that lies down; Kimodo's \
-                     files have w first: --source-order wxyz",
+                    "the quaternion of the first line is {} {} {} {}, read as x y z w: the robot would be upside down; \
+                     if w is first, as in Kimodo's files, give --source-order wxyz",
                     numbers[3], numbers[4], numbers[5], numbers[6]
                 );
                 (None, message)
@@ -147,7 +147,8 @@ impl TextDialect {
             options.source_rate = FrameRate::new(per_second, 1).ok();
             warnings.warn(Code::AssumedRate, || {
                 let message = format!(
-                    "the file has no rate; {per_second} frames a second are assumed, as its kind has; --source-fps gives \
+                    "the file has no rate; {per_second} frames a second are assumed, as usual for such files; \
+                     --source-fps gives \
                      another"
                 );
                 (None, message)

@@ -309,7 +309,7 @@ fn bezier_parameter(p1: f64, p2: f64, x0: f64) -> f64 {
         t -= off / (a_3 * t2 + b_2 * t + c);
         (t, off.abs() <= 8.881_784_197_001_252e-16)
     };
-    // Two steps are enough for most.
+    // Most times need only two steps of Newton's iteration.
     let mut found = step();
     for _ in 0..10 {
         if found.1 {

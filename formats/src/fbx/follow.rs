@@ -256,7 +256,7 @@ impl ChannelFollower<'_> {
 
     fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
-        // The arc of half a turn may go either way.
+        // Near half a turn, the direction of the arc is not determined, so this is not a line.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Ok(false);
         }
@@ -300,7 +300,8 @@ impl ChannelFollower<'_> {
             };
             open.push(*piece);
             while let Some(mut piece) = open.pop() {
-                // A cut lies on the other side of 0 from the curve before.
+                // The two halves of a divided interval may have the opposite sign of the curve before, so the sign is
+                // continued from the last key.
                 let last = keys.len() - 1;
                 piece = self.after(piece, keys[last].1);
                 let cubic = Cubic::through(piece.ends, piece.thirds);
@@ -563,7 +564,7 @@ mod tests {
             [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, ChannelValue::X * x));
         let found = follow.keys(&stops, &thirds).unwrap();
         assert_eq!(found, (FollowedKeys::Step(keys.to_vec()), true));
-        // Straight up to 1, where it falls to 0, and stays.
+        // A line up to time 1, then 0.
         let saw = |time: f64| Ok(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
         follow.value = &saw;
         let stops = [

@@ -170,7 +170,7 @@ impl StackLayers {
                     && let Some(layers) = layers_of.get_mut(property.element.typed_id as usize)
                     && layers.last() != Some(&id)
                 {
-                    // In the list, in a key of the map, and in the animation.
+                    // Memory for an entry of the list, a key of the map, and an entry of the animation.
                     budget.take(1, 4 * size_of::<usize>())?;
                     layers.push(id);
                 }

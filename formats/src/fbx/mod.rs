@@ -157,7 +157,7 @@ pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loade
     for stack in 0..scene.anim_stacks.len() {
         match reader.clip(stack, &mut warnings) {
             Ok(clip) => loaded.clips.push(clip),
-            // The others would be refused too.
+            // The limit applies to the whole file, so the other stacks would be refused too.
             Err(fault) if [Code::Memory, Code::FbxWork].contains(&fault.code) => return Err(fault),
             Err(fault) => loaded.refused.push(fault),
         }
@@ -185,7 +185,7 @@ fn no_anim(name: &str, error: &ufbx::Error) -> Diagnostic {
 
 fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnostic> {
     let half = usize::try_from(budget.left() / 2).unwrap_or(usize::MAX);
-    // None at all is no limit to it.
+    // `ufbx` takes 0 for no limit.
     let half = half.max(1);
     let allocator = || AllocatorOpts {
         memory_limit: half,
@@ -209,7 +209,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
             ErrorType::OutOfMemory | ErrorType::MemoryLimit | ErrorType::AllocationLimit => (
                 Code::Memory,
                 format!(
-                    "reading it takes more than the {half} bytes that an input of this length gets"
+                    "reading it takes more than {half} bytes, the limit for an input of this length"
                 ),
             ),
             ErrorType::NodeDepthLimit => (
@@ -405,7 +405,7 @@ impl FbxReader<'_> {
         let over = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let (scene, tracks) = (self.scene, &self.nodes.tracks);
         self.budget.take(tracks.len(), TRACK).map_err(over)?;
-        // Each clip has the names of its tracks.
+        // Memory for the names of the tracks, which each clip contains.
         let names = self.nodes.names.iter().map(String::len).sum();
         self.budget.take(names, 1).map_err(over)?;
         let anim_stack = &scene.anim_stacks[stack];
@@ -429,7 +429,7 @@ impl FbxReader<'_> {
         }
         let takes = self.on_frames(takes);
         self.warn_of_takes(stack, &takes, warnings);
-        // Once for all: the threads take their memory in any order.
+        // One limit for all threads, because they take memory in any order.
         let max_keys = usize::try_from(self.budget.left() / KEY as u64).unwrap_or(usize::MAX);
         let follower = StackFollower {
             reader: self,
@@ -448,7 +448,7 @@ impl FbxReader<'_> {
         };
         let mut nodes: Vec<NodeKeys> = nodes.into_iter().collect::<Result<_, _>>()?;
         let [start, end] = takes.span.map(|time| self.clip_time(time, takes.grid));
-        // A take in which nothing moves is as long as it says: its first track has a key at either end.
+        // If nothing moves in a take, its first track gets a key at each end, so that the clip has the take's length.
         if start < end
             && nodes.iter().all(NodeKeys::rests)
             && let Some(NodeKeys { rotation, .. }) = nodes.first_mut()
@@ -582,7 +582,8 @@ impl FbxReader<'_> {
         match keys.rotation {
             FollowedKeys::Rest(value) => {
                 let key = quat(value);
-                // Clips of one file share where their nodes rest; one that is elsewhere in this clip has a key.
+                // All clips of a file share the rest poses of nodes. A node with another pose in this clip gets a
+                // key.
                 if key != resting && key != -resting {
                     channels.rotation = Some(ChannelInterpolation::Linear);
                 }
@@ -660,7 +661,7 @@ impl StackFollower<'_> {
         });
         let evaluator = Evaluator::of(self, node);
         let mut lists = times.map(|times| times.within(takes.span));
-        // Curves that never change need no look behind their first key.
+        // A curve that never changes needs only its first key.
         for (list, channel) in lists.iter_mut().zip(CHANNELS) {
             if evaluator.is_still(channel.0) {
                 list.truncate(1);

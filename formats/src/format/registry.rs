@@ -50,7 +50,7 @@ impl Format {
     #[must_use]
     pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
         let probed = FORMATS.iter().copied().find(|format| (format.probe)(start));
-        // Trajectories are mostly called `.txt`, and few say what they are.
+        // Most trajectories have the ending `.txt` and no heading, so they are recognised by their numbers.
         let by_numbers = || {
             let width = Some(table_width(start)?);
             let mut all = FORMATS.iter().copied();

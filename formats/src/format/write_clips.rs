@@ -88,7 +88,7 @@ pub(crate) fn no_offsets(clip: &Motion, options: &MotionOptions) -> Option<Diagn
 
 /// Refuses samples whose times do not increase: no reader of clips takes such a file.
 pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
-    // Where a clip's keys are written, the samples are none.
+    // If keys are written instead of samples, `sampled.times` is empty.
     let mut pairs = sampled.times.windows(2).filter(|_| !sampled.is_at_keys);
     let Some(sample) = pairs.position(|pair| pair[1] <= pair[0]) else {
         return Ok(());
@@ -195,7 +195,7 @@ fn loss(
     let joints = || clip.skeleton.iter();
     let (has_it, loss) = match feature {
         Feature::TrackNames => {
-            // Readers of trajectories make up this name, so that nothing is lost with it.
+            // This name was not in the file: readers of trajectories add it, so leaving it out loses nothing.
             let named = |name: Option<&str>| {
                 name.is_some_and(|name| !name.is_empty() && name != TRAJECTORY_TRACK)
             };
@@ -221,15 +221,16 @@ fn loss(
             clip.channels
                 .iter()
                 .any(|channels| channels.has(ChannelInterpolation::Step)),
-            "that channels hold each key until the next one",
+            "the steps of channels, which keep each key until the next one",
         ),
         Feature::Lines => (
             are_keys(sampled) && bends_by(clip, Some(ChannelInterpolation::Linear)),
-            "that lines and arcs join the keys (evaluate them with the method slerp)",
+            "the lines and arcs between the keys (evaluate the result with the method slerp)",
         ),
         Feature::Curves => (
             are_keys(sampled) && bends_by(clip, None),
-            "that smooth curves join the keys (lines and arcs join them there; more frames are nearer to the curves)",
+            "the smooth curves between the keys (it has lines and arcs; with more frames they are nearer to the \
+             curves)",
         ),
         Feature::Bvh => (
             !clip.written_joints.is_empty() && !clip.is_world,

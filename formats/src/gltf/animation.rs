@@ -68,7 +68,7 @@ pub(super) fn read(
     let (times, stored, rate) = times(reader, &moved, options)?;
     let tracks = Tracks::of(nodes, &moved);
     reader.take(tracks.nodes.len(), TRACK, &pointer)?;
-    // Each clip has the names of its tracks.
+    // Memory for the names of the tracks, which each clip contains.
     let names = tracks.nodes.iter().map(|&node| nodes.name(node).len());
     reader.take(names.sum(), 1, &pointer)?;
     let mut motion = Motion {
@@ -80,7 +80,7 @@ pub(super) fn read(
     let mut keys: Vec<ChannelKeys> = Vec::new();
     let mut borrowed = Vec::new();
     for moved in &moved {
-        // Until the set has them, keys are there twice.
+        // Keys are in memory twice until they are moved into the set.
         let count = times[&moved.sampler.input].len();
         borrowed.push(reader.borrow(count, moved.key_bytes(), &pointer)?);
         reader.take(count, moved.key_bytes(), &pointer)?;
@@ -205,7 +205,8 @@ fn moved(
         }
         if nodes.has_matrix(node) {
             reader.warn(Code::NodeMatrix, &format!("/nodes/{node}/matrix"), || {
-                format!("node {node} is moved and has a matrix; it is split into translation, rotation and scale")
+                format!("node {node} is animated and has a matrix, which is decomposed into translation, \
+                         rotation and scale")
             });
         }
         let Some(sampler) = animation.samplers.get(channel.sampler) else {

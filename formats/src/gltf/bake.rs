@@ -130,7 +130,7 @@ impl<'a> AnimationBaker<'a> {
     /// When f32 cannot tell times apart.
     pub(super) fn bake(&mut self, edits: &mut Edits<'_>) -> Result<(), WriteError> {
         let shared = self.input(self.sampled.times, edits)?;
-        // By the samplers whose keys the samples stand for.
+        // The new samplers, by the samplers whose keys they replace.
         let mut made: HashMap<usize, Vec<BakedSampler>> = HashMap::new();
         let read = self.read;
         let others = read.others.iter().filter(|_| self.is_cut);

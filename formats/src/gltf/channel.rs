@@ -145,14 +145,14 @@ impl MovedChannel {
         duplicates: Duplicates,
     ) -> Result<ChannelKeys, Diagnostic> {
         let width = self.path.width();
-        // The numbers in f64, the keys that stay, and the quaternions that they become.
+        // Memory of one key: its numbers in f64, its index in the list of kept keys, and its quaternion.
         let each = 8 * self.values.count.div_ceil(times.len().max(1) as u64) as usize * width + 40;
         let _borrowed = reader.borrow(times.len(), each, &self.output)?;
         let mut times = times.0.clone();
         if times.is_empty() {
             reader.warn(Code::EmptySampler, &self.input, || {
                 format!(
-                    "the sampler has no keys; the {} of node {} rests",
+                    "the sampler has no keys; the {} of node {} is not animated",
                     self.path, self.node
                 )
             });

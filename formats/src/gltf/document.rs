@@ -69,8 +69,8 @@ impl Document for GltfDocument {
         let start = (first * rate.per_second()).floor() as i64;
         let end = (last * rate.per_second()).ceil() as i64;
         let time = |frame: i64| rate.time_of(frame.unsigned_abs()) * frame.signum() as f64;
-        // The ends are given as they are, and stand for the frames that they were rounded from:
-        // within an ulp, where frames are much longer (see `grid`).
+        // The ends are exact times, but they may have been rounded from frames. If frames are much longer than
+        // rounding, an ulp is tolerated (see `grid`).
         let near = if spacing * rate.per_second() < 0.01 {
             1.0
         } else {
@@ -241,7 +241,7 @@ impl GltfDocument {
             check_length(&json, bytes as u64)?;
             self.container.write_glb(&text, bin.as_deref(), out)?;
         }
-        // Whatever else is remarkable was said when the file was read.
+        // All other warnings were already reported when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
         warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
         Ok(warnings)
@@ -276,8 +276,8 @@ impl GltfDocument {
                         count => format!("{count} channels of weights and other properties are"),
                     };
                     format!(
-                        "{channels} not cut: copied whole, at the times of before, in step with the keys \
-                         that are cut; the animation lasts as long as the longest channel"
+                        "{channels} not cut but copied whole, at their times; the animation is as long as its \
+                         longest channel"
                     )
                 });
             }

@@ -113,7 +113,7 @@ impl<'a> Edits<'a> {
     pub(super) fn remove_entries(&mut self, entries: &[&RawValue], left: &LeftOut) {
         for &index in left.indices() {
             let range = self.json.range(entries[index]);
-            // With the comma before it, or behind it where nothing before it stays.
+            // The comma before it is removed too, or the comma after it if nothing before it is kept.
             let has_kept_before = left.before(index) < index;
             let range = match (has_kept_before, entries.get(index + 1)) {
                 (true, _) => self.json.range(entries[index - 1]).end..range.end,

@@ -35,7 +35,7 @@ pub(super) fn buffers<'a>(
         let buffer: Buffer<'_> = json.typed(raw, &pointer)?;
         let found = match &buffer.uri {
             Some(_) => stays_outside(reader, reader.buffer(index, &pointer)),
-            // A buffer without bytes: it stands for the data that meshopt decodes.
+            // A fallback buffer of meshopt: it has no bytes, only the length of the decoded data.
             None => None,
         };
         let Some(found) = found else {
@@ -55,8 +55,8 @@ pub(super) fn buffers<'a>(
     }
     let members = match members {
         Some(members) => members,
-        // A GLB's first buffer without a URI is its BIN chunk: it gets one, that of the file comes
-        // behind it.
+        // In a GLB, the first buffer without a URI is the BIN chunk. Here this would be a buffer of the input that
+        // has no URI, so a BIN chunk of 4 bytes is written before it.
         None if is_first_unnamed => {
             bytes.extend([0; 4]);
             String::new()
@@ -177,7 +177,7 @@ pub(super) fn images<'a>(
             let kind = kind(&bytes).ok_or_else(|| json.refuse(&pointer, Code::Uri, message()))?;
             if !["image/png", "image/jpeg"].contains(&kind) && plain.contains(&index) {
                 let message = format!(
-                    "{uri}: a texture has {kind} as its plain `source`, where glTF has PNG and JPEG alone"
+                    "{uri}: a texture has {kind} as its `source`; glTF allows only PNG and JPEG there"
                 );
                 return Err(json.refuse(&pointer, Code::Uri, message));
             }

@@ -166,7 +166,8 @@ impl<'a> Json<'a> {
     }
 
     pub(super) fn no_such(&self, list: &str, index: usize, count: usize, from: &str) -> Diagnostic {
-        let message = format!("number {index} of {list} is named, and there are {count} from 0 on");
+        let message =
+            format!("index {index} of {list} does not exist: the list has length {count}");
         self.refuse(from, Code::IndexRange, message)
     }
 

@@ -219,7 +219,7 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
     let header = stream.len();
     stream.resize(header + groups.len().div_ceil(4), 0);
     for (i, group) in groups.iter().enumerate() {
-        // Those that do not fit take a byte each behind the others; in no bits there is nothing but zeros.
+        // Values that do not fit take an additional byte after the others. A width of 0 bits can store only zeros.
         let length = |width: usize| match width {
             0 if group.iter().any(|&byte| byte != 0) => usize::MAX,
             0 => 0,

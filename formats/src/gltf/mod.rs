@@ -201,7 +201,8 @@ pub fn read_gltf(
                 loaded.clips.extend(clip);
                 read.push(channels);
             }
-            // The others would be refused too, each after all that it names was looked at.
+            // The memory limit applies to the whole file. The other animations would be refused too, after reading
+            // all their data.
             Err(fault) if fault.code == Code::Memory => return Err(fault),
             Err(fault) => {
                 read.push(None);

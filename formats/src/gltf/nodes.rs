@@ -206,7 +206,7 @@ fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnos
             }
         }
     }
-    // The number of the walk that came by a node, from 1.
+    // The number of the walk that visited each node, from 1.
     let mut walks = vec![0; list.len()];
     for start in 0..list.len() {
         let mut next = Some(start);

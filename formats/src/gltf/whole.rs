@@ -26,7 +26,7 @@ impl<'de, T: TryFrom<u64>> Deserialize<'de> for Whole<T> {
             }
 
             fn visit_f64<E: Error>(self, number: f64) -> Result<Whole<T>, E> {
-                // Up to here every whole number is one of f64.
+                // Up to this limit, f64 represents every whole number exactly.
                 let limit = (1u64 << 53) as f64;
                 if number.fract() == 0.0 && (0.0..=limit).contains(&number) {
                     return self.visit_u64(number as u64);

@@ -146,7 +146,9 @@ fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagn
     for offset in clips.iter().map(|clip| clip.clip.time_offset) {
         if offset != 0 {
             warnings.warn(Code::StartMoved, || {
-                let message = format!("times count from {offset} s; glTF's are too short for both");
+                let message = format!(
+                    "times are relative to {offset} s, because f32, in which glTF has times, cannot store the full times"
+                );
                 (None, message)
             });
         }
@@ -295,7 +297,7 @@ fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
 
 /// The times of a clip of some tracks in f32, or why they cannot be stored so.
 pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
-    // The sum makes -0 to 0.
+    // Adding 0 changes -0 to +0.
     let times: Vec<f32> = seconds.iter().map(|&time| time as f32 + 0.0).collect();
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
         let why = "it has no samples; give a time at least";

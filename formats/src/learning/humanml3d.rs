@@ -69,7 +69,7 @@ const SIGMA: f64 = 20.0;
 pub enum Humanml3dError {
     /// The direction that the person faces is not defined.
     #[error(
-        "frame {frame}: the hips and shoulders are one above the other, so that they face nowhere"
+        "frame {frame}: the hips and shoulders are one above the other, so they have no facing direction"
     )]
     NoFacing {
         /// The frame.

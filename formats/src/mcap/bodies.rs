@@ -195,7 +195,7 @@ fn resolve_static(body: &mut Body<'_>, start: Option<i64>, clock: &StampClock) {
                 _ => clock.time_of(pose.logged),
             };
             let time = time.max(start.unwrap_or(i64::MIN));
-            // The last of several values at the start holds.
+            // If there are several values at the start, the last one is used.
             if kept.last().is_some_and(|last| time <= last.time) {
                 kept.pop();
             }
@@ -254,7 +254,7 @@ pub(super) fn into_loaded(
     let of_time = |body: &&Body<'_>| body.kind != BodyKind::Static;
     let timed = bodies.iter().filter(of_time).flat_map(|body| &body.poses);
     let start = timed.map(|pose| pose.time).min();
-    // Its times are sorted: a log without static transforms needs none.
+    // Collected and sorted only if the log has static transforms.
     if bodies.iter().any(|body| body.kind == BodyKind::Static) {
         let clock = StampClock::of(&bodies);
         let statics = bodies.iter_mut();

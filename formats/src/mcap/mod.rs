@@ -96,7 +96,7 @@ pub static PATH_FORMAT: PathFormat = PathFormat {
     name: "mcap",
     summary: "the paths (nav_msgs/Path) of a log of ROS 2; those of planners have no times",
     probe: |start| (FORMAT.probe)(start),
-    // A log is first of all one of poses.
+    // A log is read for its poses by default, not for paths.
     is_of_paths: |_| false,
     read_bytes: read_paths,
 };
@@ -408,7 +408,7 @@ impl<'a> Log<'a> {
                     MessageKind::TransformList => cdr.count()?,
                     _ => 1,
                 };
-                // All of a message or nothing.
+                // A message is used completely or not at all.
                 let mut found = Vec::new();
                 for _ in 0..count {
                     let (stamp, parent) = cdr.header()?;

@@ -264,7 +264,7 @@ impl<'a> Records<'a> {
                     (self.chunk, self.chunk_offset, self.chunk_at) = (chunk, offset, 0);
                     self.borrowed = Some(borrowed);
                 }
-                // An index and a summary follow, which say the channels again.
+                // An index and a summary follow; they only repeat the channels.
                 DATA_END if !in_chunk => {
                     self.at = self.bytes.len();
                     self.is_complete = true;
@@ -304,8 +304,9 @@ impl<'a> Records<'a> {
         let limit = UNPACKED.saturating_mul(self.budget.limit());
         if self.unpacked > limit {
             let message = format!(
-                "its chunks have more than {limit} bytes when they are unpacked, and an input of this length gets no \
-                 more; it states more than a recording contains"
+                "its chunks have more than {limit} bytes when they are unpacked, the limit for an input of this \
+                 length; \
+                 it states more than a recording contains"
             );
             return Err(Diagnostic::new(self.name, Code::Memory, message));
         }

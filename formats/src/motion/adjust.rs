@@ -222,7 +222,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         let numbers = numbers.len();
         return Err(OffsetsError::Numbers { numbers, joints });
     }
-    // Some formats have keys for all joints, of those that stay at their offsets too.
+    // Some formats have keys for all joints, also for joints that stay at their offsets.
     let moves = |joint: &usize| {
         let Joint { parent, rest } = clip.skeleton[*joint];
         let keys = clip.set.vector_keys(Channel::Translation, *joint);
@@ -234,7 +234,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         return Err(OffsetsError::Moved { joint, name });
     }
     let lacks_offsets = clip.lacks_offsets();
-    // SMPL's `trans` counts from where the shape puts the pelvis.
+    // SMPL's `trans` is relative to the pelvis of the body shape.
     if let Some(body) = clip.body.clone()
         && let Some(&pelvis) = offsets.first()
     {

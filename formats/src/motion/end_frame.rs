@@ -96,7 +96,8 @@ impl EndFrame {
             Self::Key => end,
             Self::Hold => {
                 let next = timeline.time(0, 0)? + rate.time_of(timeline.len() as u64);
-                // The first sample of a file that is written again may lie between two frames.
+                // The start of the samples may be between two frames, if the file is written again with its other
+                // content.
                 let frames = (next - last) * rate.per_second();
                 match (frames - 1.0).abs() <= ON_FRAME {
                     true => next,

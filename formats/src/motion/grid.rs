@@ -17,7 +17,8 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
         let found =
             common.or_else(|| of(&RateSource::Times(std::slice::from_ref(list), precision)));
         let Some(found) = found else { continue };
-        // Frames that count from a first time somewhere are no nearer than those that f64 has already.
+        // For frames relative to an arbitrary first time, the exact time is not nearer than the f64 time, so such
+        // times are kept.
         let was_rounded = |&time: &f64| {
             let off = (time - frame_time(found.grid, found.phase, time)).abs();
             off > 2.0 * Precision::F64.rounding(time)
@@ -65,7 +66,7 @@ impl Motion {
     pub fn rate_of_keys(&self) -> Option<FrameRate> {
         let mut all: Vec<Vec<f64>> = Vec::new();
         for list in self.key_lists() {
-            // Tracks mostly have the times of the track before.
+            // Most tracks have the same times as the track before.
             if all.last().is_none_or(|last| last != list) {
                 all.push(list.to_vec());
             }
@@ -106,7 +107,7 @@ mod tests {
         let mut lists = vec![times.clone(), vec![0.25, 0.5]];
         assert_eq!(restore(&mut lists, Precision::F32), None);
         assert_eq!(lists, [times, vec![0.25, 0.5]]);
-        // A day in, an f32 is 7.8 ms wide: it says nothing about a rate.
+        // After a day, the steps of f32 are 7.8 ms, too large to determine a rate.
         let late = vec![vec![86_400.0, 86_400.039]];
         assert_eq!(restore(&mut late.clone(), Precision::F32), None);
         assert_eq!(restore(&mut [vec![0.0]], Precision::F64), None);

@@ -62,7 +62,8 @@ impl Origin<'_> {
                 return Err(self.refuse(index, Code::NotFinite, message));
             }
             if norm < LEAST_NORM {
-                let message = format!("the quaternion has norm {norm:e}; a rotation has norm 1");
+                let message =
+                    "the quaternion has a norm below 1e-6; a rotation has norm 1".to_owned();
                 return Err(self.refuse(index, Code::KeyNorm, message));
             }
             if (norm - 1.0).abs() > QUIET_NORM {
@@ -95,7 +96,7 @@ impl Origin<'_> {
             return Ok(None);
         }
         let mut kept: Vec<usize> = Vec::with_capacity(times.len());
-        // Whether the key before the last one that stays was moved from the same time.
+        // Whether the last kept key is the second of a jump: the key before it was moved away from the same time.
         let mut jumps = false;
         for key in 0..times.len() {
             let time = times[key];

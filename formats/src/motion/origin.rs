@@ -43,7 +43,7 @@ pub fn origin_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
         return DVec3::ZERO;
     };
     let largest = low.abs().max(high.abs());
-    // Where one axis needs an origin, others get one that is a gain, so that heights stay as exact.
+    // If one axis needs an origin, the other axes get one if it improves their accuracy, such as the heights.
     let smallest = match largest.max_element() >= SMALL {
         true => SMALL_BESIDE,
         false => return DVec3::ZERO,

@@ -130,7 +130,7 @@ impl Outside {
         [self.before, self.after].map(|it| it == OutsideValue::default())
     }
 
-    /// Where samples of a clip end if `end` is asked for, in seconds of its set; `None`: at its last key.
+    /// The time at which the samples of a clip end, in seconds of its set: `end`, or the last key if `end` is `None`.
     #[must_use]
     pub fn end(self, end: Option<f64>, clip: &Motion) -> f64 {
         let last = clip.set.time_span().map_or(0.0, |span| span.1);

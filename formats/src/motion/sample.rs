@@ -243,7 +243,7 @@ impl ChannelMethods {
             if methods[..first].contains(&method) {
                 continue;
             }
-            // Those that have this method, as a set of their own.
+            // The scalars with this method are evaluated together, as a separate set.
             let of_method: Vec<usize> = (first..count)
                 .filter(|&index| methods[index] == method)
                 .collect();
@@ -251,7 +251,7 @@ impl ChannelMethods {
             for keys in of_method.iter().filter_map(|&index| clip.set.scalar(index)) {
                 set.push_scalar("", keys.times, keys.keys, keys.tangents)?;
             }
-            // The ends of curves that are solved for are those of the method.
+            // c2 and the B-spline use the ends that they have for rotations.
             let of_ends = match method {
                 VectorMethod::C2 => method::C2,
                 VectorMethod::BSpline => method::B_SPLINE,

@@ -193,7 +193,7 @@ pub(crate) fn smoothed(
     if count == 0 || scalars.is_empty() {
         return Ok(scalars.to_vec());
     }
-    // Three at a time as the components of a vector, which do not meet.
+    // Three scalars at a time are evaluated as the components of a vector; components do not influence each other.
     let packs = count.div_ceil(3);
     let packed: Vec<Vec3> = scalars
         .chunks_exact(count)

@@ -51,7 +51,7 @@ impl Motion {
         let mut is_selected = vec![false; self.set.track_count()];
         for &track in tracks {
             let mut next = Some(track);
-            // Where it has been before there is nothing new, in a circle neither.
+            // Stop at a track that was visited before: its ancestors are already selected. This also ends circles.
             while let Some(track) = next.filter(|&track| is_selected.get(track) == Some(&false)) {
                 is_selected[track] = true;
                 next = self.skeleton.get(track).and_then(|joint| joint.parent);

@@ -248,7 +248,7 @@ impl Alignment {
             Align::Sim3 => {
                 let along: f64 = pairs().map(|(a, b)| a.dot(rotation * b)).sum();
                 let size: f64 = pairs().map(|(_, b)| b.length_squared()).sum();
-                // An estimate that stands still has any.
+                // If the estimate does not move, every scale is possible, so it stays 1.
                 if size > 0.0 && along > 0.0 {
                     along / size
                 } else {
@@ -351,7 +351,7 @@ fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
     for (index, row) in vectors.iter_mut().enumerate() {
         row[index] = 1.0;
     }
-    // Each round squares what is off the diagonal; six are enough for f64.
+    // Each round squares the elements off the diagonal; six rounds are enough for f64.
     for _ in 0..16 {
         for p in 0..3 {
             for q in p + 1..4 {
@@ -380,7 +380,7 @@ fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
             }
         }
     }
-    // If several are the largest, the first, which is no turn.
+    // If several eigenvalues are equally large, use the first: it is the identity.
     let mut largest = 0;
     for index in 1..4 {
         if a[index][index] > a[largest][largest] {

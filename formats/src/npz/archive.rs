@@ -277,7 +277,7 @@ impl Archive {
             self.budget
                 .take(1, usize::try_from(size).unwrap_or(usize::MAX))
                 .map_err(|error| self.refuse(member, Code::Memory, error.to_string()))?;
-            // Checked: the packed bytes can stand for as many.
+            // The size was checked: the compressed bytes can contain this many.
             let reserved = bytes.try_reserve_exact(size as usize);
             let unpacked = reserved.map_err(std::io::Error::from).and_then(|()| {
                 DeflateDecoder::new(packed)

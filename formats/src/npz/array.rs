@@ -102,7 +102,7 @@ impl Array<'_> {
             let blocks = starts.par_iter().with_min_len(at_least);
             blocks.flat_map_iter(block).collect()
         });
-        // Where the system refuses threads this one does it all.
+        // If the system refuses to start threads, this thread does all the work.
         together.unwrap_or_else(|_| starts.iter().flat_map(block).collect())
     }
 
@@ -185,7 +185,7 @@ impl Array<'_> {
         };
         let whole = |text: String| text.trim_end_matches('\0').to_owned();
         if size == 0 {
-            // Texts without a character take no bytes: how many there are is the file's word alone.
+            // Empty texts take no bytes, so their number cannot be checked against the file's length.
             let empty = text(&[])?;
             return Ok(vec![empty; usize::from(self.header.shape.is_empty())]);
         }

@@ -21,7 +21,7 @@ pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
     if let Some(member) = archive.find("betas") {
         let axes = archive.header(member)?.shape.clone();
         let betas = read_numbers(archive, member).unwrap_or_default();
-        // A row for each frame says the same in each.
+        // If there is a row for each frame, all rows are equal, and the first is used.
         let count = axes.last().copied().unwrap_or(0).min(betas.len());
         shape.betas = betas[..count].to_vec();
     }
@@ -194,7 +194,7 @@ impl Model {
         }
         let tree = Self::numbers(archive, "kintree_table")?;
         let parents = tree[..joints].iter().enumerate();
-        // That of the root is -1 or 4294967295.
+        // The parent of the root is -1 or 4294967295.
         let parent = |(joint, &parent): (usize, &f64)| match parent {
             _ if joint == 0 => Some(None),
             parent if (0.0..joint as f64).contains(&parent) => Some(Some(parent as usize)),

@@ -113,7 +113,7 @@ pub(crate) fn read(
             false => {
                 let together =
                     tumble::on_threads(|| rayon::join(&mut push_pending, &mut read)).ok();
-                // Where the system refuses threads this one does it all.
+                // If the system refuses to start threads, this thread does all the work.
                 together.unwrap_or_else(|| (push_pending(), read()))
             }
         };

@@ -85,7 +85,7 @@ impl NpzDocument {
             if !is_beside || self.archive.find(name) == Some(whole.member) {
                 continue;
             }
-            // One that is no such array is judged as any other.
+            // An array of another form is not part of the pose; it is treated like any other array.
             let piece = KeyArray::of(&self.archive, name, vectors, first, Layout::FrameMajor);
             let Ok(Some((piece, frames))) = piece else {
                 continue;
@@ -154,7 +154,7 @@ impl NpzDocument {
             }
             match self.frame_axis(index) {
                 None => MemberOutcome::Constant,
-                // At the same times everything is the same.
+                // If the times of the samples are those of the keys, the array is copied unchanged.
                 Some(_) if is_same && !options.linear.contains(&member.name) => {
                     MemberOutcome::Constant
                 }
@@ -361,7 +361,7 @@ impl Document for NpzDocument {
             return Err(self.refuse(Code::OneClip, message));
         };
         check_times(sampled, &options.name)?;
-        // `trans` counts from where the shape puts the pelvis.
+        // `trans` is relative to the pelvis of the body shape.
         let pelvis = sampled
             .clip
             .body
@@ -395,7 +395,7 @@ impl Document for NpzDocument {
             return Err(self.refuse(Code::Layout, message));
         }
         if sampled.rate.is_none() && !self.has_times() {
-            let message = "the layout tells times by a rate alone; give --fps, not times";
+            let message = "the layout stores a rate and no times; give --fps instead of times";
             return Err(self.refuse(Code::Layout, message.to_owned()));
         }
         let parts = self.parts()?;
@@ -406,7 +406,7 @@ impl Document for NpzDocument {
         if start != 0.0 && !self.has_times() {
             warnings.warn(Code::StartMoved, || {
                 let message = format!(
-                    "the first frame is at {start} s; the layout has a rate alone and begins at 0"
+                    "the first frame is at {start} s; the layout stores a rate and no times, and begins at 0"
                 );
                 (None, message)
             });

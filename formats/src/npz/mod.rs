@@ -125,7 +125,7 @@ fn read_with_objects(mut archive: Archive, options: &ReadOptions) -> Result<Load
     let mut warnings = Vec::new();
     for index in (0..archive.members.len()).rev() {
         if let Some(start) = archive.members[index].objects() {
-            // The only array of a file is the whole of it.
+            // The file is a single array.
             let name = match archive.members[index].path.is_empty() {
                 true => String::new(),
                 false => archive.members[index].name.clone(),

@@ -336,8 +336,8 @@ impl ArchivePlan {
         match is_any {
             true => Ok(()),
             false => {
-                let message = "--source-order is for files whose layout has quaternions in an order that programs \
-                               change, those of robots; leave it out, or say the order with --map";
+                let message = "--source-order is for TUM, EuRoC and files of robots' motion; leave it out, or \
+                               state the order with --map";
                 Err(Diagnostic::new(&archive.file, Code::Map, message))
             }
         }

@@ -63,7 +63,7 @@ pub(crate) fn log_of(q: DQuat, before: Option<DVec3>) -> DVec3 {
     let sin = libm::sqrt(axis.x * axis.x + axis.y * axis.y + axis.z * axis.z);
     let angle = 2.0 * libm::atan2(sin, w);
     let near = before.unwrap_or(DVec3::ZERO);
-    // A rotation of f32 whose sine is smaller has no axis of its own.
+    // With a smaller sine, f32 does not determine the axis.
     if sin < 1e-12 {
         let length = near.length();
         let direction = if length > 0.0 {

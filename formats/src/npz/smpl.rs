@@ -148,8 +148,9 @@ pub(crate) fn joints_of_body(joints: usize) -> Option<(Vec<String>, Vec<Option<u
 }
 
 /// Why the joints of a body have no places.
-pub(crate) const NO_OFFSETS: &str = "where a body's joints are depends on its shape; give a model of it with --body-model, or their \
-                                     places with --offsets";
+pub(crate) const NO_OFFSETS: &str = "the positions of a body's joints depend on its shape; give its model with \
+                                     --body-model, or the \
+                                     offsets of its joints with --offsets";
 
 /// Whether the archive has the shape of a body and nothing that may be a motion, which has at least two axes. AMASS
 /// stores the shapes of its subjects so.

@@ -69,7 +69,7 @@ pub(crate) fn plan(
     };
     match (array("rotations", quaternions)?, frames_of_scalars(archive)) {
         (Some(rotations), _) => plan.add(archive, rotations)?,
-        // A clip without tracks.
+        // A clip without tracks: its scalars give the number of frames.
         (None, Some(frames)) => (plan.frames, plan.is_part) = (frames, true),
         (None, None) => return Ok(None),
     }

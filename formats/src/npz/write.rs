@@ -42,7 +42,8 @@ impl ArchiveWriter {
             true => CompressionMethod::Deflated,
             false => CompressionMethod::Stored,
         };
-        // Sizes in 64 bits from where those of 32 bits could end; deflating may add a little.
+        // Members near 4 GiB get sizes of 64 bits. The limit is lower than 4 GiB, because deflating may make a member
+        // slightly longer.
         let options = SimpleFileOptions::default()
             .compression_method(method)
             .large_file(length >= 0xF000_0000);

@@ -109,7 +109,7 @@ impl ParquetFile<'_> {
             false => {
                 let numbers = || plain.par_iter().map(|&leaf| self.numbers(leaf)).collect();
                 let together = tumble::on_threads(|| rayon::join(read_others, numbers));
-                // Where the system refuses threads this one does it all.
+                // If the system refuses to start threads, this thread does all the work.
                 together.unwrap_or_else(|_| {
                     let numbers = plain.iter().map(|&leaf| self.numbers(leaf));
                     (read_others(), numbers.collect())
@@ -173,7 +173,7 @@ impl ParquetFile<'_> {
             let mut reader = ColumnReaderImpl::<T>::new(Arc::clone(&descriptor), Box::new(pages));
             loop {
                 levels.clear();
-                // A page's count is its word: not more is made room for than a batch takes.
+                // The count of a page is not trusted: memory is reserved for at most one batch.
                 let read = reader.read_records(BATCH, Some(&mut levels), None, &mut values);
                 let (records, numbers, _) = read.ok()?;
                 if records != numbers {

@@ -41,7 +41,7 @@ pub(crate) fn check_pages(
     let refuse = |code, message: String| Diagnostic::new(name, code, message);
     let claims = |numbers: u64, unit: &str| {
         let message = format!(
-            "the file has {} bytes and is said to hold {numbers} {unit}; it is damaged",
+            "the file has {} bytes, but states {numbers} {unit}; it is damaged",
             bytes.len()
         );
         refuse(Code::TableClaims, message)

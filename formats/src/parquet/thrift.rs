@@ -85,7 +85,7 @@ impl Compact<'_> {
                 let (count, kind) = self.list()?;
                 for _ in 0..count {
                     match kind {
-                        // In a list they take a byte.
+                        // In a list, truth values take a byte.
                         TRUE | FALSE => self.at += 1,
                         kind => self.skip(kind, depth + 1)?,
                     }

@@ -95,7 +95,7 @@ const KNOWN: &[(&[&str], &str, Global)] = &[
     (BUILTINS, "list", Global::List),
     (BUILTINS, "tuple", Global::Tuple),
     (BUILTINS, "bytearray", Global::ByteArray),
-    // How protocols 0 to 2 store bytes without any.
+    // Protocols 0 to 2 store empty bytes in this way.
     (BUILTINS, "bytes", Global::ByteArray),
     (BUILTINS, "object", Global::Object),
     (

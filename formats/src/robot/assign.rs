@@ -65,7 +65,7 @@ impl Robot {
             return Err(refused.swap_remove(0));
         }
         loaded.refused.append(&mut refused);
-        // The robot names them.
+        // The robot names the joints, so the warning about unnamed joints is removed.
         loaded
             .warnings
             .retain(|warning| !matches!(warning.code, Code::UnnamedJoints | Code::AngleJumps));
@@ -376,7 +376,7 @@ fn checked(
             None => format!("`{array}` is in another order"),
         };
         let message = format!(
-            "{message}: the bodies are within {:.1e} m of their joints then, and {:.2} m otherwise",
+            "{message}: with this order, the bodies agree with the joints within {:.1e} m, otherwise within {:.2} m",
             errors[best], errors[of_stated]
         );
         return Err(Diagnostic {
@@ -387,8 +387,9 @@ fn checked(
     let farthest = errors[of_stated];
     if !is_named && stated.is_none() {
         return Err(refuse(format!(
-            "the file does not name its joints, and in no order are the bodies of `{array}` where the robot's joints put \
-             them (at best {farthest:.3} m away): it is another robot, or another version of it; --source-body-order \
+            "the file does not name its joints, and in no order do the bodies of `{array}` agree with the \
+             robot's joints (they are at least {farthest:.3} m away): it is another robot, or another version \
+             of it; --source-body-order \
              takes an order without this check"
         )));
     }
@@ -455,7 +456,7 @@ fn error(
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
-    // The rotation of the first is known.
+    // The rotation of the first body is known.
     (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {

@@ -89,7 +89,7 @@ pub fn read_ply(name: &str, bytes: &[u8]) -> Result<Polygons, Diagnostic> {
         .read_header(&mut reader)
         .map_err(|error| refuse(error.to_string()))?;
     for (rows, element) in &header.elements {
-        // A row takes a byte at least, where it has anything.
+        // A row with any property takes at least a byte.
         if element.count > bytes.len() || (element.properties.is_empty() && element.count > 0) {
             let reason = format!(
                 "it says {} rows of `{rows}`, and has {} bytes",

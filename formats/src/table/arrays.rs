@@ -216,7 +216,7 @@ fn append(
         ColumnValues::Stamps(stamps, _) => append_stamps(stamps, array),
         ColumnValues::Words { codes, words } => append_words(codes, words, known, array, null),
         ColumnValues::Lists { ends, numbers } => append_lists(ends, numbers, array, null),
-        // Only text has such.
+        // Decimals come only from text, not from Arrow arrays.
         ColumnValues::Decimals(..) => None,
     }
 }
@@ -315,7 +315,7 @@ fn append_words(
     };
     let values = dictionary.values();
     if values.is_empty() {
-        // Every row is a null then.
+        // An empty dictionary: every row is null.
         let none = code(words, known, "");
         codes.resize(start + array.len(), none);
         return Some(());

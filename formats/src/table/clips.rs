@@ -46,7 +46,7 @@ pub(crate) fn clips(
     if let Some(columns) = plan.left_out(table) {
         warnings.warn(Code::ColumnsLeftOut, || {
             let message = format!(
-                "left out, because nothing says that they are keys: {columns}; name the keys with --map"
+                "columns with unknown names are left out: {columns}; if they are keys, name them with --map"
             );
             (None, message)
         });
@@ -230,7 +230,7 @@ impl TableClip<'_> {
                     (row, (reader.at(row) * scalars.factor) as f32)
                 });
                 let numbers: Vec<(usize, f32)> = numbers.collect();
-                // Of a scalar that other clips of the table have, all numbers are missing.
+                // A scalar that only other clips of the table have: all its numbers are missing.
                 if numbers.iter().all(|(_, number)| number.is_nan()) {
                     continue;
                 }
@@ -355,7 +355,7 @@ impl TableClip<'_> {
             if missing.is_empty() {
                 continue;
             }
-            // As a set names tracks without a name.
+            // The same name as a set gives to a track without a name.
             let name = match &*shared.tracks[track].name {
                 "" => format!("box{}", track + 1),
                 name => printable(name).into_owned(),
@@ -407,7 +407,7 @@ impl TableClip<'_> {
         let mut lists: Vec<Vec<f64>> = Vec::new();
         for (name, range) in names.into_iter().zip(ranges) {
             let times = self.sorted(&mut order[range.clone()], plan, warnings)?;
-            // Tracks mostly have the times of the track before.
+            // Most tracks have the same times as the track before.
             if lists.last() != Some(&times) {
                 lists.push(times);
             }
@@ -444,7 +444,7 @@ impl TableClip<'_> {
         keys: &mut [RowKeys],
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
-        // The list whose times were found to increase.
+        // The last list whose times are known to increase, so that it is not checked again.
         let mut increases = None;
         for (track, keys) in keys.iter_mut().enumerate() {
             let list = shared.tracks[track].list;

@@ -296,7 +296,7 @@ impl ColumnNames<'_> {
         for ((cell, found), name) in cells.iter_mut().zip(found).zip(&names) {
             let Some(index) = found else {
                 let message = format!(
-                    "there is no column `{name}` beside the others of {}; there are {}",
+                    "column `{name}` is missing: {} belong together; there are {}",
                     names.join(", "),
                     self.list()
                 );
@@ -309,7 +309,7 @@ impl ColumnNames<'_> {
 
     /// The columns of one track, and whether its translations are relative to the world.
     fn parts(&mut self, prefix: &str) -> Result<(Parts, bool), Diagnostic> {
-        // Trajectories call their rotations qx qy qz qw, and may call their positions x y z.
+        // In trajectories, rotations are called qx qy qz qw, and positions may be called x y z.
         let is_pose = self.find(&format!("{prefix}qw"))?.is_some();
         let names = match is_pose {
             true => ["qx", "qy", "qz", "qw"],
@@ -478,7 +478,8 @@ impl TablePlan {
         };
         let is_read: HashSet<usize> = names.requested.iter().map(|it| it.index).collect();
         mapped.check_used(&names, &is_read)?;
-        // Beside times, frames say nothing more, and a comma at the end of a line makes a column without a name.
+        // If there are times, a column of frame numbers adds nothing. A comma at the end of a line makes a column
+        // without a name.
         let is_known = |name: &str| name.is_empty() || COUNTED.contains(&name);
         let left_out = (file_columns.iter().enumerate())
             .filter(|(index, name)| !is_read.contains(index) && !is_known(name))

@@ -40,7 +40,7 @@ pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String
         offsets: joints().map(offset).collect(),
         no_world: clip.no_world.clone(),
     };
-    // Text and finite numbers: there is nothing that JSON has not.
+    // Cannot fail: these are only text and finite numbers.
     let text = serde_json::to_string(&hierarchy).ok()?;
     Some((KEY, text))
 }

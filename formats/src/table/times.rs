@@ -74,12 +74,10 @@ pub(crate) fn times(
     };
     let Column { name, values, .. } = &table.columns[column];
     if let Some(rate) = options.source_rate {
-        let message = format!(
-            "`{name}` has the time of every row; --source-fps {rate} would be another, leave it out"
-        );
+        let message = format!("`{name}` has the time of every row; leave out --source-fps {rate}");
         return Err(table.refuse_at(column, 0, Code::RateBesideTimes, message));
     }
-    // A unit that is given holds for numbers of every kind; stamps have their own.
+    // `--time-unit` applies to numbers of every kind; timestamps have their own unit.
     let unit = match values {
         ColumnValues::Numbers(numbers) if numbers.len() > 0 => {
             let first = numbers.at(0);
@@ -109,7 +107,8 @@ pub(crate) fn times(
             })
         }
         ColumnValues::Numbers(ColumnNumbers::Whole(times)) => {
-            // Text does not tell 2 from 2.0: small whole numbers are seconds there.
+            // In text, 2 may mean 2.0, so small whole numbers are seconds. In binary files, whole numbers need a
+            // unit.
             let small = times
                 .iter()
                 .all(|time| (time.unsigned_abs() as f64) < LARGEST_SECONDS);

@@ -122,7 +122,7 @@ impl<R: BufRead> Lines<R> {
             let charged = budget.take(words.filter(|word| !word.is_empty()).count(), NUMBER);
             charged.map_err(|error| self.refuse_whole(Code::Memory, error.to_string()))?;
         }
-        // Text by now: the check refuses all else.
+        // The bytes are valid text here, because the check refuses everything else.
         let line = String::from_utf8(std::mem::take(&mut self.buffer));
         Ok(Some(line.unwrap_or_default()))
     }

@@ -35,7 +35,7 @@ class _Located(Exception):
 
 
 class Error(_Located):
-    """Anything that Tumble refuses.
+    """The base class of all errors of Tumble.
 
     `code` is that of docs/codes.md (`tumble explain E026`), or None; `file`, `line` and `column`
     say where it is in text, `pointer` where it is in what has no lines: a JSON pointer, an
@@ -51,7 +51,7 @@ class Error(_Located):
 
 
 class InputError(Error, ValueError):
-    """A file, an array or an option is not what it should be.
+    """A file, an array or an option is invalid.
 
     >>> import tumble
     >>> issubclass(tumble.InputError, ValueError)
@@ -60,7 +60,7 @@ class InputError(Error, ValueError):
 
 
 class MissingFileError(InputError, FileNotFoundError):
-    """A file is not there.
+    """A file does not exist.
 
     >>> import tumble
     >>> issubclass(tumble.MissingFileError, FileNotFoundError)
@@ -90,7 +90,7 @@ class OutputError(Error, OSError):
 
 
 class InputWarning(_Located, UserWarning):
-    """A file is read, and something about it is probably not meant.
+    """A file was read, but something in it is probably a mistake.
 
     >>> import tumble
     >>> issubclass(tumble.InputWarning, UserWarning)

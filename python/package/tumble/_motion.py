@@ -140,23 +140,23 @@ class Skipped:
 
 
 class MotionLibrary:
-    """Clips of one skeleton, of many lengths and rates, each instance at a time of its own.
+    """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
-    `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no
-    clip has names, and another name, number or parent is refused. `method`: by which they are interpolated, as that
-    of `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
+    `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no clip
+    has names, and another name, number or parent is refused. `method`: by which they are interpolated, as that of
+    `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
     clip; its offsets are then those of all clips. Without it the skeleton is that of the first clip, and each clip
-    keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`).
-    `names`: of the clips; else their own, or their files'. `engine`: whose threads work, else one that all calls share.
-    `on_error`: "refuse", or "skip": clips that do not fit the skeleton are left out, and `skipped` lists them.
-    `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations are then within 1e-5 rad of the exact
-    ones, each relative to its parent.
+    keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`). `names`: the names of
+    the clips; by default the names that they have, or those of their files. `engine`: its threads are used; by default
+    those of an engine that all calls share. `on_error`: "refuse", or "skip": clips that do not fit the skeleton are
+    left out, and `skipped` lists them. `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations
+    are then within 1e-5 rad of the exact ones, each relative to its parent.
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
 
-    Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to
-    two minutes); before 0 and behind the end of a clip its ends are held.
+    Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to two minutes);
+    before 0 and after its end, a clip keeps its first and last pose.
 
     >>> import numpy as np, tumble
     >>> half = 0.5 ** 0.5
@@ -227,14 +227,14 @@ class MotionLibrary:
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
         of every file belongs to the library, in the order of the names.
 
-        `fps`: clips are sampled at this rate by `method`; what is left of a frame at the end is left out. `tracks`: the
-        names or the indices of joints, in the order of the results; joints on which these hang are needed, too.
-        `shard`: of the files only those that are the share of one of several processes, as (rank, processes).
+        `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
+        or the indices of joints, in the order of the results; their parents must be included, too. `shard`: read only the
+        files for one of several processes, as (rank, processes).
 
         `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
         `body_model` and `map`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
-        files, and clips that do not fit the skeleton, and lists them in `skipped`. So it does with the files of AMASS
-        that are no clips (`shape.npz`, `*_stagei.npz`). `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
+        files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
+        (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
         function, which is called with the number of files read so far and of all. `packed`: as of the class.
 
         >>> import tempfile, os, tumble
@@ -268,8 +268,7 @@ class MotionLibrary:
         return made
 
     def shard(self, rank: int, processes: int) -> MotionLibrary:
-        """The clips that are the share of one of several processes: every clip belongs to one. They lie in the same
-        memory.
+        """The clips for one of several processes; each clip belongs to one process. The memory is shared, not copied.
 
         >>> import tumble
         >>> doors = [tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None], name=name) for name in "abc"]
@@ -416,16 +415,15 @@ class MotionLibrary:
         rotations: _Representation = "quaternion",
         out: MotionState | None = None,
     ) -> MotionState:
-        """The states of instances: `clip_ids` and `times` say which clip each plays and how many seconds after the
-        clip's first key it stands. (`Clip` and `Engine` take the times of the keys.) Both have the shape of the result,
-        (N,) for example, or shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
+        """The states of instances: `clip_ids` has the clip of each instance, and `times` its time, in seconds after the clip's
+        first key. (`Clip` and `Engine` use the times of the keys.) Both have the shape of the result, (N,) for example, or
+        shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
 
-        `arrays`: the names of those to compute, by default all; rotations alone take a third of the time. `out`: a state
-        whose arrays are filled again, those that it has. `finite`: velocities as differences of the two
-        frames of the clip's rate around a time, as other motion libraries have them, instead of the exact
-        derivatives. `order`: of quaternions. `rotations`: how both arrays of rotations are stored: "quaternion" (…, 4),
-        "matrix" (…, 3, 3) for column vectors, "6d" (…, 6), the matrix's first two columns, or "rotvec" (…, 3), axis
-        times angle.
+        `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
+        that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
+        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions. `rotations`:
+        how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
+        the matrix's first two columns, or "rotvec" (…, 3), axis times angle.
 
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
@@ -659,9 +657,9 @@ class MotionLibrary:
     def draw(
         self, count: int, rng: np.random.Generator, *, weights: ArrayLike | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Clips and times at random: `clip_ids` and `times`, (count,), for `sample`. Clips are drawn by `weights`, by
-        default their lengths, so that every moment is as likely; times are uniform within each. The same state of
-        `rng` draws the same.
+        """Random clips and times: `clip_ids` and `times`, (count,), for `sample`. The probability of a clip is proportional to
+        its entry in `weights`, by default to its length, so that every moment is equally likely. Times are uniform within a
+        clip. The same state of `rng` gives the same result.
 
         >>> import numpy as np, tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])

@@ -75,7 +75,7 @@ impl Engine {
         })
     }
 
-    /// The name of its device; that of small calls, where the choice is by cost.
+    /// The name of the device. With "auto", it is the device for small calls.
     #[getter]
     fn device(&self) -> &str {
         self.engine.device_name()
@@ -503,21 +503,21 @@ impl Engine {
         poses::in_world(self, clip, layout_named(layout)?, options)
     }
 
-    /// Samples without their noise: an array of their shape, float32; of a `Clip` a clip.
+    /// Smooths samples. Returns a float32 array of the same shape, or a clip if `samples` is a `Clip`.
     ///
     /// `smooth(samples, *, kernel="gaussian:2", low_pass=None, fps=None, passes=1, ends="keep",
     /// layout="track", order="xyzw", out=None)`
     ///
     /// `samples`: evenly spaced rotations (frames, 4) or (tracks, frames, 4), or vectors with 3 components; with
-    /// `layout="frame"` (frames, tracks, …). Kernels act on the steps from sample to sample, so that what
-    /// stands still keeps its bits and even motion stays. `kernel`: "linear", "cubic", "box:S" and "tent:S" (S
-    /// samples to either side), "gaussian:S" (standard deviation) or "savitzky-golay:RADIUS:ORDER".
-    /// `low_pass`, Hz, with `fps`, the rate of the samples, is the bell that halves the power of motion at that
-    /// frequency. `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the first).
+    /// `layout="frame"` (frames, tracks, …). Kernels act on the steps from sample to sample, so that constant samples keep
+    /// their bits and uniform motion is unchanged. `kernel`: "linear", "cubic", "box:S" and "tent:S" (S samples to either
+    /// side), "gaussian:S" (standard deviation) or "savitzky-golay:RADIUS:ORDER". `low_pass`: a frequency in Hz, with
+    /// `fps`, the rate of the samples. The kernel is the Gaussian that halves the power of motion at this frequency.
+    /// `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the first).
     ///
-    /// A `Clip` keeps its names, its skeleton, scales and steps; its rotations and translations are smoothed, at its
-    /// keys or, where these are not even, at the frames of `fps`. Written to the format of its file, all else in
-    /// that stays as it is.
+    /// A `Clip` keeps its names, its skeleton, scales and steps; its rotations and translations are smoothed, at its keys
+    /// or, where these are not even, at the frames of `fps`. If it is saved in the format of its file, all other content of
+    /// the file is kept.
     ///
     /// >>> import numpy as np, tumble
     /// >>> noise = np.random.default_rng(1).normal(size=(100, 3))
@@ -605,9 +605,9 @@ impl Engine {
     ///
     /// `add(base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None)`
     ///
-    /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each
-    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1. Tracks are
-    /// combined by index, as in `blend`.
+    /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each track,
+    /// (tracks, 4), or one, (4,); without it, the layer itself is added. `weight`: 0 to 1. Tracks are combined by index, as
+    /// in `blend`.
     ///
     /// >>> import tumble
     /// >>> half = 0.5 ** 0.5
@@ -775,11 +775,10 @@ impl Engine {
             .detach(|| stoppable(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
 
-    /// Clips as rows of a record batch, in and out by Arrow: for Spark, Daft and Ray Data. `rows`, of
-    /// pyarrow's or with Arrow's C interface, have `times`, a list of seconds, and `keys`, a list of 4
-    /// numbers for each time of each track. In their place come `tracks`, `frames` and `rotations`,
-    /// track after track; other columns are kept. Keywords are those of `evaluate`. No row's result
-    /// depends on the others.
+    /// Clips as rows of a record batch, in and out by Arrow: for Spark, Daft and Ray Data. `rows`, of pyarrow's or with
+    /// Arrow's C interface, have `times`, a list of seconds, and `keys`, a list of 4 numbers for each time of each track.
+    /// They are replaced by `tracks`, `frames` and `rotations`, track after track; other columns are kept. Keywords are
+    /// those of `evaluate`. No row's result depends on the others.
     ///
     /// >>> import pyarrow, tumble
     /// >>> rows = pyarrow.table({"times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
@@ -798,8 +797,8 @@ impl Engine {
         arrow.call_method("batch", (slf, rows), Some(&keywords))
     }
 
-    /// Compiles what a Vulkan device runs for results of these, which else is done when the first of them is
-    /// asked for: some milliseconds, on some drivers seconds. The CPU has nothing to compile.
+    /// Compiles the kernels of a method on a Vulkan device in advance. Otherwise they are compiled by the first call that
+    /// needs them; this takes milliseconds, with some drivers seconds. On the CPU this does nothing.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").warm(method="slerp")

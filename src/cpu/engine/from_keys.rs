@@ -98,7 +98,7 @@ impl CpuEngine {
         let mut intervals = PART_INTERVALS;
         for row in rows {
             if let Ticks::Times { .. } = request.timeline.ticks {
-                // In any order, and all samples of the track.
+                // Unresolved samples may be anywhere; then all samples of the track are evaluated again.
                 if row.output.contains(&UNRESOLVED) {
                     let request = SetRequest {
                         tracks: row.track..row.track + 1,

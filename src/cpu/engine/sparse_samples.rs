@@ -80,7 +80,7 @@ impl CpuEngine {
         let mut of_track = Vec::with_capacity(tracks.len());
         for track in tracks.clone() {
             let (times, keys) = request.set.times_and_keys(track);
-            // Keys that nobody samples are refused too, as on every other route.
+            // Keys without a sample are checked too, as on every other route.
             Preparation::check_track(request.interpolation, keys, track)?;
             let is_known = |(known, _): &(usize, Sorted)| {
                 let (others, _) = request.set.times_and_keys(*known);

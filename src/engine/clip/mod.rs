@@ -84,12 +84,12 @@ impl Clip {
         }
     }
 
-    /// The memory that the clip takes on the host for each key, bytes; 0 for no keys.
+    /// The memory that the clip takes on the host for each key, in bytes; 0 for a clip without keys.
     ///
-    /// On the CPU, a clip of more segments than [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments), or than
-    /// the engine's memory, keeps its keys (16 bytes each, with their times once for tracks that share them) where samples can be computed from these: arcs,
-    /// and cubics that mostly rotate little between keys, with segments for the others. Other clips keep a segment for
-    /// each key (68 bytes of an arc, 212 of a polynomial).
+    /// By default a clip keeps a segment for each key: 68 bytes for an arc, 212 for a polynomial. On the CPU it keeps its
+    /// keys instead (16 bytes each; tracks with the same times share them) if its segments would take more memory than
+    /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and if samples
+    /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys.
     #[must_use]
     pub fn bytes_per_key(&self) -> f64 {
         let bytes = match &self.tracks {

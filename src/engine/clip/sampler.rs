@@ -205,7 +205,7 @@ impl Sampler {
             width,
             bytes_per_key,
         };
-        // For each hash of times the cursors of such tracks, each with a track that has it.
+        // For each hash of times: the cursors with these times, each with one of its tracks.
         let mut known: HashMap<u64, Vec<(usize, usize, usize)>> = HashMap::new();
         let mut cursors = 0;
         for (clip, index) in tracks {
@@ -614,7 +614,7 @@ impl TracksAtCursor<'_> {
         output: &mut [[f32; 4]],
     ) {
         let spans = &group.prepared().spans;
-        // A middle and a tangent each.
+        // An arc is two rows: its middle and its tangent.
         let rotations: &[[f32; 4]] = bytemuck::cast_slice(group.arcs());
         let (mut middles, mut tangents) = ([0; MAX_LANES], [0; MAX_LANES]);
         let lanes = middles[..L::COUNT].iter_mut().zip(&mut tangents);

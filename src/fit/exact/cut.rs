@@ -89,7 +89,7 @@ impl Cutter {
         segments: &mut Vec<PolynomialSegment>,
     ) {
         let mut done = 0;
-        // The caller asks again whether it was stopped.
+        // If the work was stopped, the caller finds this out itself.
         while done < self.waiting.len() && !stop::is_stopped() {
             let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);

@@ -63,7 +63,7 @@ impl Shape {
         } else if squared_extent <= LARGEST_UNCUT {
             Tier::Full
         } else {
-            // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.
+            // NaN also takes this branch: the curve is divided down to the smallest pieces, and none fits.
             Tier::Piece
         }
     }

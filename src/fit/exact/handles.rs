@@ -191,7 +191,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
 impl<R: HandleRule> KeyHandles<'_, R> {
     /// Computes the handles of one key over the full range.
     fn find(&mut self, lane: usize) {
-        // The context lanes of two neighbouring stretches do not share a key.
+        // A lane between two stretches is not a key: its intervals belong to different tracks.
         let mut stretches = self.stretches.iter().map(TrackStretch::lanes);
         if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&lane)) {
             find_handles::<R, _>(self.intervals, &mut FullRange, lane);

@@ -86,7 +86,7 @@ impl KeyFit<5> for Halves {
         };
         let ends = [RangeEnd::new(end, backward[2], HALF.slope), seam];
         sample(samples, &LAST_HALF, middle, ends);
-        // The parameter runs backwards there.
+        // In the second half, the parameter runs backwards, so odd parts change their sign.
         for odd in samples.odd.as_flattened_mut() {
             *odd = -*odd;
         }
@@ -301,7 +301,7 @@ mod tests {
         let mut three = || DVec3::new(number(), number(), number());
         let mut vectors = [three(), three(), three()];
         if goes_back {
-            // A curve that turns back has the largest coefficients of the highest powers.
+            // A curve that reverses its direction has the largest coefficients of high powers.
             vectors[1] = vectors[0] * -1.5;
             vectors[2] = vectors[0] * 0.9;
         }

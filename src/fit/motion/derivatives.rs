@@ -186,7 +186,7 @@ mod tests {
                 ] {
                     let curves: Vec<IntervalCurve> = (0..21)
                         .map(|index| {
-                            // Some stand still, and one rotates farther than the first half turn.
+                            // Some curves do not move, and one rotates by more than half a turn.
                             let reach = reach * f64::from(index % 5);
                             let mut numbers = shape.shared;
                             let key: Quaternion = exp([random(), random(), random()]);

@@ -80,7 +80,7 @@ impl VulkanEngine {
             let push = ArcsDispatch { count };
             work.recording.dispatch(set, &push, workgroups(count));
         }
-        // Whatever is submitted later, an application's work too, sees the arcs.
+        // All work that is submitted later sees the arcs, also an application's work.
         work.recording.publish();
         work.bind(|kernel| self.pipeline(kernel))?;
         submission.run()?;
@@ -208,7 +208,7 @@ mod tests {
             let engine = vulkan(&engine);
             for set in &sets {
                 let [expected, listed] = [false, true].map(|lists| prepared(&engine, set, lists));
-                // Buffers that were used before are longer, and have other arcs.
+                // Reused buffers are longer and contain other arcs, so the device must write exactly the new ones.
                 let mut spare = None;
                 for _ in 0..2 {
                     let buffers = engine.upload(&listed, spare.take()).unwrap();

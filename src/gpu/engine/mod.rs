@@ -162,7 +162,7 @@ impl VulkanEngine {
             }
         }
         if version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
-            // The application did not enable what the device offers.
+            // The application may not have enabled the float controls of the device, so none are used.
             physical.float_controls = FloatControls::default();
         }
         physical.has_int64 &= handles.shader_int64;
@@ -441,8 +441,8 @@ impl VulkanEngine {
             true => match self.output_buffer(bytes, residence) {
                 // Window by window the result may still be made.
                 Err(error) if error.is_out_of_memory() => None,
-                // The host changes some rotations (`patches`). Where it must show that, it would show
-                // with them what lies beside, into which the device may be writing the next window.
+                // The host changes some rotations (`patches`). In memory that is not coherent it would have to flush
+                // whole atoms, and could overwrite rotations of the next window, which the device may be writing.
                 Ok(buffer) if !buffer.is_coherent() => None,
                 buffer => Some(buffer?),
             },

@@ -263,7 +263,7 @@ fn walk_all(random: &mut Random) -> Trial {
         first_link,
         ..CrowdDispatch::zeroed()
     };
-    // A workgroup takes a pose, and one of them has none.
+    // Each workgroup evaluates a pose; one workgroup too many is dispatched and must do nothing.
     Trial::new([bytes(&links)], &dispatch, [4, 5, 1]).over(&before)
 }
 
@@ -282,7 +282,7 @@ fn skin(random: &mut Random) -> Trial {
 
 fn half(random: &mut Random) -> Trial {
     const VALUES: usize = 139;
-    // Near the largest half, or any.
+    // A number near the largest half float, or any number.
     let number = |random: &mut Random| match random.once_in(4) {
         true => 65_520.0 + 100.0 * random.number(),
         false => random.finite(),

@@ -255,7 +255,7 @@ impl Random {
     /// The tangent weights at a key.
     pub(crate) fn weights(&mut self) -> TangentWeights {
         let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
-        // Steps between keys at even times count alike.
+        // For keys at even times, both steps have the same weight.
         let even = self.once_in(4).then_some(0.5);
         let limit = if self.once_in(2) { 0.33 } else { 0.05 };
         TangentWeights {

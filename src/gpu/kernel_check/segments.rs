@@ -273,7 +273,7 @@ impl<S: Segment> SegmentInputs<S> {
             let length = (1 + random.below(40)).min(end - position);
             let count = length - random.below(3).min(length - 1);
             self.item(random, is_listed, position, count);
-            // As on the CPU, every segment that may give a tiny component says so; others may.
+            // As on the CPU, every segment that may have a tiny component is marked; others may be marked too.
             let Some(item) = self.items.last_mut() else {
                 unreachable!("it was just added");
             };

@@ -90,7 +90,7 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     for raw in all.named("vkEnumeratePhysicalDevices")? {
         match PhysicalDevice::new(&instance, raw) {
             Ok(device) => devices.extend(device),
-            // The others may be sound.
+            // Other devices may still work.
             Err(error) => failed = Some(error),
         }
     }

@@ -375,7 +375,7 @@ fn joint_values(joints: &[&TreeJoint]) -> Result<(Vec<JointValue>, JointCounts),
         .map(|(i, joint)| (&*joint.name, i))
         .collect();
     for start in 0..joints.len() {
-        // The joints that wait for the value of the next one.
+        // A stack of joints whose value depends on the next one.
         let (mut waiting, mut i) = (Vec::new(), start);
         while let (None, Some(mimic)) = (values[i], &joints[i].mimic) {
             let refuse = |reason| {

@@ -391,7 +391,8 @@ impl Bench<'_> {
             .map(|form| rotations(form, SEGMENTS.min(self.effort.samples / 4) as usize));
         let [arcs, polynomials] = segments;
         let of_forms = [self.resident(&arcs)?, self.resident(&polynomials)?];
-        // Of each class of runs the lanes, with their times as shares of today's for each kernel.
+        // For each class of runs and each number of lanes: the times of all kernels, relative to the engine's present
+        // variant.
         let mut shares: [Vec<[Timed; 4]>; 5] = Default::default();
         for (run, has_keys) in RUNS {
             let class = RunLanes::class(1, u64::from(run));
@@ -476,7 +477,8 @@ impl Bench<'_> {
         let mut left = rules::halve(variants.len(), FINALISTS, &mut |index, rows| {
             self.row(dispatch(index), between, rows)
         })?;
-        // A rule asks for the one that differs from today's in its stores alone.
+        // The rule about stores needs the variant that differs from the engine's only in its stores, so it is never
+        // left out.
         let cached = variants[0].cached();
         let cached = variants.iter().position(|variant| *variant == cached);
         left.extend(cached.filter(|index| !left.contains(index)));

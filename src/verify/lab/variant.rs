@@ -16,7 +16,7 @@ pub enum StoreCaching {
     Cached,
 }
 
-/// How numbers become halves.
+/// How numbers are converted to half precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HalfConversion {

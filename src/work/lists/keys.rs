@@ -301,7 +301,7 @@ impl KeyDispatch<'_, '_> {
         if written.imported.is_none() {
             let written_keys = take_first(&mut written.keys, keys.len());
             if track.signs.any() {
-                // Whole keys, in order: what is written to may be slow to read.
+                // Whole keys are written in order, because this memory may be slow to read.
                 for (i, (to, &[x, y, z, w])) in written_keys.iter_mut().zip(keys).enumerate() {
                     let sign = SIGN_NEGATED * u32::from(track.signs.is_negated(i));
                     *to = [x | sign, y, z, w];

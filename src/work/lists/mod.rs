@@ -102,7 +102,7 @@ impl Work {
         } = stored;
         let bytes = encoding.bytes();
         let mut encoded = [0; PATCHED_BYTES];
-        // Neighbours go together.
+        // Neighbouring patches are copied together.
         let are_neighbours = |one: &Patch, next: &Patch| next.0 == one.0 + 1;
         let per_command = PATCHED_BYTES / bytes;
         let rows = self.patches.chunk_by(are_neighbours);
@@ -538,7 +538,7 @@ impl Emit for PartsList<'_> {
                         let first_distance = chunk.distances.len() as i32;
                         let from_middle =
                             |sample| distance.at_sample(0, || timeline.time_at(track, sample));
-                        // A key's is not used.
+                        // A key has no distance; 0 is a placeholder.
                         chunk.distances.extend(key.map(|_| 0.0));
                         chunk.distances.extend(samples.map(from_middle));
                         first_distance + i32::from(key.is_some())

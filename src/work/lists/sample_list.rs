@@ -272,7 +272,7 @@ impl SampleChunk<'_> {
                     let parameter = distance.at_sample(0, || times[sample]) * scale + offset;
                     ListedSample { source, parameter }
                 }
-                // Outside the keys of a whole track lie constants or curves, which are one run.
+                // The sample is outside the keys of the track: it is a constant or a curve, and is listed as a run.
                 _ => {
                     spans.runs_of_times(part, times, sample..sample + 1, self);
                     continue;

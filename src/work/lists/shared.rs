@@ -124,7 +124,7 @@ impl SharedGroup {
         parts: &[TrackPart],
     ) -> Result<Option<Self>, SampleTimesError> {
         let tracks = parts.len() as u32;
-        // Tracks that repeat have other runs in each copy, and few have more than a copy or two.
+        // Tracks that repeat have different runs in each copy, so they are listed separately.
         let is_plain = |part: &TrackPart| part.extension.is_none();
         let ([first, second, ..], true) = (parts, tracks >= LEAST_TRACKS) else {
             return Ok(None);

@@ -247,7 +247,7 @@ pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> PreviousE
     let shard_names: HashSet<&str> = names.iter().copied().collect();
     let mut found = ManifestLines::parse(&[]);
     if let Ok(Some(file)) = entry::open(folder) {
-        // The directory's may be of a million results: one line is in memory at a time.
+        // The directory's manifest may have a million lines, so only one line is in memory at a time.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
             let is_of_shard = |name: &str| shard_names.contains(name);
             let is_kept = match owner(&line) {

@@ -168,7 +168,7 @@ fn of_format(
             }
             Ok(Vec::new())
         }),
-        // As batches do.
+        // The next file is read while the current one is resampled, as in batches.
         Contestant::new("resampling while the next is read", |_: &mut [Quat]| {
             thread::scope(|scope| {
                 let (hand_over, clips) = sync_channel(0);

@@ -32,8 +32,8 @@ use crate::messages::{listing, names, words};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Motions are interpolated as their files state (`eval --method authored`), at every key of both and halfway \
-between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, by index only \
-if neither file has names; joints with other parents are compared with --world alone. A table lists \
+between neighbouring keys, or at the frames of --fps. Tracks are matched by equal names, or by \
+index if neither file has names. Joints with different parents can be compared only with --world. A table lists \
 the joints that are furthest apart. Frames are those of the first input, from 0 at its first key; \
 frame 7.5 is halfway between two. Two NPY files are compared number by number, and by angles if they contain \
 rotations. The exit code is 8 if a difference exceeds --tolerance or --distance. With one of these \
@@ -68,8 +68,8 @@ pub(crate) struct Arguments {
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
-    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; of arrays that are
-    /// no rotations the largest difference of two numbers
+    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; for arrays
+    /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
     /// The largest distance: between two translations that pass
@@ -84,7 +84,7 @@ pub(crate) struct Arguments {
     /// Relative errors: over steps of this many seconds, or units of length along the second path
     #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
-    /// How poses are associated: interpolated, or nearest:SECONDS, the nearest at most so far away
+    /// How poses are associated: interpolated, or nearest:SECONDS, the nearest one within this time
     #[arg(long, value_name = "HOW", value_parser = association, help_heading = TRAJECTORIES)]
     associate: Option<Associate>,
     /// The longest gap, seconds: poses between two of the interpolated input that are further apart are left out
@@ -294,7 +294,7 @@ impl Arguments {
         let track = |clip: &Motion, name: &str| {
             let all = || (0..clip.set.track_count()).collect();
             let chosen = self.inputs.tracks.of(clip, name)?.unwrap_or_else(all);
-            // Its position depends on all its ancestors, so that they are kept.
+            // The other tracks of the clip are kept, because the position of a track depends on its ancestors.
             let &[track] = &chosen[..] else {
                 let message = format!(
                     "{name}: has {}; a path is one, choose it with --tracks",
@@ -488,7 +488,8 @@ impl Arguments {
                         let (bound, unit) = match kind.parse() {
                             Ok(ScalarKind::Angle) => (self.tolerance, "°"),
                             Ok(ScalarKind::Length) => (self.distance, ""),
-                            // A number without a unit has no bound of its own: with one of 0, all numbers are equal.
+                            // Numbers without a unit have no tolerance, except 0, which requires that all numbers are
+                            // equal.
                             _ => (self.tolerance.filter(|&bound| bound == 0.0), ""),
                         };
                         let quantity = format!("{kind} {}", difference.track);

@@ -141,7 +141,7 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
-        // Writers of clips say themselves what they have no room for.
+        // Writers of clips report themselves which data they cannot store.
         if kind != ResultKind::Motion {
             self.warn_of_lost_channels(clips);
         }
@@ -382,7 +382,7 @@ impl EvaluationJob<'_> {
 impl EvaluationJob<'_> {
     /// Whether the result is the input's file with other keys.
     fn is_baked(&self, target: &ResultTarget) -> bool {
-        // Some tracks alone are another file.
+        // With --tracks, the result is a new file.
         self.arguments.output.is_rotations()
             && !self.arguments.command_line.has("tracks")
             && self.keeps(target)
@@ -437,7 +437,7 @@ impl EvaluationJob<'_> {
         self.check_scale(name, clip, false)?;
         let samples = self.clip_frames(clip, EndFrame::LeaveOut, name)?;
         self.left_out = samples.left_out;
-        // Each body has a pose, a velocity, and both in the memory of the result.
+        // Memory for the pose and the velocity of each body, and for the same in the result.
         let bodies = robot.tree.bodies().len();
         let timeline = room::in_memory(name, &clip.set, &samples.frames, 12 * bodies.max(1))?;
         let methods = self.curve().channel_methods();
@@ -556,7 +556,7 @@ impl EvaluationJob<'_> {
             let frames = &samples.frames;
             let boxes = target.format().takes(FormatOption::BoxLength);
             self.check_scale(name, clip, boxes)?;
-            // Rotations, translations, scales, and the same as written.
+            // Memory for rotations, translations and scales, and for the same in the written form.
             room::in_memory(name, &clip.set, frames, 6)?;
             self.explain(name, clip, frames, Layout::FrameMajor, Delivery::InMemory)?;
             let mut found = self.sample(name, clip, samples)?;
@@ -707,7 +707,7 @@ impl EvaluationJob<'_> {
         }
         let timeline = samples.written_times(clip, name)?;
         let methods = self.curve().channel_methods();
-        // Names of the rows.
+        // A set that contains only the names of the rows.
         let mut set = TrackSet::new();
         for index in 0..count {
             let scalar = clip.set.scalar(index).map_or("", |scalar| scalar.name);
@@ -849,7 +849,7 @@ impl EvaluationJob<'_> {
             return Err(refused(message.to_owned()));
         }
         if !clip.has_vectors() {
-            // Boxes hang at the ends of others.
+            // Tracks without translations are boxes of a chain, which need no skeleton.
             return Ok(Cow::Borrowed(clip));
         }
         let rest = Transform::default();

@@ -43,7 +43,7 @@ pub(super) fn page(device: &str, seconds: f64, lab: &LabReport) -> String {
             times(ceiling.time)
         ));
     }
-    // Every kernel over typical runs, then other runs that something other than today's is better for.
+    // Every kernel for typical runs; then other runs, if another variant than the engine's is faster.
     let is_typical = |row: &&LabRow| row.run == 48 && !row.has_keys;
     let is_changed = |row: &&LabRow| row.winner.variant != row.today.variant;
     let rows = lab.rows.iter();

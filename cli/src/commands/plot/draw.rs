@@ -386,7 +386,7 @@ fn label(axis: &PlotAxis, value: f64) -> String {
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
         return format!("{}e{power}", trimmed(digits));
     }
-    // As many as tell neighbours apart.
+    // Enough decimals to distinguish neighbouring ticks.
     let decimals = (2.0 - width.log10()).clamp(4.0, 15.0) as usize;
     trimmed(&format!("{value:.decimals$}"))
 }

@@ -85,7 +85,8 @@ pub(super) fn figure(
                 .iter()
                 .flat_map(|curve| curve.pieces.iter().flatten())
         };
-        // A body that never rolls does so by its rounding alone, which is not to fill the panel.
+        // The roll of a body that never rolls is only rounding. A smallest range prevents that rounding fills the
+        // panel.
         let least = if matches!(show, PathQuantity::Roll) {
             [-1.0, 1.0]
         } else {

@@ -109,7 +109,7 @@ fn figures(
             progress.advance(1);
             Ok::<(), Failure>(())
         };
-    // Those of the original's report; of a smaller set, its last instead.
+    // The dimensions of the original report; for a smaller set, its last dimension instead.
     let mut dimensions = DIMENSIONS
         .map(|dimension| dimension.min(4 * clip.set.track_count()))
         .to_vec();

@@ -196,7 +196,7 @@ impl<'a> PlotSource<'a> {
         let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
             return Vec::new();
         };
-        // Half a frame is none too many.
+        // Keys up to half a frame outside the samples are drawn too, because frames are rounded.
         let room = (last - first) / (2 * times.len()) as f64;
         let keys = track.times.iter().zip(track.keys);
         let inside = keys.filter(|&(&time, _)| time >= first - room && time <= last + room);

@@ -192,7 +192,7 @@ pub(crate) fn run([one, two]: [&PathBuf; 2], json: bool) -> Result<(), Failure> 
     }
     let mut reasons = Vec::new();
     if found.same_random_bits == Some(false) {
-        reasons.push("the CPUs of the two made other bits of the same random sets");
+        reasons.push("for the same random sets, the CPUs of both reports gave different bits");
     }
     if !found.same_golden_table {
         reasons.push("they compared with other recorded results");

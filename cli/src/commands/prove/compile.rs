@@ -71,7 +71,7 @@ pub(crate) fn measure(uuid: &str, limit: Duration) -> Result<CompileTimes, Strin
     let deadline = Instant::now() + limit;
     let mut times = CompileTimes::default();
     if reader.is_ok() {
-        // A line that does not come in time ends it, and so does the end of the process.
+        // The loop ends if no line arrives in time, or if the process ends.
         while let Some(left) = deadline.checked_duration_since(Instant::now())
             && let Ok(line) = lines.recv_timeout(left)
         {

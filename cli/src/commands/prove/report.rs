@@ -367,8 +367,8 @@ impl Proof {
         );
         unless(
             !control.has_run || !control.must_differ || control.differing > 0,
-            "the negative control saw no difference on a device that is known to show one: the \
-             comparison would not notice"
+            "the negative control found no difference on a device that is known to show one: the comparison \
+             cannot find errors"
                 .to_owned(),
         );
         let GoldenSection {

@@ -442,7 +442,8 @@ impl ProofRun<'_> {
             if self.is_past(1.0) {
                 break;
             }
-            // A method has six cases: of the next one each goes to the next setting.
+            // Each method has six cases. The shift by `case / 6` makes sure that the same case of the next method
+            // uses another setting.
             let setting = (case + case / 6) % engines.len();
             outcome = self.compare_recorded(case, setting, &engines[setting], &mut compared);
             if outcome.is_err() {

@@ -281,7 +281,7 @@ impl Arguments {
             None => clip,
         };
         let times = SampleTimes::at(clip.key_times());
-        // The samples and the poses of the input and of the result.
+        // Memory for the samples and the poses of the input and of the result.
         room::in_memory(name, &clip.set, &times, 14)?;
         let options = ReduceOptions {
             curve: self.method,
@@ -400,7 +400,7 @@ impl Arguments {
             ..target.motion_options()
         };
         let otherwise = match keys_per_channel {
-            // A file that is kept keeps the bytes of its old keys too.
+            // If the file is edited instead of written anew, the bytes of its old keys stay in it.
             true if self.meshopt => Some("compression makes"),
             true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),

@@ -47,8 +47,8 @@ impl Subject {
         if clip.no_world.is_some() && clip.body.is_some() && set_typical_offsets(&mut clip).is_ok()
         {
             words::warning(&format!(
-                "{name}: does not say where the body's joints are, so that a typical body is drawn; give a model of \
-                 it with --body-model, or their places with --offsets"
+                "{name}: does not contain the positions of the body's joints, so a typical body is drawn; give \
+                 its model with --body-model, or the offsets of its joints with --offsets"
             ));
         }
         if let Some(reason) = &clip.no_world {
@@ -96,7 +96,7 @@ impl Subject {
             return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
         }
         let count = timeline.len();
-        // Times that decide where the camera stands.
+        // The times from which the position of the camera is computed.
         let seen = || (0..count).step_by(count.div_ceil(REACHES).max(1));
         let at = |frame: usize| frame * tracks..(frame + 1) * tracks;
         let (shape, reach) = match &self.mesh {

@@ -390,7 +390,7 @@ impl Arguments {
                 let name = format!("{frame:0digits$}.png");
                 Destination::below(&folder, Path::new(&name), self.overwrite, inputs)
             };
-            // All that can be refused is, before there are any.
+            // Errors in the arguments are reported before any frame is written.
             (0..times.len()).try_for_each(|frame| destination(frame).map(drop))?;
             return scene.each_frame(|frame, pixels| {
                 if let Some(stopped) = signals::stopped() {

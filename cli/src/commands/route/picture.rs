@@ -99,7 +99,8 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[RouteOutcome]
         for triangle in rocks.triangles() {
             let [a, mut b, mut c] =
                 triangle.map(|vertex| view.at(rocks.positions()[vertex as usize]));
-            // All the same way round, or the lower side would leave the upper one unfilled.
+            // All triangles get the same orientation. Otherwise areas where the upper and the lower side of a rock
+            // overlap would not be filled.
             if (b - a).perp_dot(c - a) < 0.0 {
                 (b, c) = (c, b);
             }

@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "KERNEL", default_value = "gaussian:2")]
     kernel: SmoothingKernel,
     /// Instead of a kernel: keep motion below this frequency; motion at the frequency keeps 71 % of its size
-    /// (-3 dB), motion at twice of it 25 %
+    /// (-3 dB), motion at twice the frequency 25 %
     #[arg(long, value_name = "HZ", conflicts_with_all = ["kernel", "passes"], value_parser = frequency)]
     low_pass: Option<f64>,
     /// The number of passes
@@ -227,9 +227,9 @@ fn smoothed(
     if let (Some(last), Some((_, end))) = (last, clip.set.time_span())
         && end - last > 1e-3 * fps.map_or(f64::INFINITY, |rate| rate.time_of(1))
     {
-        // A kernel needs even samples, so that there can be no key at the end.
+        // A smoothing kernel needs evenly spaced samples, so an additional key at the end is not possible.
         words::warning(&format!(
-            "{name}: the {} s after the last frame are left out; a rate of which the end is a frame keeps them",
+            "{name}: the {} s after the last frame are left out; with a rate that has a frame at the end they are kept",
             words::seconds(end - last)
         ));
     }

@@ -51,8 +51,8 @@ the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and
 file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their \
 paths, with frames as small axes. \
 Several inputs are shown at once, at the same moment: the first one solid, the others as translucent \
-ghosts, each in a colour of its own. A list names them, hides each, and says which joint is furthest \
-from that of the solid one; a menu chooses which is solid. Joints, and animations of files with \
+ghosts, each in a different colour. A list names them, can hide each, and shows the joint with the largest \
+difference from the solid input; a menu selects the solid input. Joints, and animations of files with \
 several, are matched by equal names.
 
 Examples:
@@ -160,7 +160,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         Ok(())
     };
-    // An input that fails does not take the page of the others away.
+    // If an input fails, the page is still written for the others.
     let outcome = for_each(&inputs, |path| {
         read(path).inspect_err(|failure| failed.push(InputEntry::failed(path, None, failure)))
     });

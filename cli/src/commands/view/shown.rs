@@ -293,7 +293,7 @@ impl ShownClip {
                     .ok_or_else(|| refused(too_large));
             }
         };
-        // Rotations and velocities, and of joints with places vectors and poses too.
+        // Memory for rotations and velocities; for joints with positions also for vectors and poses.
         let copies = if self.has_positions() { 7 } else { 3 };
         room::in_memory(name, &clip.set, &frames, copies)?;
         let rotations = CurveChoice::of_rotations(argument, interpolation);

@@ -268,7 +268,7 @@ impl<'a> GltfReader<'a> {
             let count = numbers.len() / width;
             if index >= count || before.is_some_and(|before| index <= before) {
                 let message = format!(
-                    "index {index} of {count} elements; indices must increase and be less than that"
+                    "index {index} of {count} elements; indices must increase and be less than {count}"
                 );
                 return Err(refuse(message));
             }
@@ -290,7 +290,8 @@ impl<'a> GltfReader<'a> {
         let size = component.size() * width;
         let stride = found.stride.unwrap_or(size);
         if stride < size {
-            let message = format!("elements of {size} bytes, and from one to the next {stride}");
+            let message =
+                format!("the stride, {stride} bytes, is less than an element, {size} bytes");
             return Err(self
                 .json
                 .refuse(&format!("/bufferViews/{view}"), Code::Property, message));

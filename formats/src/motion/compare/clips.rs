@@ -541,7 +541,7 @@ impl ClipPair<'_> {
         let matched = if joints.iter().all(|side| side.len() == 1) {
             JointPairs::in_order(1)
         } else {
-            // Formats without room for a name that occurs twice number it.
+            // Formats that require unique names number repeated names, so both clips are compared by numbered names.
             let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
             match first == second {
                 true => JointPairs::in_order(first.len()),

@@ -147,7 +147,7 @@ impl PathDifference {
             let motions = clips.map(|(_, clip, _)| clip);
             check_known_parents(names, motions, &[clips.map(|(_, _, track)| track)])?;
         }
-        // Each clip counts from whole seconds of its own.
+        // Each clip has its own time offset, in whole seconds.
         let shift = (first.time_offset - clips[1].1.time_offset) as f64;
         let times = [0, 1].map(|side| {
             let (_, clip, track) = clips[side];
@@ -195,8 +195,8 @@ impl PathDifference {
             .collect();
         warnings.extend(alignment.undetermined.map(|why| {
             format!(
-                "{why}, so that no alignment by {} determines the rotation; the smallest one is used, and the \
-                 rotation errors mean nothing",
+                "{why}, so an alignment by {} does not determine the rotation; the smallest rotation is used, \
+                 and rotation errors have no meaning",
                 measure.align.name()
             )
         }));
@@ -267,7 +267,7 @@ fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
     let start = times.map(|times| times.first().copied().unwrap_or(f64::INFINITY));
     let end = times.map(|times| times.last().copied().unwrap_or(f64::NEG_INFINITY));
     let common = start[0].max(start[1])..=end[0].min(end[1]);
-    // As in evo, where all poses count and the second is the sparser of two equal ones.
+    // As in evo: all poses count, and if both have equally many, the second is used.
     let counts = match measure.associate {
         Associate::Nearest(_) => times.map(<[f64]>::len),
         Associate::Interpolated => {

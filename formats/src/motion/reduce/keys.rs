@@ -185,7 +185,7 @@ impl Reduction<'_> {
         let curve = self.options.curve;
         let mut found = reduce_together(&self.times, &rotations, &vectors, curve)?;
         let last = self.times.len().saturating_sub(1);
-        // Where nothing moves, a second key says how long the clip lasts. Elsewhere the channels that move say it.
+        // If nothing moves, a second key stores the length of the clip. Otherwise the moving channels have it.
         let counts = found.rotations.iter().map(|keys| keys.indices.len());
         let moving = counts.chain(found.vectors.iter().map(|keys| keys.indices.len()));
         if moving.max() <= Some(1) {
@@ -362,7 +362,7 @@ impl Reduction<'_> {
         let name = track.and_then(|track| track.name).unwrap_or_default();
         match self.sampler(joint).rotation {
             Some(_) => push_rotations(&mut reduced.set, name, &self.times, keys),
-            // It rests, at its one key.
+            // The joint rests: it keeps its single key.
             None => {
                 let (times, keys) =
                     track.map_or((&[][..], &[][..]), |track| (track.times, track.keys));

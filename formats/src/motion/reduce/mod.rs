@@ -87,8 +87,8 @@ pub enum ReduceMotionError {
     },
     /// A bound is smaller than the precision with which keys are stored.
     #[error(
-        "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \
-         {kept}: give a larger one"
+        "even with all samples as keys the error is {found:.3e} {unit}, and the bound is {bound:.3e}; keys are \
+         {kept}: give a larger bound"
     )]
     TooSmall {
         /// The largest error with all samples as keys.
@@ -316,7 +316,8 @@ impl<'a> Reduction<'a> {
     fn tighten(&self, found: &MeasuredErrors, tolerances: &mut Tolerances) -> bool {
         let mut factors = vec![1.0f64; self.parents.len()];
         for (joint, &[angle, distance]) in found.joints.iter().enumerate() {
-            // To the bound that would have been enough, and a little less; by no more than a factor at once.
+            // Reduce the tolerance slightly below the value that would have been enough, but only by a limited factor
+            // in one round.
             let part = |bound: f64, error: f64| (0.95 * bound / error).clamp(0.3, 0.95);
             if angle > self.options.angle {
                 factors[joint] = factors[joint].min(part(self.options.angle, angle));

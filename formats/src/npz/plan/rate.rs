@@ -81,7 +81,7 @@ impl ArchivePlan {
         }
         self.two_rates.get_or_insert_with(|| {
             format!(
-                "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
+                "the file states {rate} frames a second, but by `{name}` {} frames last {seconds} s, which is \
                  {by_length:.3} a second; the first is used, --override-fps replaces it",
                 self.frames
             )
@@ -98,7 +98,7 @@ impl ArchivePlan {
             let message = format!("{} numbers for {} frames", numbers.len(), self.frames);
             return Err(archive.refuse(member, Code::Shape, message));
         }
-        // Up to here every whole number is one of f64.
+        // Up to this limit, f64 represents every whole number exactly.
         let is_number = |&number: &f64| (0.0..9e15).contains(&number) && number.fract() == 0.0;
         match numbers.iter().find(|number| !is_number(number)) {
             None => Ok(numbers.into_iter().map(|number| number as u64).collect()),
@@ -146,7 +146,8 @@ impl ArchivePlan {
                 };
             } else if let Some(other) = options.source_rate.filter(is_other) {
                 self.two_rates = Some(format!(
-                    "the file says {rate} frames a second, which is used; --source-fps {other} is for files that say \
+                    "the file states {rate} frames a second, which is used; --source-fps {other} is for files \
+                     that state \
                      none, --override-fps replaces a rate"
                 ));
             }
@@ -162,9 +163,8 @@ impl ArchivePlan {
                 Some(_) => "--override-fps",
                 None => "--source-fps",
             };
-            let message = format!(
-                "the file has the time of every frame; {option} {rate} would be another, leave it out"
-            );
+            let message =
+                format!("the file has the time of every frame; leave out {option} {rate}");
             return Err(archive.refuse(list.member, Code::RateBesideTimes, message));
         }
         let array = archive.array(list.member)?;
@@ -215,7 +215,7 @@ impl ArchivePlan {
         };
         if let (Some(first), None, Some(found), false) = (self.rate, said, found, ends_between) {
             self.two_rates = Some(format!(
-                "the file says {first} frames a second, and its times lie at {found}; the times are used"
+                "the file states {first} frames a second, but its times have {found}; the times are used"
             ));
         }
         self.rate = said.or(found);

@@ -104,11 +104,10 @@ impl TableClip<'_> {
                 let tracks = shared.tracks.par_iter().with_min_len(at_least);
                 tracks.map(quiet_keys).collect()
             })
-            // Where the system refuses threads this one does it all.
+            // If the system refuses to start threads, this thread does all the work.
             .unwrap_or_else(|_| alone()),
         };
-        // Where there is something to be said it is said in the order of the rows: tracks that share
-        // columns are read together.
+        // Tracks that share columns are read together, so that warnings are in the order of the rows.
         let mut known: Option<(&Parts, AllKeys)> = None;
         let keys = shared.tracks.iter().zip(quiet).map(|(track, quiet)| {
             if let Some(keys) = quiet {
@@ -243,7 +242,7 @@ impl TableClip<'_> {
                 let rotation = |position| {
                     let row = self.row(position);
                     let numbers: Vec<f64> = columns.iter().map(|column| column.at(row)).collect();
-                    // Gaps are left out later.
+                    // Rows with NaN are removed later.
                     if self.options.bridge_gaps && numbers.iter().any(|number| number.is_nan()) {
                         return Ok(DQuat::IDENTITY);
                     }
@@ -379,7 +378,7 @@ fn units(keys: impl Iterator<Item = Quat>) -> Option<Vec<Quat>> {
 fn finite(vectors: impl Iterator<Item = Vec3>) -> Option<Vec<Vec3>> {
     let vectors: Vec<Vec3> = vectors.collect();
     let numbers: &[f32] = bytemuck::cast_slice(&vectors);
-    // To the end in any case, so that it is compiled to vectors.
+    // The loop has no early exit, so that it is compiled to vector instructions.
     let are_finite = |all: bool, number: &f32| all & number.is_finite();
     numbers.iter().fold(true, are_finite).then_some(vectors)
 }

@@ -83,7 +83,7 @@ impl PlotSource<'_> {
         let columns = match (subject, panels.len()) {
             (PlotSubject::Components(_), _) if self.choices.len() > 1 => 4,
             (PlotSubject::Sphere(..), 2) => 2,
-            // As many rows: these panels are as broad as high.
+            // Panels of spheres are square, so there are as many columns as rows.
             (PlotSubject::Sphere(..), panels @ 9..) => (panels - 1).isqrt() + 1,
             (_, 0..3) => 1,
             (_, 3..9) => 2,

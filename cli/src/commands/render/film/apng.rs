@@ -38,8 +38,8 @@ impl<W: Write> Apng<W> {
         let writer = &mut self.writer;
         writer.set_frame_delay(self.delays.next().unwrap_or(1), 1000)?;
         if self.before.is_some() {
-            // The first frame is whole, and says so by itself. A new size is measured from
-            // the corner of the one before it, else.
+            // The first frame is always complete and needs no position. The position is reset first, because the
+            // writer checks a new size at the position of the previous frame.
             writer.reset_frame_position()?;
             writer.set_frame_dimension(patch.width as u32, patch.height as u32)?;
             writer.set_frame_position(patch.left as u32, patch.top as u32)?;

@@ -27,7 +27,7 @@ impl Request<'_> {
         let bytes = (part.window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
         let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
         let export = |engine: &VulkanEngine, job: Job<'_>, window: &Window| {
-            // Smaller windows would not make room for it.
+            // The result is allocated as a whole, so smaller windows would not help.
             let exported = match Exported::new(&engine.device, bytes) {
                 Err(error) if error.is_out_of_memory() && engine.give_back() => {
                     Exported::new(&engine.device, bytes)
