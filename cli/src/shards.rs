@@ -15,7 +15,7 @@ use tumble_formats::{Format, Limits};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::InputFile;
-use crate::batch::entry::{InputEntry, ManifestEntry, ManifestLines, UnfinishedInputs};
+use crate::batch::entry::{FrameNotes, InputEntry, ManifestEntry, ManifestLines, UnfinishedInputs};
 use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
@@ -473,6 +473,7 @@ impl ShardRecord {
             input_sha256: Some(rows.inputs_sha256),
             options: format!("{} into={}", first.options, rows.into),
             one_of: None,
+            frames: FrameNotes::default(),
             ..first.clone()
         }];
     }
@@ -577,6 +578,7 @@ mod tests {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: "CPU".to_owned(),
             one_of: one_of.map(|(all, count)| (all.to_owned(), count)),
+            frames: FrameNotes::default(),
             warnings: Vec::new(),
         })
     }

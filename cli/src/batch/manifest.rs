@@ -558,7 +558,7 @@ impl ResultRecorder for Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::batch::entry::kernels_sha256;
+    use crate::batch::entry::{FrameNotes, kernels_sha256};
 
     fn entry(output: &str, hash: &str) -> ManifestEntry {
         let text = String::from;
@@ -574,6 +574,7 @@ mod tests {
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),
             one_of: None,
+            frames: FrameNotes::default(),
             warnings: Vec::new(),
         }
     }
@@ -625,6 +626,19 @@ mod tests {
         let text = |path| std::fs::read_to_string(path).unwrap();
         assert_eq!(text(&other), line(&entry("a", "1")));
         assert_eq!(text(&path).lines().count(), 3);
+    }
+
+    /// A manifest is written again with every batch: its numbers stay, and lines of before have none.
+    #[test]
+    fn notes_about_frames_are_read_as_they_were_written() {
+        let mut noted = entry("a", "1");
+        noted.frames = FrameNotes::new(Some("25".to_owned()), Some(0.6 / 7.3));
+        let text = line(&noted);
+        assert!(text.contains(r#""assumed_fps":"25","left_out_seconds":0.082191781"#), "{text}");
+        let read = ManifestEntry::of_line(text.as_bytes()).unwrap();
+        assert_eq!((&read, line(&read)), (&noted, text));
+        let plain = line(&entry("a", "1"));
+        assert!(!plain.contains("assumed_fps"), "{plain}");
     }
 
     #[test]

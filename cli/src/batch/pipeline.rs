@@ -31,7 +31,7 @@ use crate::arguments::input::{InputReader, check_complete, print_warnings, sever
 use crate::arguments::options::ResultOptions;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{
-    BatchStart, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
+    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
     kernels_sha256,
 };
 use crate::batch::output_plan::UnplannedInput;
@@ -75,6 +75,7 @@ pub(crate) struct EvaluatedResult {
     pub(crate) written: WrittenFile,
     pub(crate) device: String,
     pub(crate) message: String,
+    pub(crate) frames: FrameNotes,
 }
 
 /// An input that was read.
@@ -154,6 +155,7 @@ impl ClipWork {
             written,
             device: device.unwrap_or("none").to_owned(),
             message: format!("{name}: {done}{on_device} in {spent} → {target}{sizes}"),
+            frames: FrameNotes::default(),
         }
     }
 }
@@ -220,7 +222,9 @@ struct BatchRecords<'a> {
     /// The inputs with all their results, and those with some of them.
     done: usize,
     done_in_part: usize,
+    /// The inputs whose results were complete, and how many results these are.
     skipped: usize,
+    skipped_results: usize,
     failed: usize,
 }
 
@@ -300,6 +304,7 @@ impl<'a> Pipeline<'a> {
             done: 0,
             done_in_part: 0,
             skipped: 0,
+            skipped_results: 0,
             failed: 0,
         };
         let (hand_over, read_jobs) = sync_channel(0);
@@ -453,15 +458,7 @@ impl<'a> Pipeline<'a> {
             batch.left.remove(&path);
         }
         let Some((file, loaded)) = input else {
-            if let Some(batch) = &mut self.batch {
-                batch.skipped += 1;
-                batch.progress.advance(1);
-                batch.records.skip(target.name());
-            }
-            if let Some(json) = &mut self.json {
-                let (input, output) = (names::input(&path), target.path().display().to_string());
-                json.push(json!({"state": "kept", "input": input, "output": output}));
-            }
+            self.skip(&path, &target);
             return;
         };
         let files = loaded.and_then(|loaded| {
@@ -497,6 +494,29 @@ impl<'a> Pipeline<'a> {
                 });
             }
             Err(failure) => self.add(&path, Some(target.name()), Err(failure)),
+        }
+    }
+
+    /// The results of an input are complete.
+    fn skip(&mut self, path: &Path, target: &ResultTarget) {
+        let Some(batch) = &mut self.batch else {
+            return;
+        };
+        let folder = batch.previous.folder();
+        let kept = batch.previous.results_of(target.name());
+        let records = kept.map(|entry| KeptResult {
+            state: "kept",
+            input: names::input(path),
+            output: folder.join(&entry.output).display().to_string(),
+            frames: &entry.frames,
+        });
+        let records: Vec<Value> = records.map(|record| to_json(&record)).collect();
+        batch.skipped += 1;
+        batch.skipped_results += records.len();
+        batch.progress.advance(1);
+        batch.records.skip(target.name());
+        if let Some(json) = &mut self.json {
+            json.extend(records);
         }
     }
 
@@ -602,9 +622,19 @@ impl<'a> Pipeline<'a> {
     }
 }
 
-/// An input without a result in JSON.
-fn to_json(entry: &InputEntry) -> Value {
-    serde_json::to_value(entry).expect("strings and numbers")
+/// A result that was complete before the batch, in JSON.
+#[derive(Serialize)]
+struct KeptResult<'a> {
+    state: &'static str,
+    input: String,
+    output: String,
+    #[serde(flatten)]
+    frames: &'a FrameNotes,
+}
+
+/// A record in JSON: an input without a result, or a result that is kept.
+fn to_json(record: &impl Serialize) -> Value {
+    serde_json::to_value(record).expect("strings and numbers")
 }
 
 /// The records of a result in JSON.
@@ -715,6 +745,7 @@ impl BatchRecords<'_> {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: result.device,
             one_of: (name != whole).then(|| (whole.to_owned(), clips)),
+            frames: result.frames,
             warnings,
         };
         let kept = self.records.keep(entry, result.written);
@@ -747,8 +778,11 @@ impl BatchRecords<'_> {
         }
         let mut parts = vec![made];
         if self.skipped > 0 {
-            let results = words::count(self.skipped, "result");
-            parts.push(format!("{results} skipped (already complete)"));
+            let mut skipped = words::count(self.skipped_results, "result");
+            if self.skipped_results != self.skipped {
+                skipped += &format!(" of {}", words::count(self.skipped, "input"));
+            }
+            parts.push(format!("{skipped} skipped (already complete)"));
         }
         if self.failed > 0 {
             parts.push(format!("{} failed", words::count(self.failed, "input")));

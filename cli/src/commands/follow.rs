@@ -54,7 +54,7 @@ fn kinds() -> String {
     mut_arg("path_ends", |arg| arg.alias("ends")),
     mut_arg("path_up", |arg| arg.alias("up")),
     mut_arg("path_speed", |arg| arg.alias("speed")),
-    mut_arg("path_frames", |arg| {
+    mut_arg("path_frame", |arg| {
         let arg = arg.value_name("FRAME").help("The orientation about this direction");
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })

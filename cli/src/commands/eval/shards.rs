@@ -16,8 +16,8 @@ use crate::batch::shards::run::Shard;
 use crate::batch::target;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
 use crate::commands::eval::job::evaluate_all;
-use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
-use crate::messages::{listing, words};
+use crate::messages::exit::{FailedInputs, Failure};
+use crate::messages::listing;
 
 /// Runs the shards of a part.
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
     let folder = target::opened(folder)?;
-    let (mut failed, mut inputs) = (0, 0);
+    let (mut codes, mut inputs) = (Vec::new(), 0);
     let mut reports = Vec::new();
     for number in shards {
         let range = plan.cuts[number - 1].clone();
@@ -59,22 +59,13 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
         let evaluated = evaluator.evaluate(arguments, jobs, &mut shard)?;
         reports.extend(evaluated.json.into_iter().flatten());
         shard.finish()?;
-        failed += shard.header.failed.len();
+        let failed = shard.header.failed.iter();
+        codes.extend(failed.map(|refused| Some(refused.code)));
     }
     if arguments.results.prints_json() {
         listing::json(&reports)?;
     }
-    match failed {
-        0 => Ok(()),
-        _ if failed == inputs => Err(Failure::new(
-            ALL_INPUTS,
-            format!("all {} failed", words::count(failed, "input")),
-        )),
-        _ => {
-            let message = format!("{failed} of {inputs} inputs failed; the others are done");
-            Err(Failure::new(SOME_INPUTS, message))
-        }
-    }
+    FailedInputs::of_codes(codes.into_iter()).outcome_of(inputs)
 }
 
 /// The size of a file; 0 where it cannot be read, which is reported when it is opened.

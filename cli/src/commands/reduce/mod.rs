@@ -24,6 +24,7 @@ use crate::arguments::results::{
     ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new,
 };
 use crate::arguments::tolerance::{degrees, not_negative};
+use crate::batch::entry::FrameNotes;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
@@ -62,7 +63,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     shell: f64,
     /// How to interpolate: the curve that joins the remaining keys
-    #[arg(id = "curve", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
+    #[arg(id = "method", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
     method: ReducedCurve,
     /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
     /// as it is read back
@@ -246,6 +247,7 @@ impl Arguments {
             written,
             device: engine.device_name().to_owned(),
             message: format!("{} in {spent} → {target}{sizes}", lines.join("; ")),
+            frames: FrameNotes::default(),
         };
         Ok((evaluated, reports))
     }

@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
     /// How samples continue beyond the first and the last one
-    #[arg(id = "ends", long = "edges", alias = "ends", value_name = "EDGES", default_value_t, value_parser = edges())]
+    #[arg(long = "edges", alias = "ends", value_name = "EDGES", default_value_t, value_parser = edges())]
     edges: SmoothingEnds,
     /// Frames per second: sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
