@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use clap::Parser;
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser};
 use tumble::{Device, Engine, EngineOptions, Interpolation};
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
@@ -14,7 +14,7 @@ use crate::arguments::interpolation;
 use crate::commands::view;
 use crate::drivers;
 use crate::messages::exit::{self, Failure};
-use crate::messages::{signals, words};
+use crate::messages::{listing, signals, words};
 
 /// Why a call failed.
 #[derive(Debug)]
@@ -42,9 +42,14 @@ impl From<Failure> for Refused {
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
     let raw: Vec<OsString> = arguments.into_iter().collect();
-    let arguments = match Arguments::try_parse_from(&raw) {
-        Ok(arguments) => arguments,
-        Err(mut error) => {
+    let mut command = Arguments::command();
+    let parsed = command
+        .try_get_matches_from_mut(&raw)
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, prints_json(&matches))));
+    let (arguments, prints_json) = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            let mut error = error.format(&mut command);
             words::usage(&mut error, &raw);
             return error.exit_code() as u8;
         }
@@ -52,13 +57,27 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = std::panic::catch_unwind(|| {
         arguments.global.apply();
         signals::stop_on_signals();
+        listing::begin();
         arguments.command.run()
     });
     match outcome {
         Ok(Ok(())) => exit::DONE,
-        Ok(Err(failure)) => failure.report(),
+        Ok(Err(failure)) => {
+            let printed = match prints_json {
+                true => listing::failed(&failure),
+                false => Ok(()),
+            };
+            let code = failure.report();
+            printed.map_or_else(|failure| failure.report(), |()| code)
+        }
         Err(_) => exit::BUG, // the hook has reported it
     }
+}
+
+/// Whether the command is one with `--json`, which was given.
+fn prints_json(matches: &ArgMatches) -> bool {
+    let command = matches.subcommand().map(|(_, matches)| matches);
+    command.is_some_and(|matches| matches!(matches.try_get_one("json"), Ok(Some(true))))
 }
 
 /// Sets the command of the child process that loads the Vulkan drivers, instead of this executable; see

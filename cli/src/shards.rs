@@ -324,7 +324,8 @@ impl Worker {
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);
-        let evaluated = self.evaluator.evaluate(&self.arguments, jobs, &mut shard)?;
+        let arguments = &self.arguments;
+        let rotations = (self.evaluator).evaluate(arguments, jobs, &mut shard, &mut Vec::new())?;
         let record = match task.record {
             true => shard.finish().map(|()| None),
             false => shard.finish_elsewhere().map(Some),
@@ -332,7 +333,7 @@ impl Worker {
         Ok(ShardOutcome {
             made: shard.made,
             skipped: shard.skipped,
-            rotations: evaluated.rotations,
+            rotations,
             device: self.evaluator.device.label.clone(),
             failed: shard.header.failed,
             record,

@@ -197,7 +197,7 @@ codes! {
     GltfFolder = "E116" elsewhere, "a .gltf in another folder than its files", "It refers to files relative to its folder, so it can only be written into the folder of its input. Write a .glb, which contains everything.";
     NothingToAnimate = "E180" elsewhere, "nothing to animate", "An animation in glTF needs at least one time and one channel. Clips without tracks or samples cannot be written.";
     NotTrees = "E181" elsewhere, "joints that are not trees", "glTF requires that nodes are trees with finite transforms. The joints of the clip are not.";
-    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Use a lower rate, or times nearer to 0.";
+    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Give a lower rate (`--fps`), or count times from the start of the clip (`--from-zero`).";
     TimesBelowZero = "E183" elsewhere, "times below 0", "glTF has no negative times. `tumble convert --start 0` removes them.";
     GlbTooLong = "E184" elsewhere, "too long for GLB", "A GLB has at most 4 GiB. Write fewer samples, or write the clips to several files.";
     // E2xx and W2xx: BVH.
@@ -293,7 +293,7 @@ codes! {
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
     NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body that their names mean, and these names are not those of a known kind of skeleton, or hang on each other in another way. `--bones` pairs joints by their names.";
-    Dialect = "E918" elsewhere, "a motion that a dialect cannot hold", "The layout of another program has no room for it: it has a number for each hinge and slide, one root, and frames of one rate. The message says what is too much.";
+    Dialect = "E918" elsewhere, "a motion that a dialect cannot hold", "The layout of another program has no room for it: it has a number for each hinge and slide, one root, and frames of one rate. The message says what is too much. `--fps` of `tumble eval` samples a motion at another rate; NPZ, CSV and GLB (without `--dialect`) hold what dialects do not.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";

@@ -300,7 +300,7 @@ impl DialectArguments {
         let (name, tree) = (&*work.name, &robot.tree);
         let Some(rate) = rate else {
             let message = format!(
-                "{} has frames of one rate, and the samples are none; give --fps (`tumble eval`)",
+                "{} has frames of one rate, and the keys have none; give --fps FPS (with `tumble eval`)",
                 dialect.name
             );
             return Err(Failure::input(

@@ -298,6 +298,29 @@ impl ManifestLines {
         lines
     }
 
+    /// The lines of a directory's manifest, and whether there is a file of its name; none of a file that is no
+    /// manifest, if it may be replaced.
+    pub(crate) fn of_folder(folder: &Path, overwrite: bool) -> Result<(Self, bool), Failure> {
+        let mut bytes = Vec::new();
+        let exists = match open(folder) {
+            Ok(None) => false,
+            Ok(Some(mut file)) => {
+                let read = file.read_to_end(&mut bytes);
+                read.map_err(|error| {
+                    let path = folder.join(NAME);
+                    let message = format!("{}: cannot be read: {error}", path.display());
+                    Failure::new(OUTPUT, message)
+                })?;
+                true
+            }
+            Err(_) if overwrite && folder.join(NAME).is_file() => true,
+            Err(failure) => return Err(failure),
+        };
+        let lines = Self::parse(&bytes);
+        warn_of_damaged_lines(folder, lines.damaged);
+        Ok((lines, exists))
+    }
+
     /// Adds later lines.
     pub(crate) fn extend(&mut self, later: Self) {
         for entry in later.entries.values() {
@@ -459,6 +482,11 @@ impl PreviousEntries {
     /// The directory of results.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// All entries, by the names of their results.
+    pub(crate) fn entries(&self) -> &BTreeMap<String, ManifestEntry> {
+        &self.entries
     }
 
     /// The entry of an output, or the entries of its clips.

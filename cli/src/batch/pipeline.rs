@@ -25,7 +25,7 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::{Value, json};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Diagnostic, Feature, Loaded};
+use tumble_formats::{Diagnostic, Feature, Limits, Loaded};
 
 use crate::arguments::input::{InputReader, check_complete, print_warnings, several_clips_failure};
 use crate::arguments::options::ResultOptions;
@@ -827,9 +827,7 @@ impl<R: InputReader> ReadingAhead<R> {
         let limits = self.reader.limits();
         let file = InputFile::within(path, limits);
         let is_done = |hash: &str| self.previous.is_done(target.name(), hash, &self.options);
-        // The hash is of the bytes that are read next; longer inputs are refused.
-        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= limits.file);
-        let sha256 = is_read.then(|| file.sha256()).flatten();
+        let sha256 = hash_before_reading(&file, limits);
         if self.resume && sha256.is_some_and(is_done) {
             return None;
         }
@@ -838,6 +836,16 @@ impl<R: InputReader> ReadingAhead<R> {
         Some((file, loaded))
     }
 }
+
+/// The hash of an input's bytes, which are read next; longer inputs are refused.
+pub(super) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&str> {
+    let is_read = std::fs::metadata(file.path()).is_ok_and(|found| found.len() <= limits.file);
+    is_read.then(|| file.sha256()).flatten()
+}
+
+/// For an input with several clips whose result is one file of one clip.
+pub(super) const SEVERAL_CLIPS_REMEDY: &str =
+    ", or give a directory for all of them: -o RESULTS/";
 
 /// A file to write: which of the input's clips go into it.
 pub(super) struct ClipFile {
@@ -862,10 +870,9 @@ pub(super) fn clip_files(
         })]));
     }
     if target.name().is_empty() {
-        let hint = ", or give a directory for all of them: -o RESULTS/";
-        return Err(several_clips_failure(path, loaded).hinted(hint));
+        return Err(several_clips_failure(path, loaded).hinted(SEVERAL_CLIPS_REMEDY));
     }
-    let file_names = file_names(clips).into_iter();
+    let file_names = clip_file_names(clips).into_iter();
     let files = clips.iter().zip(file_names).enumerate();
     Ok(files
         .map(|(index, (clip, file))| {
@@ -880,7 +887,7 @@ pub(super) fn clip_files(
 
 /// The names of the clips' files: the clips' names, with characters that file systems refuse replaced;
 /// names that are then equal get the clip's index appended.
-fn file_names(clips: &[Motion]) -> Vec<String> {
+pub(super) fn clip_file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     let plain = |clip: &Motion| -> String {
         let name = clip.name.clone().unwrap_or_else(|| clip.index.to_string());
@@ -939,7 +946,7 @@ mod tests {
             })
             .collect();
         assert_eq!(
-            file_names(&clips),
+            clip_file_names(&clips),
             ["Run", "run.1", "a_b", "a_b.3", "4", "4.5"]
         );
     }
@@ -952,7 +959,7 @@ mod tests {
             index,
             ..Motion::default()
         };
-        let names = file_names(&[clip(0), clip(1)]);
+        let names = clip_file_names(&[clip(0), clip(1)]);
         assert_eq!(names[0], format!("{}.0", "ä".repeat(59)));
         assert_eq!(names[1], format!("{}.1", "ä".repeat(59)));
     }

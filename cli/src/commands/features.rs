@@ -24,6 +24,7 @@ use crate::arguments::options::CommandLine;
 use crate::arguments::output::one_of;
 use crate::arguments::results::ResultArguments;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -140,9 +141,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage(message));
     }
     arguments.inputs.reading.robot()?;
-    let plan = arguments.results.plan_in(files, format)?;
     let options = arguments.command_line.options().of_command("features");
     let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan_in(files, format, &work)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("features", &error))?;
     let mut pipeline = arguments.results.start(reader, plan, options);

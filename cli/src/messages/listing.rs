@@ -1,6 +1,7 @@
 //! Listings and JSON, on standard output.
 
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use tumble_formats::printable::{printable, printable_lines};
 
@@ -24,8 +25,12 @@ pub(crate) fn styled(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Whether JSON was printed, or begun.
+static HAS_JSON: AtomicBool = AtomicBool::new(false);
+
 /// As [`text`], for programs: pretty-printed JSON.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    HAS_JSON.store(true, Ordering::Relaxed);
     let text =
         serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
     styled(&format!("{}\n", json_printable(&text)))
@@ -40,6 +45,29 @@ pub(crate) fn records(
     let results = results.iter().map(serde_json::to_value);
     let records: Result<Vec<_>, _> = results.chain(failed).collect();
     json(&records.expect("names are strings and numbers are numbers"))
+}
+
+/// Prepares for a command's JSON.
+pub(crate) fn begin() {
+    HAS_JSON.store(false, Ordering::Relaxed);
+}
+
+/// The failure of a command as a list of one record, if it ended before its JSON was printed.
+pub(crate) fn failed(failure: &Failure) -> Result<(), Failure> {
+    #[derive(serde::Serialize)]
+    struct FailedCommand<'a> {
+        state: &'static str,
+        code: u8,
+        message: &'a str,
+    }
+    if HAS_JSON.load(Ordering::Relaxed) || failure.message().is_empty() {
+        return Ok(());
+    }
+    json(&[FailedCommand {
+        state: "failed",
+        code: failure.code,
+        message: failure.message(),
+    }])
 }
 
 /// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings

@@ -26,6 +26,7 @@ use crate::arguments::results::{
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::entry::FrameNotes;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::room;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -138,7 +139,13 @@ impl LargestError {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(files)?;
+    let options = arguments.command_line.options().of_command("reduce");
+    let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan(files, &work)?;
     let plot = match &arguments.plot {
         Some(file) => arguments.results.picture(file, &plan)?,
         None => None,
@@ -155,8 +162,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.check_quantized(format)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
-    let options = arguments.command_line.options().of_command("reduce");
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.make(&engine, &work, plot.as_ref());
