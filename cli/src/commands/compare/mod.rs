@@ -95,7 +95,7 @@ pub(crate) struct Arguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Print a table of the joints as CSV
+    /// Print a table of the joints and the scalars as CSV
     #[arg(long, conflicts_with = "json")]
     csv: bool,
 }
@@ -246,6 +246,7 @@ impl Arguments {
                 let ordered = found.iter().map(|found| {
                     let mut found = found.clone();
                     found.joints = table.listed(&found.joints);
+                    found.each_scalar = table.listed_scalars(&found.each_scalar);
                     found
                 });
                 if self.csv {
