@@ -197,7 +197,7 @@ codes! {
     GltfFolder = "E116" elsewhere, "a .gltf in another folder than its files", "It refers to files relative to its folder, so it can only be written into the folder of its input. Write a .glb, which contains everything.";
     NothingToAnimate = "E180" elsewhere, "nothing to animate", "An animation in glTF needs at least one time and one channel. Clips without tracks or samples cannot be written.";
     NotTrees = "E181" elsewhere, "joints that are not trees", "glTF requires that nodes are trees with finite transforms. The joints of the clip are not.";
-    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Give a lower rate (`--fps`), or count times from the start of the clip (`--from-zero`).";
+    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Give a lower rate (`--fps`); the message says which fits. NPZ, CSV and Parquet have times in f64.";
     TimesBelowZero = "E183" elsewhere, "times below 0", "glTF has no negative times. `tumble convert --start 0` removes them.";
     GlbTooLong = "E184" elsewhere, "too long for GLB", "A GLB has at most 4 GiB. Write fewer samples, or write the clips to several files.";
     // E2xx and W2xx: BVH.

@@ -116,7 +116,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 14] = [
+    const WORDS: [(&str, &str); 13] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -142,7 +142,6 @@ pub(crate) fn in_python(message: &str) -> String {
         ("--weld DISTANCE", "weld=DISTANCE"),
         ("--source-fps FPS", "source_fps=FPS"),
         (" (with `tumble eval`)", ""),
-        (", or --from-zero, which moves the start to 0 s", ""),
     ];
     const FLAGS: [&str; 5] = [
         "bridge_gaps",

@@ -31,11 +31,11 @@ pub(crate) struct Inputs {
     /// Also the inputs in a text file, one a line (`-`: standard input)
     #[arg(long, value_name = "LIST")]
     files_from: Option<PathBuf>,
-    /// With --files-from: the inputs end in NUL characters, as `find -print0` writes them, instead of line ends
+    /// With --files-from: the inputs in the list end in NUL characters, as `find -print0` writes them, instead of line ends
     #[arg(short = '0', long, requires = "files_from")]
     null: bool,
-    /// Leave out inputs by a pattern of a name (of a file or a folder), or of several in a row, such as
-    /// '*_draft.bvh' or 'takes/old'; may be given several times
+    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or 'takes/old' for names
+    /// that follow each other in a path; may be given several times
     #[arg(long, value_name = "PATTERN", value_parser = PathPattern::new)]
     exclude: Vec<PathPattern>,
     /// Read named pipes too

@@ -31,10 +31,10 @@ use crate::messages::words;
 /// Compute features for learning: six numbers of rotations, headings, contacts, mirrors, HumanML3D
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the
-names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the
-curves; of other skeletons they are differences over a thirty-second of a frame. HumanML3D needs metres, y
-up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need
+The result is an NPZ file: arrays of f32 for all frames and joints, in the world, the times, and the names of \
+the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the curves; for \
+other skeletons they are differences over a thirty-second of a frame. HumanML3D needs metres, y up, 20 frames \
+a second, and the 22 joints of SMPL or of a skeleton that is recognised by its names. Bodies of SMPL need \
 --body-model.
 
 Examples:
@@ -60,16 +60,16 @@ pub(crate) struct Arguments {
     /// The axis that points up, for headings and contacts
     #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
     vertical: Ground,
-    /// A joint that is lower touches the ground, if it is slower too; metres
+    /// The height below which a slow joint touches the ground, metres
     #[arg(long, value_name = "METRES", default_value_t = ContactLimits::PROTOMOTIONS.height)]
     contact_height: f64,
-    /// A joint that is slower touches the ground, if it is lower too; metres a second
+    /// The speed below which a low joint touches the ground, metres a second
     #[arg(long, value_name = "SPEED", default_value_t = ContactLimits::PROTOMOTIONS.speed)]
     contact_speed: f64,
-    /// Contacts are those of most of so many frames, an odd number
+    /// How many frames decide about a contact, an odd number: it is that of most of them
     #[arg(long, value_name = "FRAMES", default_value_t = 1)]
     contact_window: usize,
-    /// The axis across the mirror
+    /// The axis whose direction the mirror reverses
     #[arg(long, value_name = "AXIS", default_value = "x", value_parser = mirror_axis())]
     mirror_axis: usize,
 }

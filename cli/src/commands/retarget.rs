@@ -28,12 +28,13 @@ use crate::messages::words;
 /// Carry motions over to the skeleton of another file
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each joint turns away from its rest pose in the world as its partner of the input does, and the hips move
-as far as the skeleton is high. Nothing is resampled: keys keep their times. Joints are paired by the parts
-of the body that their names mean (VRM, Mixamo, SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA); --bones names the
-pairs of other skeletons. If --onto is glTF and so is the output, it is that file with its meshes and
-materials, and its animations are replaced. Hands and feet are where the lengths of the limbs put them:
---report says how far from the input's. There is no inverse kinematics.
+Each joint rotates away from its rest pose, in the world, as the joint of the input does that is paired with \
+it. The translations of the hips are scaled by the ratio of the heights of both skeletons. Nothing is \
+resampled: keys keep their times. Joints are paired by the parts of the body that their names mean (VRM, \
+Mixamo, SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA); for other skeletons --bones names the pairs. If --onto and \
+the output are glTF, the output is the file of --onto, with its meshes and materials, and with these \
+animations instead of its own. Hands and feet are where the lengths of the limbs put them, because there is \
+no inverse kinematics; --report says how far that is from the input's.
 
 Examples:
   tumble retarget take.bvh --onto character.glb -o walking.glb
@@ -49,7 +50,7 @@ pub(crate) struct Arguments {
     /// The file with the skeleton: glTF, with or without animations, or the first clip of any other file
     #[arg(long, value_name = "FILE")]
     onto: PathBuf,
-    /// The joints that belong together, as JSON: {\"joint of --onto\": \"joint of the input\", …} [default: by the
+    /// The joints that belong together, as JSON: `{"joint of --onto": "joint of the input", …}` [default: by the
     /// parts of the body that their names mean]
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
@@ -76,8 +77,8 @@ pub(crate) struct Arguments {
 fn rest() -> impl TypedValueParser<Value = RestAlignment> {
     let help = |rest| match rest {
         RestAlignment::Auto => "directions, if one of a limb differs by more than 5°, else same",
-        RestAlignment::Same => "both stand alike",
-        RestAlignment::Directions => "arms and legs are turned to the directions of the input's",
+        RestAlignment::Same => "the same rotations are the same pose",
+        RestAlignment::Directions => "the arms and legs of the skeleton are first turned to the directions that the input's have",
     };
     one_of(RestAlignment::ALL.map(|rest| (rest.name(), help(rest), rest)))
 }

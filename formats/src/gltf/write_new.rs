@@ -322,7 +322,7 @@ pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Cod
         let spacing = f64::from(last.next_up()) - f64::from(last);
         let why = format!(
             "{} s and {} s are one time in f32, in which glTF has times; there f32 has a time every {spacing} s: give \
-             --fps {} or less, or --from-zero, which moves the start to 0 s",
+             --fps {} or less",
             seconds[index],
             seconds[index + 1],
             1.0 / spacing,

@@ -16,13 +16,13 @@ use crate::commands::prove::device;
 use crate::commands::prove::report::{Host, LAB_FORMAT, LAB_FORMAT_VERSION, Program};
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 
-/// Compare every variant of the kernels for cards with the CPU, measure them, and say which follow by rules
+/// Compare every variant of the kernels for cards with the CPU, measure them, and choose the fastest by fixed rules
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Variants differ in the invocations that evaluate a run together, in the size of workgroups, in how results \
 pass the caches, and in how numbers become halves. Each is compared with the same function on the CPU, and \
-left out if a bit differs. Then what no kernel exceeds is measured, and rows of 32 dispatches of the \
-variants. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
+left out if a bit differs. Then the speed of the device's memory is measured, which no kernel exceeds, and \
+that of the variants, in rows of 32 dispatches. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
 
 Exit codes:
   0  no bit differs
