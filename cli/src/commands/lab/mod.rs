@@ -21,8 +21,8 @@ use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 #[command(after_help = "\
 Variants differ in the invocations that evaluate a run together, in the size of workgroups, in how results \
 pass the caches, and in how numbers become halves. Each is compared with the same function on the CPU, and \
-left out if a bit differs. Then the speed of the device's memory is measured, which no kernel exceeds, and \
-that of the variants, in rows of 32 dispatches. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
+left out if a bit differs. Then the limits of the device are measured, such as that of stores, and the \
+variants, in rows of 32 dispatches. `docs/proofs.md` has the rules by which the fastest are chosen, and explains the JSON.
 
 Exit codes:
   0  no bit differs
