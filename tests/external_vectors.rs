@@ -334,8 +334,8 @@ fn gltf_cubic_spline_without_tangents_eases() {
 #[test]
 fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
     let times: Vec<f64> = (0..9).map(f64::from).collect();
-    let even = [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 20.0, 15.0, 10.0]
-        .map(|yaw| about([0.0, 1.0, 0.0], yaw));
+    let even =
+        [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 20.0, 15.0, 10.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
     let mut any_signs = even;
     for negated in [1, 2, 5] {
         any_signs[negated] = -any_signs[negated];

@@ -52,7 +52,10 @@ fn recipes_have_the_version_the_licence_and_the_description_of_cargo_toml() {
         assert!(unknown.is_empty(), "{path}: {unknown:?} have no value");
         assert!(places(&text).contains("VERSION"), "{path}");
         for fixed in [&version, &license, &description] {
-            assert!(!text.contains(fixed.as_str()), "{path}: `{fixed}` is in Cargo.toml");
+            assert!(
+                !text.contains(fixed.as_str()),
+                "{path}: `{fixed}` is in Cargo.toml"
+            );
         }
     }
     let filled = recipe("vcpkg/vcpkg.json")
@@ -72,10 +75,19 @@ fn recipes_have_the_version_the_licence_and_the_description_of_cargo_toml() {
 #[test]
 fn recipes_name_files_packages_and_commands_that_exist() {
     let named = [
-        ("conda/recipe.yaml", &["LICENSE-APACHE", "LICENSE-MIT", "cli"][..]),
+        (
+            "conda/recipe.yaml",
+            &["LICENSE-APACHE", "LICENSE-MIT", "cli"][..],
+        ),
         (
             "homebrew/tumble.rb",
-            &["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "cli"],
+            &[
+                "README.md",
+                "CHANGELOG.md",
+                "LICENSE-APACHE",
+                "LICENSE-MIT",
+                "cli",
+            ],
         ),
         (
             "vcpkg/portfile.cmake",
@@ -107,7 +119,11 @@ fn recipes_name_files_packages_and_commands_that_exist() {
     ] {
         let words: Vec<&str> = line.split(' ').collect();
         let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
-        let texts = [recipe("conda/recipe.yaml"), recipe("homebrew/tumble.rb"), flake.clone()];
+        let texts = [
+            recipe("conda/recipe.yaml"),
+            recipe("homebrew/tumble.rb"),
+            flake.clone(),
+        ];
         let is_used = |text: &String| text.contains(line) || text.contains(&quoted.join(", "));
         assert!(texts.iter().any(is_used), "no recipe runs `tumble {line}`");
         succeed(folder.path(), &words);

@@ -104,7 +104,10 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
     }
     let planned = run_of("eval in -o out -n");
     let planned: Vec<&str> = text(&planned).lines().collect();
-    let of_clips = ["in/m.gltf Run → out/m.Run.npy", "in/m.gltf Walk → out/m.Walk.npy"];
+    let of_clips = [
+        "in/m.gltf Run → out/m.Run.npy",
+        "in/m.gltf Walk → out/m.Walk.npy",
+    ];
     assert_eq!(planned[3..], of_clips, "{planned:?}");
     assert!(!folder.join("out").exists());
     run_of("eval in -o out");
@@ -125,20 +128,33 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
             "removes out/b.npy (its input is gone)",
         ]
     );
-    let summary = "2 results would be made, 3 skipped (already complete), 1 removed; nothing was written";
+    let summary =
+        "2 results would be made, 3 skipped (already complete), 1 removed; nothing was written";
     assert!(dry.words.contains(summary), "{}", dry.words);
     assert_eq!(tree(&folder.join("out")), before);
     let json = run_of("eval in -o out -n --resume --prune --json");
     let json: serde_json::Value = serde_json::from_slice(&json.out).unwrap();
-    let states: Vec<&str> = json.as_array().unwrap().iter().map(|it| it["state"].as_str().unwrap()).collect();
-    assert_eq!(states, ["kept", "planned", "planned", "kept", "kept", "pruned"]);
+    let states: Vec<&str> = json
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| it["state"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        states,
+        ["kept", "planned", "planned", "kept", "kept", "pruned"]
+    );
     // The batch does what was said.
     let done = run_of("eval in -o out --resume --prune");
     let summary = "2 results made, 3 results of 2 inputs skipped (already complete)";
     assert!(done.words.contains(summary), "{}", done.words);
     assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
     let one = run(folder, &words("eval in/m.gltf -o m.npy -n"));
-    assert!(one.code == 4 && one.words.contains("--animation"), "{}", one.words);
+    assert!(
+        one.code == 4 && one.words.contains("--animation"),
+        "{}",
+        one.words
+    );
 }
 
 /// A program that reads the JSON learns of an output that cannot be written, and of a batch that the disk ends.
@@ -153,8 +169,14 @@ fn a_command_that_fails_before_its_results_prints_its_failure_as_json() {
         let run = run(folder.path(), &words(line));
         assert_eq!(run.code, code, "{line}: {}", run.words);
         let json: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
-        assert_eq!((&json[0]["state"], &json[0]["code"]), (&"failed".into(), &code.into()));
-        assert!(json[0]["message"].as_str().unwrap().contains(words_of), "{json}");
+        assert_eq!(
+            (&json[0]["state"], &json[0]["code"]),
+            (&"failed".into(), &code.into())
+        );
+        assert!(
+            json[0]["message"].as_str().unwrap().contains(words_of),
+            "{json}"
+        );
     }
     let silent = run(folder.path(), &words("eval a.dat -o none/o.npy"));
     assert!(silent.out.is_empty());
@@ -165,10 +187,16 @@ fn patterns_that_leave_nothing_out_are_told() {
     let folder = sample_folder();
     let line = "eval folder b.dat -o out --exclude b.* --exclude *_draft.dat -n";
     let run = succeed(folder.path(), &words(line));
-    let told: Vec<&str> = run.words.lines().filter(|line| line.contains("--exclude")).collect();
+    let told: Vec<&str> = run
+        .words
+        .lines()
+        .filter(|line| line.contains("--exclude"))
+        .collect();
     assert_eq!(
         told,
-        ["warning: --exclude '*_draft.dat' leaves nothing out: no name of a file or a folder matches it"]
+        [
+            "warning: --exclude '*_draft.dat' leaves nothing out: no name of a file or a folder matches it"
+        ]
     );
 }
 

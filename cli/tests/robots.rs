@@ -828,15 +828,25 @@ fn scalars_are_compared_one_by_one_and_told_where_they_are_not_drawn() {
     assert!((worst - 0.1f64.to_degrees()).abs() < 1e-4, "{text}");
     assert_eq!(scalars[0][column("scalar_frame")], "10");
     assert_eq!(scalars[1][column("scalar_largest")], "0");
-    let top = line(folder, "compare take.csv bent.csv --robot robot.xml --csv --top 1");
+    let top = line(
+        folder,
+        "compare take.csv bent.csv --robot robot.xml --csv --top 1",
+    );
     assert_eq!(String::from_utf8(top.out).unwrap().lines().count(), 3);
 
-    for drawing in ["plot take.csv -o o.svg", "view take.csv -o o.html", "render take.csv -o o.png"] {
+    for drawing in [
+        "plot take.csv -o o.svg",
+        "view take.csv -o o.html",
+        "render take.csv -o o.png",
+    ] {
         let drawn = line(folder, &format!("{drawing} --robot robot.xml --device cpu"));
         let told = "take.csv: 4 scalars are not drawn";
         assert!(drawn.words.contains(told), "{drawing}: {}", drawn.words);
     }
     let unnamed = line(folder, "info take.csv");
     let both = String::from_utf8(unnamed.out).unwrap() + &unnamed.words;
-    assert!(both.contains("W906") && both.contains("--robot FILE"), "{both}");
+    assert!(
+        both.contains("W906") && both.contains("--robot FILE"),
+        "{both}"
+    );
 }

@@ -395,8 +395,22 @@ fn tables_of_others_have_their_values() {
     assert!(refused.message.contains("--from euroc"), "{refused}");
     // Tables of Motive and Vicon are read, with their rates and units; the drone turns by 1° a frame.
     for (name, rate, keys, metres, up, second) in [
-        ("motive.csv", 120, 31, 1.0, DVec3::Y, Vec3::new(0.033_333, 0.066_667, 0.0)),
-        ("vicon.csv", 100, 30, 0.001, DVec3::Z, Vec3::new(0.067, 0.133, 0.0)),
+        (
+            "motive.csv",
+            120,
+            31,
+            1.0,
+            DVec3::Y,
+            Vec3::new(0.033_333, 0.066_667, 0.0),
+        ),
+        (
+            "vicon.csv",
+            100,
+            30,
+            0.001,
+            DVec3::Z,
+            Vec3::new(0.067, 0.133, 0.0),
+        ),
     ] {
         let loaded = read(&text(&format!("csv-messages/{name}")), None, false).unwrap();
         assert_eq!(loaded.space, Some(Space { up, metres }), "{name}");
@@ -428,13 +442,25 @@ fn tables_of_motion_capture_are_read_or_told_the_export_that_is() {
     let loaded = read(&motive("Quaternion", "Rigid Body"), None, false).unwrap();
     let clip = &loaded.clips[0];
     assert!(clip.is_world, "{clip:?}");
-    assert_eq!(positions(&loaded), [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
-    assert_eq!(clip.set.track(0).keys[1], Quat::from_xyzw(0.0, 0.0, 0.6, 0.8));
+    assert_eq!(
+        positions(&loaded),
+        [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]
+    );
+    assert_eq!(
+        clip.set.track(0).keys[1],
+        Quat::from_xyzw(0.0, 0.0, 0.6, 0.8)
+    );
     assert_eq!(loaded.space.map(|space| space.metres), Some(0.01));
-    assert!(loaded.warnings[0].message.contains("`m.Position X`"), "{:?}", loaded.warnings);
+    assert!(
+        loaded.warnings[0].message.contains("`m.Position X`"),
+        "{:?}",
+        loaded.warnings
+    );
 
     let vicon = |columns: &str, cells: &str| {
-        format!("Objects,,,,,,,,\n50,,,,,,,,\n,,a:b,,,,,,\nFrame,Sub Frame,{columns}\n,,,,,,m,m,m\n{cells}")
+        format!(
+            "Objects,,,,,,,,\n50,,,,,,,,\n,,a:b,,,,,,\nFrame,Sub Frame,{columns}\n,,,,,,m,m,m\n{cells}"
+        )
     };
     let quaternions = "RX,RY,RZ,RW,TX,TY,TZ";
     let cells = "3,0,0,0,0,1,1,2,3\n4,0,0,0,0.6,0.8,4,5,6\n";
@@ -442,15 +468,43 @@ fn tables_of_motion_capture_are_read_or_told_the_export_that_is() {
     let loaded = read(&vicon(quaternions, &two_tables), None, false).unwrap();
     let track = loaded.clips[0].set.track(0);
     assert_eq!((track.name, track.keys.len()), (Some("a:b"), 2));
-    assert!((track.times[1] - track.times[0] - 0.02).abs() < 1e-12, "{:?}", track.times);
-    assert!(loaded.warnings[0].message.contains("another table"), "{:?}", loaded.warnings);
+    assert!(
+        (track.times[1] - track.times[0] - 0.02).abs() < 1e-12,
+        "{:?}",
+        track.times
+    );
+    assert!(
+        loaded.warnings[0].message.contains("another table"),
+        "{:?}",
+        loaded.warnings
+    );
 
     for (text, code, remedy) in [
-        (motive("XYZ", "Rigid Body"), Code::NoRotations, "with the rotation type Quaternion"),
-        (motive("Quaternion", "Marker"), Code::NoRotations, "with rigid bodies or bones"),
-        (vicon("RX,RY,RZ,TX,TY,TZ,", cells), Code::NoRotations, "quaternions, RX RY RZ RW"),
-        (vicon("X,Y,Z,X,Y,Z,", cells), Code::NoRotations, "export objects or segments"),
-        ("Segments\n50\n,,a\n1,2,3\n".to_owned(), Code::NoTimes, "no row begins with `Frame`"),
+        (
+            motive("XYZ", "Rigid Body"),
+            Code::NoRotations,
+            "with the rotation type Quaternion",
+        ),
+        (
+            motive("Quaternion", "Marker"),
+            Code::NoRotations,
+            "with rigid bodies or bones",
+        ),
+        (
+            vicon("RX,RY,RZ,TX,TY,TZ,", cells),
+            Code::NoRotations,
+            "quaternions, RX RY RZ RW",
+        ),
+        (
+            vicon("X,Y,Z,X,Y,Z,", cells),
+            Code::NoRotations,
+            "export objects or segments",
+        ),
+        (
+            "Segments\n50\n,,a\n1,2,3\n".to_owned(),
+            Code::NoTimes,
+            "no row begins with `Frame`",
+        ),
     ] {
         let refused = read(&text, None, false).unwrap_err();
         assert_eq!(refused.code, code, "{refused}");
@@ -461,12 +515,21 @@ fn tables_of_motion_capture_are_read_or_told_the_export_that_is() {
 /// Names below other lines: after what the message says, the table is read.
 #[test]
 fn names_below_other_lines_are_read_when_these_are_deleted() {
-    let lines = ["Recording,walk", "Time,hand.x,hand.y,hand.z,hand.w", "s,1,1,1,1", "0,0,0,0,1"];
+    let lines = [
+        "Recording,walk",
+        "Time,hand.x,hand.y,hand.z,hand.w",
+        "s,1,1,1,1",
+        "0,0,0,0,1",
+    ];
     let with_units = lines.map(|line| line.replace("s,1,1,1,1", "s,,,,"));
     for (lines, units) in [(lines.map(str::to_owned), false), (with_units, true)] {
         let lines: Vec<String> = match units {
             true => lines.to_vec(),
-            false => lines.iter().filter(|line| !line.starts_with('s')).cloned().collect(),
+            false => lines
+                .iter()
+                .filter(|line| !line.starts_with('s'))
+                .cloned()
+                .collect(),
         };
         let refused = read(&lines.join("\n"), None, false).unwrap_err();
         assert_eq!(refused.code, Code::NoTimes, "{refused}");

@@ -11,7 +11,9 @@ use clap::Args;
 use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
-use tumble_formats::{Code, Diagnostic, FORMATS, Feature, Format, Limits, Loaded, ReadOptions, file_kind};
+use tumble_formats::{
+    Code, Diagnostic, FORMATS, Feature, Format, Limits, Loaded, ReadOptions, file_kind,
+};
 use walkdir::WalkDir;
 
 use crate::arguments::reading::ReadingArguments;

@@ -314,7 +314,12 @@ pub(crate) fn with_present_names(text: &str) -> Cow<'_, str> {
     let ordered = options.is_sorted_by(|(a, _), (b, _)| a < b);
     let in_order = match ordered {
         true => options.len(),
-        false => 1 + options.windows(2).position(|pair| pair[0].0 >= pair[1].0).unwrap_or(0),
+        false => {
+            1 + options
+                .windows(2)
+                .position(|pair| pair[0].0 >= pair[1].0)
+                .unwrap_or(0)
+        }
     };
     let mut has_changed = false;
     for (name, _) in &mut options[..in_order] {
@@ -329,9 +334,17 @@ pub(crate) fn with_present_names(text: &str) -> Cow<'_, str> {
         return Cow::Borrowed(text);
     }
     options[..in_order].sort_by(|(a, _), (b, _)| a.cmp(b));
-    let options = options.iter().map(|(name, value)| format!("{name}={value}"));
+    let options = options
+        .iter()
+        .map(|(name, value)| format!("{name}={value}"));
     let command = Some(command).filter(|command| !command.is_empty());
-    Cow::Owned(command.into_iter().chain(options).collect::<Vec<_>>().join(" "))
+    Cow::Owned(
+        command
+            .into_iter()
+            .chain(options)
+            .collect::<Vec<_>>()
+            .join(" "),
+    )
 }
 
 /// The rule of an option.
@@ -658,7 +671,10 @@ mod tests {
             let name = argument.get_id().as_str();
             let decides = rule(name).is_some_and(|rule| rule.bytes != Bytes::Unchanged);
             let long = argument.get_long().unwrap_or_default();
-            assert!(!decides || long.replace('-', "_") == name, "{name} is --{long}");
+            assert!(
+                !decides || long.replace('-', "_") == name,
+                "{name} is --{long}"
+            );
         }
     }
 
@@ -669,11 +685,23 @@ mod tests {
                 "layout=track method=slerp output=euler path=shortest sequence=XYZ times=0f",
                 "layout=track method=slerp quantity=euler sequence=XYZ signs=shortest times=0f",
             ),
-            ("encoding=f32 order=wxyz up=z times=0f", "encoding=f32 order=wxyz up_axis=z times=0f"),
-            ("map=a = b,output=x method=slerp", "map=a = b,output=x method=slerp"),
-            ("reduce curve=linear tolerance=1", "reduce method=linear tolerance=1"),
+            (
+                "encoding=f32 order=wxyz up=z times=0f",
+                "encoding=f32 order=wxyz up_axis=z times=0f",
+            ),
+            (
+                "map=a = b,output=x method=slerp",
+                "map=a = b,output=x method=slerp",
+            ),
+            (
+                "reduce curve=linear tolerance=1",
+                "reduce method=linear tolerance=1",
+            ),
             ("smooth ends=loop passes=2", "smooth edges=loop passes=2"),
-            ("follow path_frames=fixed rate=2 upward=x", "follow body_up=x pace=2 path_frame=fixed"),
+            (
+                "follow path_frames=fixed rate=2 upward=x",
+                "follow body_up=x pace=2 path_frame=fixed",
+            ),
             ("ends=natural method=c2", "ends=natural method=c2"),
             ("", ""),
         ] {

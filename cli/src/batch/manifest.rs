@@ -654,7 +654,10 @@ mod tests {
         let mut noted = entry("a", "1");
         noted.frames = FrameNotes::new(Some("25".to_owned()), Some(0.6 / 7.3));
         let text = line(&noted);
-        assert!(text.contains(r#""assumed_fps":"25","left_out_seconds":0.082191781"#), "{text}");
+        assert!(
+            text.contains(r#""assumed_fps":"25","left_out_seconds":0.082191781"#),
+            "{text}"
+        );
         let read = ManifestEntry::of_line(text.as_bytes()).unwrap();
         assert_eq!((&read, line(&read)), (&noted, text));
         let plain = line(&entry("a", "1"));

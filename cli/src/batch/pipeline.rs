@@ -31,8 +31,8 @@ use crate::arguments::input::{InputReader, check_complete, print_warnings, sever
 use crate::arguments::options::ResultOptions;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{
-    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
-    kernels_sha256,
+    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning,
+    ResultRecorder, kernels_sha256,
 };
 use crate::batch::output_plan::UnplannedInput;
 use crate::batch::owner::{Owner, ReplacedOwners};
@@ -844,8 +844,7 @@ pub(super) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&s
 }
 
 /// For an input with several clips whose result is one file of one clip.
-pub(super) const SEVERAL_CLIPS_REMEDY: &str =
-    ", or give a directory for all of them: -o RESULTS/";
+pub(super) const SEVERAL_CLIPS_REMEDY: &str = ", or give a directory for all of them: -o RESULTS/";
 
 /// A file to write: which of the input's clips go into it.
 pub(super) struct ClipFile {

@@ -83,7 +83,8 @@ impl fmt::Display for PreviewedResult {
             }
             write!(f, " → {output}")?;
         }
-        self.reason.map_or(Ok(()), |reason| write!(f, " ({reason})"))
+        self.reason
+            .map_or(Ok(()), |reason| write!(f, " ({reason})"))
     }
 }
 
@@ -250,14 +251,16 @@ impl<'a> PreviewedFolder<'a> {
         }
         if resume && self.is_complete(path, name) {
             let kept = self.previous.results_of(name);
-            self.preview.results.extend(kept.map(|entry| PreviewedResult {
-                state: PreviewState::Kept,
-                input: input.clone(),
-                animation: None,
-                output: self.out.join(&entry.output).display().to_string(),
-                exists: true,
-                reason: Some("complete, would be skipped"),
-            }));
+            self.preview
+                .results
+                .extend(kept.map(|entry| PreviewedResult {
+                    state: PreviewState::Kept,
+                    input: input.clone(),
+                    animation: None,
+                    output: self.out.join(&entry.output).display().to_string(),
+                    exists: true,
+                    reason: Some("complete, would be skipped"),
+                }));
             self.planned.complete(name);
             return Ok(());
         }

@@ -98,7 +98,9 @@ fn path_of_clip(path: &Path, clip: &str, format: &Format) -> PathBuf {
 
 /// The name of the result of one of several clips, from that of all: `fox.npy` becomes `fox.Run.npy`.
 pub(super) fn name_of_clip(name: &str, clip: &str, format: &Format) -> String {
-    path_of_clip(Path::new(name), clip, format).display().to_string()
+    path_of_clip(Path::new(name), clip, format)
+        .display()
+        .to_string()
 }
 
 /// The target of one result: its destination and format.

@@ -78,7 +78,9 @@ fn rest() -> impl TypedValueParser<Value = RestAlignment> {
     let help = |rest| match rest {
         RestAlignment::Auto => "directions, if one of a limb differs by more than 5°, else same",
         RestAlignment::Same => "the same rotations are the same pose",
-        RestAlignment::Directions => "the arms and legs of the skeleton are first turned to the directions that the input's have",
+        RestAlignment::Directions => {
+            "the arms and legs of the skeleton are first turned to the directions that the input's have"
+        }
     };
     one_of(RestAlignment::ALL.map(|rest| (rest.name(), help(rest), rest)))
 }

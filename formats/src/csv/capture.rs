@@ -37,7 +37,8 @@ fn cells(record: &ByteRecord) -> Row {
 
 /// Whether none of these cells is a number, as in rows of names and units.
 pub(super) fn has_no_number(record: &ByteRecord) -> bool {
-    let is_number = |cell: &[u8]| std::str::from_utf8(cell).is_ok_and(|it| it.parse::<f64>().is_ok());
+    let is_number =
+        |cell: &[u8]| std::str::from_utf8(cell).is_ok_and(|it| it.parse::<f64>().is_ok());
     !record.iter().map(<[u8]>::trim_ascii).any(is_number)
 }
 
@@ -114,7 +115,10 @@ fn motive(rows: &[Row]) -> Result<CaptureHeading, String> {
         let row = above.iter().find(|row| at(row, 1) == label);
         row.map_or(&[][..], Vec::as_slice)
     };
-    let is_kinds = |row: &&Row| row.iter().any(|cell| cell == "Rotation" || cell == "Position");
+    let is_kinds = |row: &&Row| {
+        row.iter()
+            .any(|cell| cell == "Rotation" || cell == "Position")
+    };
     let kinds = above.iter().rev().find(is_kinds);
     let kinds = kinds.map_or(&[][..], Vec::as_slice);
     let (types, bodies) = (labelled("Type"), labelled("Name"));

@@ -278,8 +278,13 @@ impl<'a> Sheet<'a> {
             }
             let location = self.cell(&record, 0);
             let mut after = ByteRecord::new();
-            let has_units = matches!(self.next(reader, &mut after), Ok(true)) && has_no_number(&after);
-            let units = if has_units { ", and the one of units after it," } else { "" };
+            let has_units =
+                matches!(self.next(reader, &mut after), Ok(true)) && has_no_number(&after);
+            let units = if has_units {
+                ", and the one of units after it,"
+            } else {
+                ""
+            };
             let remedy = match (time, frame) {
                 (Some(time), _) => format!("--map 'time={time}'"),
                 (None, frame) => format!(

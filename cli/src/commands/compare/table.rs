@@ -193,7 +193,12 @@ pub(super) fn csv_table(differences: &[ClipDifference]) -> io::Result<String> {
             record.extend(blank(1 + NUMBERS));
             writer.write_record(&record)?;
         }
-        for ScalarDifference { kind, difference: found, .. } in &difference.each_scalar {
+        for ScalarDifference {
+            kind,
+            difference: found,
+            ..
+        } in &difference.each_scalar
+        {
             let mut record: Vec<String> = difference.inputs.to_vec();
             record.push(found.track.clone());
             record.extend(blank(3 * NUMBERS));

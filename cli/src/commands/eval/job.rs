@@ -319,7 +319,11 @@ impl EvaluationJob<'_> {
         order: Option<ComponentOrder>,
     ) -> (EvaluatedResult, EvaluationReport) {
         let methods = self.curve().channel_methods();
-        let mut of_clips = self.work.clips().into_iter().map(|clip| methods.method_of(clip));
+        let mut of_clips = self
+            .work
+            .clips()
+            .into_iter()
+            .map(|clip| methods.method_of(clip));
         let first = of_clips.next().flatten();
         let stated = first.filter(|_| {
             self.arguments.method == MethodChoice::AUTHORED && of_clips.all(|other| other == first)
