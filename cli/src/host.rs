@@ -14,7 +14,8 @@ use crate::arguments::interpolation;
 use crate::commands::view;
 use crate::drivers;
 use crate::messages::exit::{self, Failure};
-use crate::messages::{listing, signals, words};
+use crate::messages::listing::{self, JsonForm};
+use crate::messages::{signals, words};
 
 /// Why a call failed.
 #[derive(Debug)]
@@ -46,10 +47,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let parsed = command.try_get_matches_from_mut(&raw).and_then(|matches| {
         Ok((
             Arguments::from_arg_matches(&matches)?,
-            prints_json(&matches),
+            json_form(&matches),
         ))
     });
-    let (arguments, prints_json) = match parsed {
+    let (arguments, json_form) = match parsed {
         Ok(parsed) => parsed,
         Err(error) => {
             let mut error = error.format(&mut command);
@@ -66,10 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(Ok(())) => exit::DONE,
         Ok(Err(failure)) => {
-            let printed = match prints_json {
-                true => listing::failed(&failure),
-                false => Ok(()),
-            };
+            let printed = json_form.map_or(Ok(()), |form| listing::failed(&failure, form));
             let code = failure.report();
             printed.map_or_else(|failure| failure.report(), |()| code)
         }
@@ -77,10 +75,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Whether the command is one with `--json`, which was given.
-fn prints_json(matches: &ArgMatches) -> bool {
-    let command = matches.subcommand().map(|(_, matches)| matches);
-    command.is_some_and(|matches| matches!(matches.try_get_one("json"), Ok(Some(true))))
+/// The form of the JSON that the command prints; `None` without `--json`.
+fn json_form(matches: &ArgMatches) -> Option<JsonForm> {
+    const OBJECTS: [&str; 6] = ["bench", "check", "compare", "devices", "merge", "prove"];
+    let (name, matches) = matches.subcommand()?;
+    let is_set = matches!(matches.try_get_one("json"), Ok(Some(true)));
+    is_set.then_some(match OBJECTS.contains(&name) {
+        true => JsonForm::Object,
+        false => JsonForm::List,
+    })
 }
 
 /// Sets the command of the child process that loads the Vulkan drivers, instead of this executable; see

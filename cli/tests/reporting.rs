@@ -165,16 +165,19 @@ fn a_command_that_fails_before_its_results_prints_its_failure_as_json() {
         ("eval a.dat -o none/o.npy --json", 7, "none does not exist"),
         ("eval a.dat b.dat -o old.npy --json", 2, "need a directory"),
         ("check none.jsonl --json", 4, "cannot be read"),
+        ("compare bad.dat a.dat --json", 4, "E020"),
     ] {
         let run = run(folder.path(), &words(line));
         assert_eq!(run.code, code, "{line}: {}", run.words);
         let json: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+        // In the form of the command's results: a list, or one object.
+        let json = if json.is_array() { json[0].clone() } else { json };
         assert_eq!(
-            (&json[0]["state"], &json[0]["code"]),
+            (&json["state"], &json["code"]),
             (&"failed".into(), &code.into())
         );
         assert!(
-            json[0]["message"].as_str().unwrap().contains(words_of),
+            json["message"].as_str().unwrap().contains(words_of),
             "{json}"
         );
     }

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use tumble_formats::Code;
 use tumble_formats::printable::{printable, printable_lines};
 
 use crate::batch::entry::InputEntry;
@@ -52,22 +53,37 @@ pub(crate) fn begin() {
     HAS_JSON.store(false, Ordering::Relaxed);
 }
 
-/// The failure of a command as a list of one record, if it ended before its JSON was printed.
-pub(crate) fn failed(failure: &Failure) -> Result<(), Failure> {
+/// What a command prints with `--json`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JsonForm {
+    Object,
+    /// A list of records.
+    List,
+}
+
+/// The failure of a command, in the form of its JSON, if it ended before that was printed.
+pub(crate) fn failed(failure: &Failure, form: JsonForm) -> Result<(), Failure> {
     #[derive(serde::Serialize)]
     struct FailedCommand<'a> {
         state: &'static str,
         code: u8,
         message: &'a str,
+        /// The code of the error in an input, such as E021.
+        diagnostic: Option<&'static str>,
     }
     if HAS_JSON.load(Ordering::Relaxed) || failure.message().is_empty() {
         return Ok(());
     }
-    json(&[FailedCommand {
+    let failed = FailedCommand {
         state: "failed",
         code: failure.code,
         message: failure.message(),
-    }])
+        diagnostic: failure.input_code().map(Code::name),
+    };
+    match form {
+        JsonForm::Object => json(&failed),
+        JsonForm::List => json(&[failed]),
+    }
 }
 
 /// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings

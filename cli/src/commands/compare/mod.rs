@@ -17,7 +17,7 @@ use tumble_formats::compare::{
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npz::open_numbers;
 use tumble_formats::trajectory::{Align, Associate, Step};
-use tumble_formats::{Code, Diagnostic, Format};
+use tumble_formats::{Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::output::one_of;
@@ -174,23 +174,6 @@ enum ComparisonReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let outcome = compare(arguments);
-    // Differences over their bounds have been printed.
-    if let Err(failure) = &outcome
-        && arguments.json
-        && failure.code != DIFFERENCE
-    {
-        listing::json(&serde_json::json!({
-            "state": "failed",
-            "code": failure.code,
-            "message": failure.message(),
-            "diagnostic": failure.input_code().map(Code::name),
-        }))?;
-    }
-    outcome
-}
-
-fn compare(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.with_repeats()?;
     let [first, second] = &inputs[..] else {
         return Err(Failure::usage(format!(
