@@ -805,7 +805,8 @@ fn files_of_other_programs_become_those_of_mjlab() {
 fn scalars_are_compared_one_by_one_and_told_where_they_are_not_drawn() {
     let temporary = folder();
     let folder = temporary.path();
-    let lines = take().lines().enumerate().map(|(frame, line)| match frame {
+    let text = take();
+    let lines = text.lines().enumerate().map(|(frame, line)| match frame {
         10 => {
             let (others, last) = line.rsplit_once(',').unwrap();
             format!("{others},{}\n", last.parse::<f64>().unwrap() + 0.1)

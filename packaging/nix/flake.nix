@@ -38,7 +38,7 @@
               wrapProgram $out/bin/tumble --suffix LD_LIBRARY_PATH : ${pkgs.lib.makeLibraryPath [ pkgs.vulkan-loader ]}
             '';
             meta = {
-              description = "Bulk interpolation of rotations: Vulkan compute and the CPU, with the same bits";
+              description = cargo.package.description;
               license = with pkgs.lib.licenses; [ mit asl20 ];
               mainProgram = "tumble";
             };
